@@ -1,0 +1,1 @@
+"""The page: one simulation process per browser, the 3D view and the panels. The only door to viser."""

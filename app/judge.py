@@ -1,0 +1,88 @@
+"""Judging dragged targets off the page's threads: only the latest question counts."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from robots import Robot
+from robots.reach import ReachJudge
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Where the hand holds a target: position (3,), m; rotation (3, 3) or None; frame: a link's name."""
+
+    position: np.ndarray
+    rotation: np.ndarray | None
+    frame: str
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """accepted: the position itself, or the nearest one found within reach; missing: m between them;
+    turned_away: rad the orientation falls short at the accepted position (0 if none was asked for)."""
+
+    question: Question
+    accepted: np.ndarray
+    missing: float
+    turned_away: float
+
+    @property
+    def reachable(self) -> bool:
+        return self.missing == 0.0
+
+
+class Judge:
+    """A thread with placo on it."""
+
+    def __init__(self, robot: Robot, answer: Callable[[Verdict], None]) -> None:
+        self._robot = robot
+        self._answer = answer
+        self._wake = threading.Condition()
+        self._question: Question | None = None
+        self._closed = False
+        threading.Thread(target=self._work, daemon=True).start()
+
+    def ask(self, question: Question) -> None:
+        with self._wake:
+            self._question = question
+            self._wake.notify()
+
+    def close(self) -> None:
+        with self._wake:
+            self._closed = True
+            self._wake.notify()
+
+    def _next(self) -> Question | None:
+        with self._wake:
+            self._wake.wait_for(lambda: self._closed or self._question is not None)
+            question, self._question = self._question, None
+            return None if self._closed else question
+
+    def _work(self) -> None:
+        judge = ReachJudge(self._robot)
+        data = self._robot.model.createData()
+        q = self._robot.home
+        while (question := self._next()) is not None:
+            # The seed is the last posture: a dragged target moves little between two questions.
+            found = judge.solve(question.position, None, q, question.frame)
+            q = found.q
+            accepted, missing = question.position, 0.0
+            if not found.reachable:
+                pin.forwardKinematics(self._robot.model, data, found.q)
+                frame = self._robot.frame_id(question.frame)
+                accepted = pin.updateFramePlacement(self._robot.model, data, frame).translation.copy()
+                missing = found.position_error
+            turned = 0.0
+            if question.rotation is not None:
+                pose = judge.solve(accepted, question.rotation, q, question.frame)
+                if not pose.reachable:
+                    turned = max(pose.rotation_error, np.radians(1.0))
+                elif missing == 0.0:
+                    q = pose.q
+            self._answer(Verdict(question, accepted, missing, turned))

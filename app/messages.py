@@ -1,0 +1,162 @@
+"""What the page and its simulation process say to each other. Everything here is frozen and picklable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from himpc.telemetry import Layout
+from lessons.events import Event
+from lessons.session import Settings
+from robots import Robot
+
+
+@dataclass(frozen=True)
+class SceneChoice:
+    """Which scene to load, and for `hold` which robot."""
+
+    name: str
+    urdf: str | None = None
+    tip: str | None = None
+    urdf_text: str | None = None
+
+
+# ------------------------------------------------------------------ page → simulation
+
+
+@dataclass(frozen=True)
+class Post:
+    """An event for the session's mailbox."""
+
+    event: Event
+
+
+@dataclass(frozen=True)
+class Play:
+    """Run or pause."""
+
+    running: bool
+
+
+@dataclass(frozen=True)
+class Step:
+    """Pause, then run so many ticks."""
+
+    ticks: int = 1
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Simulated seconds per second that are asked for."""
+
+    factor: float
+
+
+@dataclass(frozen=True)
+class ResetAll:
+    """The scene as it was first loaded, settings included."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """Another scene or robot."""
+
+    choice: SceneChoice
+
+
+@dataclass(frozen=True)
+class Quit:
+    """End the process."""
+
+
+Command = Post | Play | Step | Speed | ResetAll | Load | Quit
+
+
+# ------------------------------------------------------------------ simulation → page
+
+
+@dataclass(frozen=True, eq=False)
+class TaskView:
+    """What the page must know about a task to draw it.
+
+    kind: "position", "orientation" or "joints"; frame: a link's name (tasks on frames only); axes: the
+    world axes under control; raw: where the hand put a draggable target, None for other references; path:
+    (k, 3) closed curve of the reference, m; speed_cap: of the filtered target, m/s or rad/s.
+    """
+
+    name: str
+    level: str
+    kind: str
+    unit: str
+    frame: str
+    axes: str
+    raw: np.ndarray | None
+    path: np.ndarray | None
+    speed_cap: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A scene is loaded and its first tick can run."""
+
+    choice: SceneChoice
+    block: str  # name of the shared memory
+    robot: Robot
+    layout: Layout
+    settings: Settings
+    tasks: tuple[TaskView, ...]
+
+
+@dataclass(frozen=True)
+class BindingRow:
+    """One active constraint of the last plan."""
+
+    level: str
+    joint: str
+    kind: str
+    side: str
+    multiplier: float
+    slack: float
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """What is not worth sending every tick; about ten times a second.
+
+    real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
+    over_budget: ticks whose control step took longer than T_s; resets: how often the scene was reset (the
+    page then puts its gizmo back); targets: raw targets by task; path: (N + 1, 3) predicted tip, m;
+    settings: only after a change.
+    """
+
+    t: float
+    ticks: int
+    running: bool
+    speed: float
+    real_time_factor: float
+    capped: bool
+    over_budget: int
+    resets: int
+    targets: dict[str, np.ndarray]
+    path: np.ndarray
+    binding: tuple[BindingRow, ...]
+    notices: tuple[str, ...] = ()
+    settings: Settings | None = field(default=None)
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A scene or robot could not be loaded; the one before goes on."""
+
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The simulation stopped with an exception."""
+
+    sentence: str
+
+
+Report = Ready | Status | Refused | Failed

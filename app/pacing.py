@@ -1,0 +1,55 @@
+"""How much simulated time is due: in simulated time, never skipping a tick."""
+
+from __future__ import annotations
+
+BACKLOG = 0.1
+"""s of simulated time that may be owed; beyond, simulated time slows down instead of piling up work."""
+_MEMORY = 1.0
+"""s over which the real-time factor is averaged and a cap stays visible."""
+
+
+class Pacer:
+    """Keeps the debt of simulated time. Times are passed in, so that tests need no clock."""
+
+    def __init__(self, now: float) -> None:
+        self.speed = 1.0
+        self._last = now
+        self._debt = 0.0
+        self._capped_at = -float("inf")
+        self._window: tuple[float, float] = (now, 0.0)
+        self._ran = 0.0
+        self._factor = 0.0
+
+    def due(self, now: float, T_s: float) -> int:
+        """Ticks to run now."""
+        self._debt += (now - self._last) * self.speed
+        self._last = now
+        if self._debt > BACKLOG:
+            self._debt = BACKLOG
+            self._capped_at = now
+        return int(self._debt / T_s + 1e-9)
+
+    def ran(self, ticks: int, T_s: float) -> None:
+        """So many ticks were run."""
+        self._debt -= ticks * T_s
+        self._ran += ticks * T_s
+
+    def rest(self, now: float) -> None:
+        """Time passed that is nobody's debt: paused, or busy loading."""
+        self._last = now
+        self._debt = 0.0
+        self._window = (now, self._ran)
+        self._factor = 0.0
+        self._capped_at = -float("inf")
+
+    def capped(self, now: float) -> bool:
+        """Whether simulated time was slowed down within the last second."""
+        return now - self._capped_at < _MEMORY
+
+    def real_time_factor(self, now: float) -> float:
+        """Simulated over real seconds, averaged over about a second."""
+        start, ran = self._window
+        if now - start >= 0.5 * _MEMORY:
+            self._factor = (self._ran - ran) / (now - start)
+            self._window = (now, self._ran)
+        return self._factor

@@ -1,0 +1,122 @@
+"""One browser tab: builds the view and the panels for a learner's session and keeps them up to date."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import viser
+
+from app.learner import Learner
+from app.messages import Load, Ready, SceneChoice
+from app.stage import Stage
+from app.text import block
+from lessons.scenes import SCENES
+
+RATE = 30.0  # Hz, poses
+_PLOTS = 3  # every so many frames
+_TEXTS = 8
+
+
+class Page:
+    """A thread that looks at the learner. It builds a `Stage` whenever the learner has another scene."""
+
+    def __init__(self, client: viser.ClientHandle, learner: Learner, dark: bool, by_path: bool) -> None:
+        self.learner = learner
+        self.on_dark: Callable[[bool], None] = lambda _: None
+        self._client = client
+        self._dark = dark
+        self._by_path = by_path
+        self._stage: Stage | None = None
+        self._built = -1
+        self._failure: str | None = None
+        self._waiting: viser.GuiHtmlHandle | None = None
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._loop, daemon=True)
+
+    def start(self) -> None:
+        gui = self._client.gui
+        gui.set_panel_label("himpc-lab")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(380)
+        self._theme(self._dark)
+        self._waiting = gui.add_html(block("<b>Starting the simulation …</b>"))
+        self._thread.start()
+
+    def close(self) -> None:
+        self._closed.set()
+        if self._thread.ident is not None and self._thread is not threading.current_thread():
+            self._thread.join(2.0)
+        if self._stage is not None:
+            self._stage.close()
+
+    def _theme(self, dark: bool) -> None:
+        self._dark = dark
+        self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
+        self.on_dark(dark)
+
+    def _choose(self, choice: SceneChoice) -> None:
+        if self.learner.failure is not None:
+            self.learner.choice = choice
+            self.learner.restart()
+        else:
+            self.learner.send(Load(choice))
+
+    # ---------------------------------------------------------------- loop
+
+    def _loop(self) -> None:
+        frame = 0
+        while not self._closed.is_set():
+            began = time.perf_counter()
+            self._look(frame)
+            frame += 1
+            self._closed.wait(max(0.002, 1 / RATE - (time.perf_counter() - began)))
+
+    def _look(self, frame: int) -> None:
+        learner = self.learner
+        ready, changed = learner.ready, learner.changed
+        if ready is not None and changed != self._built:
+            self._build(ready)
+            self._built = changed
+        self._pass_on()
+        stage = self._stage
+        if stage is None:
+            return
+        if learner.failure != self._failure:
+            self._failure = learner.failure
+            stage.show_failure(self._failure)
+        stage.follow(
+            plots=frame % _PLOTS == 0,
+            texts=frame % _TEXTS == 0,
+        )
+
+    def _build(self, ready: Ready) -> None:
+        before, self._stage = self._stage, None
+        if before is not None:
+            before.close()
+        with self._client.atomic():
+            self._client.scene.reset()
+            self._client.gui.reset()
+            self._stage = Stage(
+                self._client,
+                self.learner,
+                ready,
+                SCENES,
+                self._dark,
+                self._choose,
+                self._theme,
+                self._by_path,
+            )
+        self._failure = None
+
+    def _pass_on(self) -> None:
+        """Sentences of the session go where they belong."""
+        refusals, notices = self.learner.take_messages()
+        for sentence in refusals:
+            if self._stage is not None:
+                self._stage.refuse(sentence)
+            else:
+                self._client.add_notification("Not loaded", sentence, color="red")
+        for sentence in notices[-3:]:
+            self._client.add_notification("Not changed", sentence, color="orange", auto_close_seconds=8.0)

@@ -1,0 +1,1 @@
+"""Controls and plots of one page; each file one thing."""

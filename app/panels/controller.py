@@ -1,0 +1,159 @@
+"""The controller: horizon, M̄ with its gauge, time step, limits, solver."""
+
+from __future__ import annotations
+
+import viser
+
+from app.palette import BAD, GOOD
+from app.panels.bind import Bindings
+from app.panels.snapshot import Snapshot
+from app.text import bar, block, formula
+from lessons.events import Set
+from lessons.session import Settings
+from robots import Robot
+
+
+class ControllerPanel:
+    """Everything about the controller that can be changed while it runs."""
+
+    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings, robot: Robot) -> None:
+        self._horizon(gui, bindings, settings)
+        self._inertia(gui, bindings, settings, robot)
+        self._limits(gui, bindings, settings)
+        self._solver(gui, bindings, settings)
+
+    def _horizon(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+        with gui.add_folder("Horizon"):
+            knots = gui.add_slider(
+                "N",
+                min=1,
+                max=max(30, settings.horizon),
+                step=1,
+                initial_value=settings.horizon,
+                hint="Knots the controller looks ahead; 1 is the inverse dynamics hierarchy",
+            )
+            with gui.add_folder(None):
+                period = gui.add_slider(
+                    "T_s [ms]",
+                    min=0.5,
+                    max=max(5.0, 1e3 * settings.T_s),
+                    step=0.5,
+                    initial_value=1e3 * settings.T_s,
+                    hint="Control period, and the budget of every control step",
+                )
+        bindings.bind(knots, lambda s: s.horizon, lambda value: Set("horizon", int(value)))
+        bindings.bind(
+            period, lambda s: round(1e3 * s.T_s, 6), lambda value: Set("T_s", round(1e-3 * float(value), 9))
+        )
+
+    def _inertia(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings, robot: Robot) -> None:
+        with gui.add_folder("Inertia guess M̄"):
+            self._gauge = gui.add_html("")
+            with gui.add_folder(None):
+                scale = gui.add_slider(
+                    "M̄ scale",
+                    min=0.1,
+                    max=max(5.0, settings.M_bar_scale),
+                    step=0.05,
+                    initial_value=settings.M_bar_scale,
+                    hint="One factor on the whole diagonal of M̄",
+                )
+            with gui.add_folder("Per joint, kg·m²", expand_by_default=False):
+                for joint in range(robot.n):
+                    with gui.add_folder(None):
+                        value = float(settings.M_bar[joint])
+                        number = gui.add_number(
+                            robot.joint_names[joint], value, min=1e-6, step=_nice_step(value)
+                        )
+                    bindings.bind(
+                        number,
+                        lambda s, joint=joint: float(s.M_bar[joint]),
+                        lambda value, joint=joint: Set("M_bar", self._diagonal(joint, float(value))),
+                    )
+        self._diagonal_now = tuple(float(value) for value in settings.M_bar)
+        bindings.bind(scale, lambda s: float(s.M_bar_scale), lambda value: Set("M_bar_scale", float(value)))
+
+    def _diagonal(self, joint: int, value: float) -> tuple[float, ...]:
+        diagonal = self._diagonal_now
+        # Remembered at once: a second joint may be edited before the session answers.
+        self._diagonal_now = (*diagonal[:joint], value, *diagonal[joint + 1 :])
+        return self._diagonal_now
+
+    def _limits(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+        limits = settings.limits
+        with gui.add_folder("Limits"):
+            torque = gui.add_checkbox("Torque", limits.torque)
+            velocity = gui.add_checkbox("Velocity", limits.velocity)
+            position = gui.add_dropdown(
+                "Position",
+                ("viability", "paper", "off"),
+                initial_value=limits.position,
+                hint="viability: a speed from which the joint can still stop. paper: the rows as printed, "
+                "which a few milliseconds of horizon cannot keep: the list of rungs shows it.",
+            )
+            scales = []
+            for name, value in (("Torque", limits.torque_scale), ("Velocity", limits.velocity_scale)):
+                with gui.add_folder(None):
+                    scales.append(
+                        gui.add_slider(
+                            f"{name} scale", min=0.05, max=max(2.0, value), step=0.05, initial_value=value
+                        )
+                    )
+        bindings.bind(torque, lambda s: s.limits.torque, lambda on: Set("limits.torque", bool(on)))
+        bindings.bind(velocity, lambda s: s.limits.velocity, lambda on: Set("limits.velocity", bool(on)))
+        bindings.bind(position, lambda s: s.limits.position, lambda mode: Set("limits.position", str(mode)))
+        bindings.bind(
+            scales[0],
+            lambda s: float(s.limits.torque_scale),
+            lambda value: Set("limits.torque_scale", float(value)),
+        )
+        bindings.bind(
+            scales[1],
+            lambda s: float(s.limits.velocity_scale),
+            lambda value: Set("limits.velocity_scale", float(value)),
+        )
+
+    def _solver(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+        with gui.add_folder("Solver", expand_by_default=False):
+            for label, path, options, hint in (
+                ("Route", "route", ("structured", "explicit"), "Two ways to the same torque"),
+                ("QP solver", "solver", ("daqp", "proxqp"), "For the QPs with active bounds"),
+                ("R weighs", "R_on", ("torque", "acceleration"), "Δτ as printed, or M̄⁻¹Δτ"),
+            ):
+                with gui.add_folder(None):
+                    choice = gui.add_dropdown(
+                        label, options, initial_value=str(getattr(settings, path)), hint=hint
+                    )
+                bindings.bind(
+                    choice,
+                    lambda s, path=path: str(getattr(s, path)),
+                    lambda value, path=path: Set(path, str(value)),
+                )
+        with gui.add_folder("Why M̄ matters", expand_by_default=False):
+            gui.add_html(
+                formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
+                + block("Time-delay estimation: the torque and acceleration of the tick before stand for the "
+                        "whole dynamics, M̄ for the inertia. The estimation error dies out if")
+                + formula(r"\rho(I - M^{-1} \bar M) < 1")
+            )  # fmt: skip
+
+    def update(self, now: Snapshot) -> None:
+        self._diagonal_now = tuple(float(value) for value in now.settings.M_bar)
+        norm, radius = now.number("gauge_norm"), now.number("gauge_radius")
+        self._gauge.content = block(
+            f"spectral radius of I − M⁻¹M̄: <b>{radius:.3f}</b>{_verdict(radius)}"
+            f"{bar(radius / 2, GOOD if radius < 1 else BAD, 0.5)}"
+            f"norm ‖I − M⁻¹M̄‖₂: <b>{norm:.3f}</b>{_verdict(norm)}"
+            f"{bar(norm / 2, GOOD if norm < 1 else BAD, 0.5)}"
+            "The line marks 1. Below it the estimation error dies out; a norm below 1 says so at once, "
+            "the radius decides."
+        )
+
+
+def _verdict(value: float) -> str:
+    return "" if value != value else " &lt; 1 ✓" if value < 1 else " ≥ 1"
+
+
+def _nice_step(value: float) -> float:
+    """A tenth of the value's decade: one click is a visible change whatever the joint's size."""
+    return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1

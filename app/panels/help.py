@@ -1,0 +1,49 @@
+"""The last tab: keys, what is drawn, words."""
+
+from __future__ import annotations
+
+import viser
+
+from app.text import block
+
+_KEYS = (
+    ("Space", "run or pause"),
+    ("S", "a single control tick (pauses first)"),
+    ("R", "robot back to its start, settings kept"),
+    ("1 … 9", "switch the level at that place on or off"),
+    ("Ctrl K", "every command, searchable"),
+)
+_WORDS = (
+    ("level", "priority, 1 is the highest; a lower level never disturbs a higher one"),
+    ("Q, R", "weights of the residual and of the changes of torque"),
+    ("M̄", "the controller's constant, diagonal guess of the inertia matrix"),
+    ("N", "horizon: knots the controller looks ahead, T_s apart"),
+    (
+        "priority leak",
+        "how far lower levels move higher ones in the controller's own prediction; should be 0",
+    ),
+    ("dynamic leak", "the same with the plant's true inertia: what the wrong M̄ costs"),
+    ("rung", "what was applied when a QP had no sound solution; anything but 'solved' is shown in red"),
+    ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
+)
+_DRAWN = (
+    ("ball with arrows", "the target your hand holds; rings turn it while the orientation level is on"),
+    ("small frame with a ball", "the filtered target the controller follows now (speed and acceleration capped)"),
+    ("large thin frame", "the actual hand"),
+    ("line behind the hand", "where it went in the last seconds"),
+    ("pink line", "the predicted path of the hand, motion enlarged as its label says"),
+)  # fmt: skip
+
+
+class HelpPanel:
+    """Plain text; nothing here changes."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        for title, rows in (("Keys", _KEYS), ("In the scene", _DRAWN), ("Words", _WORDS)):
+            with gui.add_folder(title):
+                cells = "".join(
+                    f'<tr><td style="white-space:nowrap;vertical-align:top;padding-right:0.8em"><b>{word}</b>'
+                    f"</td><td>{meaning}</td></tr>"
+                    for word, meaning in rows
+                )
+                gui.add_html(block(f'<table style="border-spacing:0 0.2em">{cells}</table>'))

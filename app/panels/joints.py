@@ -1,0 +1,178 @@
+"""Torques, velocities and positions inside their bounds: all joints in shares, or one in its units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from app.history import History
+from app.palette import BAD, BOUND, GOOD, joint_colour
+from app.panels.chart import Chart, Line
+from app.text import block
+from robots import Robot
+from robots.truth import joint_axis
+
+_ALL = "All joints, % of bound"
+_SHARE = 120.0  # %: the axis ends a little beyond the bounds
+_RUG = 0.035  # height of the mark "at its bound", as a share of the axis
+
+
+@dataclass(frozen=True, eq=False)
+class _Quantity:
+    """values, lower, upper: (rows, n), NaN or infinite where unknown; fallback (2, n): the data sheet's."""
+
+    title: str
+    values: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+class JointPlots:
+    """Three charts. The choice is only noted by the callback; the page's loop builds and draws."""
+
+    def __init__(self, gui: viser.GuiApi, robot: Robot) -> None:
+        self._gui, self._robot = gui, robot
+        self._sheet = _sheet(robot)
+        self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
+        self._joint: int | None = None
+        self._built: int | None = -1
+        self._charts: list[Chart] = []
+        options = (_ALL, *robot.joint_names)
+        choice = gui.add_dropdown("Joints", options, initial_value=_ALL)
+        self._place = gui.add_folder(None)
+        gui.add_html(
+            block(
+                "Shaded: inside the bounds in force (the data sheet's where a bound is off). "
+                'A <b style="color:rgb(225,45,45)">red mark</b> along the bottom: a shown joint is at its bound.'
+            )
+        )
+
+        @choice.on_update
+        async def _(_: object) -> None:
+            index = options.index(str(choice.value)) - 1
+            self._joint = None if index < 0 else index
+
+    def draw(self, history: History, T_s: float) -> None:
+        joint = self._joint
+        if joint != self._built:
+            self._build(joint)
+        ages = history.ages(T_s)
+        for kind, (chart, quantity) in enumerate(zip(self._charts, self._read(history), strict=True)):
+            at_bound = history.at_bound(kind)
+            known = np.isfinite(quantity.values[:, 0])
+            if joint is None:
+                middle, half = (
+                    0.5 * (quantity.upper + quantity.lower),
+                    0.5 * (quantity.upper - quantity.lower),
+                )
+                shares = 100.0 * (quantity.values - middle) / np.where(half > 0, half, np.inf)
+                edge = np.where(known, 100.0, np.nan)
+                low, high = -_SHARE, _SHARE
+                lines = [*shares.T, edge, -edge]
+                marked = at_bound.any(axis=1)
+            else:
+                low, high = self._span(kind, joint)
+                unit = self._unit(kind, joint)[1]
+                lines = [
+                    unit * quantity.values[:, joint],
+                    unit * quantity.upper[:, joint],
+                    unit * quantity.lower[:, joint],
+                ]
+                marked = at_bound[:, joint]
+            rug = np.where(marked, low + _RUG * (high - low), low)
+            chart.show(ages, [*lines, rug])
+
+    def _read(self, history: History) -> Sequence[_Quantity]:
+        columns, fields = history.columns, history.layout.fields
+        v = columns(fields["v_limit"])
+        found = (
+            ("Torque", "tau", columns(fields["tau_lower"]), columns(fields["tau_upper"])),
+            ("Velocity", "v", -v, v),
+            ("Position", "q", columns(fields["q_lower"]), columns(fields["q_upper"])),
+        )
+        quantities: list[_Quantity] = []
+        for kind, (title, field, lower, upper) in enumerate(found):
+            sheet_lower, sheet_upper = self._sheet[kind]
+            quantities.append(
+                _Quantity(
+                    title,
+                    columns(fields[field]),
+                    np.where(np.isfinite(lower), lower, sheet_lower),
+                    np.where(np.isfinite(upper), upper, sheet_upper),
+                )
+            )
+        return quantities
+
+    def _unit(self, kind: int, joint: int) -> tuple[str, float]:
+        """(unit on the axis, factor from SI)."""
+        if self._prismatic[joint]:
+            return (("N", 1.0), ("m/s", 1.0), ("m", 1.0))[kind]
+        return (("N·m", 1.0), ("°/s", np.degrees(1.0)), ("°", np.degrees(1.0)))[kind]
+
+    def _span(self, kind: int, joint: int) -> tuple[float, float]:
+        factor = self._unit(kind, joint)[1]
+        lower, upper = (factor * float(side[joint]) for side in self._sheet[kind])
+        margin = 0.1 * (upper - lower)
+        return lower - margin, upper + margin
+
+    def _build(self, joint: int | None) -> None:
+        for chart in self._charts:
+            chart.remove()
+        names = self._robot.joint_names
+        with self._place:
+            self._charts = [
+                self._all(title, names, last=kind == 2) if joint is None else self._one(title, kind, joint)
+                for kind, title in enumerate(("Torque", "Velocity", "Position"))
+            ]
+        self._built = joint
+
+    def _all(self, title: str, names: tuple[str, ...], last: bool) -> Chart:
+        n = len(names)
+        lines = [Line(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
+        bounds = [Line("bound", BOUND, dashed=True), Line("bound", BOUND, dashed=True)]
+        return Chart(
+            self._gui,
+            f"{title}, % of bound",
+            [*lines, *bounds, Line("at bound", BAD, fill=True, width=0.5)],
+            (-_SHARE, _SHARE),
+            height=170,
+            bands=((n, n + 1, GOOD),),
+            legend=last,  # one legend serves the three
+        )
+
+    def _one(self, title: str, kind: int, joint: int) -> Chart:
+        return Chart(
+            self._gui,
+            f"{title}, {self._unit(kind, joint)[0]}",
+            [
+                Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0),
+                Line("upper bound", BOUND, dashed=True),
+                Line("lower bound", BOUND, dashed=True),
+                Line("at bound", BAD, fill=True, width=0.5),
+            ],
+            self._span(kind, joint),
+            height=170,
+            bands=((1, 2, GOOD),),
+            legend=kind == 2,
+        )
+
+
+def _sheet(robot: Robot) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """The robot's own bounds; ± one turn where a joint has none."""
+    tau = np.where(np.isfinite(robot.tau_limit), robot.tau_limit, 1e3)
+    v = np.where(np.isfinite(robot.v_limit), robot.v_limit, 1e2)
+    return (
+        (-tau, tau),
+        (-v, v),
+        (
+            np.where(np.isfinite(robot.q_lower), robot.q_lower, -2 * np.pi),
+            np.where(np.isfinite(robot.q_upper), robot.q_upper, 2 * np.pi),
+        ),
+    )
+
+
+def _short(name: str, index: int) -> str:
+    return name if len(name) <= 8 else f"joint {index + 1}"

@@ -1,0 +1,57 @@
+"""What the plant really is. The controller is told none of it."""
+
+from __future__ import annotations
+
+import viser
+
+from app.panels.bind import Bindings, scalar
+from app.text import block
+from lessons.events import Set
+from lessons.session import Settings
+
+_SLIDERS = (
+    # label, field, least, greatest, step, hint
+    ("Payload [kg]", "payload_kg", 0.0, 10.0, 0.1, "A mass at the hand that the controller does not know"),
+    ("Coulomb friction [N·m]", "friction", 0.0, 10.0, 0.1, "The same at every joint"),
+    ("Viscous friction [N·m·s/rad]", "damping", 0.0, 10.0, 0.1, "The same at every joint"),
+    ("Armature [kg·m²]", "armature", 0.0, 1.0, 0.01, "Reflected inertia of the motors"),
+    ("Inertia scale", "inertia_scale", 0.2, 3.0, 0.05, "Factor on the mass and inertia of every link"),
+    ("Encoder step [0.001°]", "encoder_resolution_deg", 0.0, 20.0, 0.25, "0 is an ideal sensor"),
+    ("Torque lag [ms]", "torque_lag_ms", 0.0, 20.0, 0.5, "First-order lag of the motors"),
+    ("Delay [ms]", "delay_ms", 0.0, 10.0, 0.5, "From command to torque"),
+)
+_UNIT = {"encoder_resolution_deg": 1e3}
+
+
+class PlantPanel:
+    """Sliders of the plant's settings."""
+
+    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+        gui.add_html(block("This is the truth in the simulation. The controller sees none of it."))
+        for label, field, low, high, step, hint in _SLIDERS:
+            unit = _UNIT.get(field, 1.0)
+            value = _shown(settings, field, unit)
+            with gui.add_folder(None):
+                slider = gui.add_slider(
+                    label, min=low, max=max(high, value), step=step, initial_value=value, hint=hint
+                )
+            bindings.bind(
+                slider,
+                lambda s, field=field, unit=unit: _shown(s, field, unit),
+                lambda number, field=field, unit=unit: Set(f"plant.{field}", float(number) / unit),
+            )
+        for label, field, hint in (
+            ("Motors saturate", "saturate", "Clip the torque at the data sheet's limits"),
+            ("Gravity", "gravity", "Off: a weightless plant"),
+        ):
+            with gui.add_folder(None):
+                box = gui.add_checkbox(label, bool(getattr(settings.plant, field)), hint=hint)
+            bindings.bind(
+                box,
+                lambda s, field=field: bool(getattr(s.plant, field)),
+                lambda on, field=field: Set(f"plant.{field}", bool(on)),
+            )
+
+
+def _shown(settings: Settings, field: str, unit: float) -> float:
+    return round(scalar(getattr(settings.plant, field)) * unit, 9)

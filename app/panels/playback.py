@@ -1,0 +1,108 @@
+"""Run, pause, step, speed, reset, and how honest the clock is. Always visible above the tabs."""
+
+from __future__ import annotations
+
+import viser
+
+from app.learner import Learner
+from app.messages import Play, Post, Speed, Step
+from app.palette import BAD, GOOD, LEVELS
+from app.panels.snapshot import Snapshot
+from app.text import badge, block, esc
+from lessons.events import Reset
+
+_PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
+
+
+class PlaybackPanel:
+    """Buttons and a status line."""
+
+    def __init__(self, gui: viser.GuiApi, learner: Learner) -> None:
+        self._learner = learner
+        self._failure = gui.add_html("", visible=False)
+        self._status = gui.add_html(block("Starting the simulation …"))
+        self._buttons = gui.add_button_group(
+            "Playback",
+            (_PAUSE, _STEP, _RESET, _RESET_ALL),
+            hint="Space: run or pause · S: one control tick · R: robot back to its start. "
+            "Reset all also brings every setting back.",
+        )
+        with gui.add_folder(None):
+            self._speed = gui.add_slider(
+                "Speed",
+                min=0.1,
+                max=1.0,
+                step=0.1,
+                initial_value=1.0,
+                hint="Simulated seconds per second",
+            )
+        self._shown: tuple[str, str] = ("", "")
+
+        @self._buttons.on_click
+        async def _(_: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            self._click(str(self._buttons.value))
+
+        @self._speed.on_update
+        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+            if event.client is not None:
+                learner.send(Speed(float(self._speed.value)))
+
+        for label, key, choice in (
+            ("Run or pause", "space", _RUN),
+            ("Reset the robot", "R", _RESET),
+            ("Single control tick", "S", _STEP),
+        ):
+            self._hotkey(gui, label, key, choice)
+
+    def _hotkey(self, gui: viser.GuiApi, label: str, key: str, choice: str) -> None:
+        command = gui.add_command(label, hotkey=key)  # pyright: ignore[reportArgumentType]
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            self._click(choice)
+
+    def _click(self, choice: str) -> None:
+        learner = self._learner
+        if choice in (_PAUSE, _RUN):
+            running = learner.status is not None and learner.status.running
+            learner.send(Play(not running))
+        elif choice == _STEP:
+            learner.send(Step())
+        elif choice == _RESET and learner.failure is None:
+            learner.send(Post(Reset()))
+        else:
+            learner.reset_all()
+
+    def show_failure(self, sentence: str | None) -> None:
+        """A crash of the simulation, or None."""
+        self._failure.visible = sentence is not None
+        if sentence is not None:
+            self._failure.content = block(
+                f"{badge('STOPPED', BAD)} {esc(sentence)}<br><b>Press Reset to start again.</b>",
+                "border-left:3px solid " + "rgb(225,45,45);margin:0.4em 0",
+            )
+            self._status.content = block("No simulation is running.")
+
+    def update(self, now: Snapshot) -> None:
+        status = now.status
+        first = _PAUSE if status.running else _RUN
+        if self._buttons.options[0] != first:
+            self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
+        if abs(self._speed.value - status.speed) > 1e-9 and status.ticks < 500:
+            self._speed.value = status.speed
+        state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
+        if status.capped:
+            state += " " + badge("CAPPED", LEVELS[0])
+        factor = f"{status.real_time_factor:.2f} × real time" if status.running else f"tick {status.ticks}"
+        share = 100 * status.over_budget / max(status.ticks, 1)
+        budget = 1e3 * now.settings.T_s
+        cap = (
+            "<br><b>CAPPED</b>: this computer cannot keep up, so simulated time runs slower; "
+            "no control tick is skipped."
+            if status.capped
+            else ""
+        )
+        self._status.content = block(
+            f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
+            f"<br>{status.over_budget} ticks over the {budget:g} ms budget ({share:.1f} %){cap}"
+        )

@@ -1,0 +1,306 @@
+"""What one scene looks like in one page: the 3D view, the panels, and how they follow the session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import viser
+
+from app.judge import Judge, Question, Verdict
+from app.learner import Learner
+from app.messages import Post, Ready, SceneChoice, TaskView
+from app.palette import LEVELS, level_colours
+from app.panels.bind import Bindings
+from app.panels.binding import BindingPanel
+from app.panels.controller import ControllerPanel
+from app.panels.help import HelpPanel
+from app.panels.joints import JointPlots
+from app.panels.plant import PlantPanel
+from app.panels.playback import PlaybackPanel
+from app.panels.plots import LevelPlots
+from app.panels.robot import RobotPanel
+from app.panels.snapshot import Snapshot
+from app.panels.start import StartPanel
+from app.panels.tasks import TasksPanel
+from app.view.robot import RobotView, camera_for
+from app.view.target import Frames, TargetGizmo
+from app.view.trails import Trails
+from lessons.events import Event, MoveTarget
+from lessons.session import Settings
+
+_HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
+
+
+class Stage:
+    """Built once per scene. `follow` is called by the page's loop; callbacks only post."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        learner: Learner,
+        ready: Ready,
+        scenes: Mapping[str, str],
+        dark: bool,
+        choose: Callable[[SceneChoice], None],
+        theme: Callable[[bool], None],
+        by_path: bool,
+    ) -> None:
+        self._client, self._learner, self._ready = client, learner, ready
+        self._colours = level_colours([task.level for task in _in_order(ready)])
+        self._verdict: Verdict | None = None
+        self._resets: int | None = None
+        self._T_s = ready.settings.T_s
+        self._judge: Judge | None = None
+        self._build_panels(client.gui, scenes, dark, choose, theme, by_path)
+        self._build_scene(client)
+
+    # ---------------------------------------------------------------- building
+
+    def _build_panels(
+        self,
+        gui: viser.GuiApi,
+        scenes: Mapping[str, str],
+        dark: bool,
+        choose: Callable[[SceneChoice], None],
+        theme: Callable[[bool], None],
+        by_path: bool,
+    ) -> None:
+        ready, settings = self._ready, self._learner.settings or self._ready.settings
+        draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
+        self._bindings = Bindings(self._post)
+        self._playback = PlaybackPanel(gui, self._learner)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Start"):
+            self._start = StartPanel(gui, self._post, ready.robot.joint_names, draggable, dark)
+        with tabs.add_tab("Tasks"):
+            self._tasks = TasksPanel(gui, self._bindings, settings, self._colours, self._settings)
+        with tabs.add_tab("Control"):
+            self._controller = ControllerPanel(gui, self._bindings, settings, ready.robot)
+        with tabs.add_tab("Plant"):
+            PlantPanel(gui, self._bindings, settings)
+        with tabs.add_tab("Robot"):
+            self._robot_panel = RobotPanel(gui, ready, scenes, choose, by_path)
+        with tabs.add_tab("Help"):
+            HelpPanel(gui)
+        self._start.on_theme = theme
+        self._start.on_recall = self._recall
+        for place, key in enumerate(_HOTKEYS[: len(settings.levels)]):
+            self._level_hotkey(gui, place, key)
+        plots = gui.add_panel()
+        with plots.add_tab("Errors"):
+            self._level_plots = LevelPlots(gui, ready, self._colours)
+        with plots.add_tab("Joints"):
+            self._joint_plots = JointPlots(gui, ready.robot)
+        with plots.add_tab("Who binds"):
+            self._binding = BindingPanel(gui, self._colours)
+        plots.dock_left()
+        plots.set_width(400)
+
+    def _level_hotkey(self, gui: viser.GuiApi, place: int, key: str) -> None:
+        command = gui.add_command(f"Level {place + 1} on or off", hotkey=key)  # pyright: ignore[reportArgumentType]
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            event = self._tasks.toggle(place)
+            if event is not None:
+                self._post(event)
+
+    def _build_scene(self, client: viser.ClientHandle) -> None:
+        ready, scene = self._ready, client.scene
+        scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
+        self._robot = RobotView(scene, ready.robot)
+        poses = self._learner.read(lambda block, _: block.poses())
+        tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
+        position, orientation = _draggable(ready.tasks)
+        colour = LEVELS[0]
+        self._gizmo: TargetGizmo | None = None
+        self._frames = Frames(scene)
+        if position is not None:
+            colour = self._colours[position.level]
+            size = float(np.clip(0.28 * self._robot.size, 0.12, 0.35))
+            targets = {} if self._learner.status is None else self._learner.status.targets
+            self._gizmo = TargetGizmo(
+                scene,
+                position,
+                orientation,
+                colour,
+                _full(position, targets.get(position.name, position.raw), tip[:3]),
+                np.eye(3) if orientation is None else targets.get(orientation.name, _raw(orientation)),
+                size,
+                self._moved,
+            )
+            self._judge = Judge(ready.robot, self._judged)
+        curves = [
+            (task.path, self._colours[task.level])
+            for task in ready.tasks
+            if task.kind == "position" and task.path is not None
+        ]
+        self._trails = Trails(scene, curves, colour)
+        eye, at = camera_for(ready.robot)
+        client.camera.up_direction = (0.0, 0.0, 1.0)
+        client.camera.position = eye
+        client.camera.look_at = at
+
+    # ---------------------------------------------------------------- events out
+
+    def _settings(self) -> Settings:
+        return self._learner.settings or self._ready.settings
+
+    def _post(self, event: Event) -> None:
+        self._learner.send(Post(event))
+
+    def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
+        """The hand moved the target: the judge first, so that the controller gets one answer, not two."""
+        gizmo = self._gizmo
+        assert gizmo is not None and self._judge is not None
+        self._start.dragged()
+        self._judge.ask(Question(position, rotation, gizmo.position.frame))
+        if rotation is not None and gizmo.orientation is not None:
+            self._post(MoveTarget(gizmo.orientation.name, _xyzw(rotation)))
+
+    def _judged(self, verdict: Verdict) -> None:
+        gizmo = self._gizmo
+        assert gizmo is not None
+        clamp = bool(self._start.clamp.value)
+        place = verdict.accepted if clamp else verdict.question.position
+        axes = ["xyz".index(axis) for axis in gizmo.position.axes]
+        self._post(MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes)))
+        self._verdict = verdict
+
+    def _recall(self) -> None:
+        gizmo = self._gizmo
+        poses = self._learner.read(lambda block, _: block.poses())
+        if gizmo is not None and poses is not None:
+            rotation = viser.transforms.SO3(poses[-1, 3:]).as_matrix()
+            gizmo.put(poses[-1, :3], rotation)
+            self._moved(poses[-1, :3], rotation if gizmo.orientation is not None else None)
+
+    # ---------------------------------------------------------------- following
+
+    def refuse(self, sentence: str) -> None:
+        self._robot_panel.refuse(sentence)
+
+    def show_failure(self, sentence: str | None) -> None:
+        self._playback.show_failure(sentence)
+
+    def follow(self, plots: bool, texts: bool) -> None:
+        """Shows the newest poses, and now and then plots and texts."""
+        learner = self._learner
+        found = learner.read(lambda block, history: (block.poses(), history.pull()))
+        if found is None:
+            return
+        poses, _ = found
+        with self._client.atomic():
+            self._robot.move(poses[:-1])
+            self._frames.actual(poses[-1])
+        if learner.failure is not None or learner.status is None:
+            return
+        status, settings = learner.status, self._settings()
+        if settings.T_s != self._T_s:
+            self._T_s = settings.T_s
+            learner.new_time_step(self._T_s)
+        if status.resets != self._resets:
+            self._after_reset(first=self._resets is None)
+            self._resets = status.resets
+        self._trails.add(status.t, poses[-1, :3])
+        if plots:
+            self._draw()
+        if texts:
+            self._write()
+
+    def _after_reset(self, first: bool) -> None:
+        status = self._learner.status
+        assert status is not None
+        self._trails.clear()
+        if first:
+            return
+        self._learner.read(lambda _, history: history.forget())
+        gizmo = self._gizmo
+        if gizmo is not None:
+            raw = status.targets.get(gizmo.position.name)
+            turned = None if gizmo.orientation is None else status.targets.get(gizmo.orientation.name)
+            gizmo.put(_full(gizmo.position, raw, gizmo.raw), turned)
+        self._verdict = None
+
+    def _draw(self) -> None:
+        learner, settings = self._learner, self._settings()
+        status = learner.status
+        assert status is not None
+        with self._client.atomic():
+            self._show()
+            self._trails.draw(status.path, settings.T_s)
+            learner.read(lambda _, history: self._level_plots.draw(history, settings.T_s))
+            learner.read(lambda _, history: self._joint_plots.draw(history, settings.T_s))
+
+    def _show(self) -> None:
+        gizmo, settings = self._gizmo, self._settings()
+        self._frames.show(bool(self._start.frames.value))
+        self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
+        if gizmo is None:
+            return
+        fields = self._ready.layout.fields
+        latest = self._learner.read(lambda _, history: history.latest)
+        if latest is not None:
+            turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
+            self._frames.desired(
+                _full(gizmo.position, latest[fields[f"x_d/{gizmo.position.name}"]], gizmo.raw), turned
+            )
+        if gizmo.orientation is not None:
+            name = gizmo.orientation.level
+            gizmo.show_rings(any(level.name == name and level.enabled for level in settings.levels))
+        verdict = self._verdict
+        if verdict is not None:
+            gizmo.show_accepted(verdict.accepted, verdict.missing)
+
+    def _write(self) -> None:
+        learner, settings = self._learner, self._settings()
+        found = learner.read(lambda _, history: (history.latest, history.bound_ticks.copy(), history.count))
+        if found is None or learner.status is None or found[2] == 0:
+            return
+        now = Snapshot(self._ready, settings, learner.status, found[0], found[1] * settings.T_s)
+        with self._client.atomic():
+            self._playback.update(now)
+            self._start.show_verdict(self._verdict, bool(self._start.clamp.value))
+            self._tasks.update(now)
+            self._controller.update(now)
+            self._binding.update(now)
+            self._bindings.refresh(settings)
+
+    def close(self) -> None:
+        if self._judge is not None:
+            self._judge.close()
+
+
+def _in_order(ready: Ready) -> list[TaskView]:
+    return list({task.level: task for task in ready.tasks}.values())
+
+
+def _draggable(tasks: tuple[TaskView, ...]) -> tuple[TaskView | None, TaskView | None]:
+    """The first position target of the stack, and an orientation target of the same frame."""
+    position = next((t for t in tasks if t.kind == "position" and t.raw is not None), None)
+    if position is None:
+        return None, None
+    orientation = next(
+        (t for t in tasks if t.kind == "orientation" and t.raw is not None and t.frame == position.frame),
+        None,
+    )
+    return position, orientation
+
+
+def _raw(task: TaskView) -> np.ndarray:
+    assert task.raw is not None
+    return task.raw
+
+
+def _full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
+    """A point in space from the coordinates under control."""
+    point = np.array(else_, float)
+    if values is not None:
+        point[["xyz".index(axis) for axis in task.axes]] = values
+    return point
+
+
+def _xyzw(rotation: np.ndarray) -> tuple[float, ...]:
+    w, x, y, z = viser.transforms.SO3.from_matrix(rotation).wxyz
+    return float(x), float(y), float(z), float(w)

@@ -1,0 +1,70 @@
+"""Numbers and snippets of HTML for people. Whatever a user or a file named passes through `esc`."""
+
+from __future__ import annotations
+
+import html
+import math
+from functools import lru_cache
+
+from latex2mathml.converter import convert
+
+from app.palette import RGB, css
+
+esc = html.escape
+
+
+def quantity(value: float, unit: str) -> str:
+    """A length in m or an angle in rad in the unit and with the digits a reader wants."""
+    if not math.isfinite(value):
+        return "–"
+    if unit == "m":
+        size = abs(value)
+        return f"{value * 1e6:.0f} µm" if size < 1e-4 else f"{value * 1e3:.{_digits(size * 1e3)}f} mm"
+    degrees = math.degrees(value)
+    return f"{degrees:.{max(1, _digits(abs(degrees)))}f}°"
+
+
+def _digits(size: float) -> int:
+    return 0 if size >= 100 else 1 if size >= 10 else 2
+
+
+def swatch(colour: RGB) -> str:
+    """A small square in a level's colour."""
+    return (
+        '<span style="display:inline-block;width:0.75em;height:0.75em;border-radius:2px;'
+        f'background:{css(colour)};margin-right:0.4em"></span>'
+    )
+
+
+def badge(text: str, colour: RGB) -> str:
+    return (
+        f'<span style="background:{css(colour)};color:#fff;border-radius:4px;padding:0 0.4em;'
+        f'font-weight:600;white-space:nowrap">{esc(text)}</span>'
+    )
+
+
+def block(inner: str, style: str = "") -> str:
+    """A paragraph in the panel's own size."""
+    return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
+
+
+def bar(share: float, colour: RGB, mark: float | None = None) -> str:
+    """A horizontal gauge; `mark` draws a line across it. Both as shares of its width."""
+    width = 100 * min(max(share, 0.0), 1.0)
+    line = (
+        ""
+        if mark is None
+        else f'<div style="position:absolute;left:{100 * mark:.1f}%;top:-2px;bottom:-2px;width:2px;'
+        'background:currentColor"></div>'
+    )
+    return (
+        '<div style="position:relative;height:8px;border-radius:4px;background:rgba(139,149,161,0.25);'
+        f'margin:0.25em 0"><div style="width:{width:.1f}%;height:100%;border-radius:4px;'
+        f'background:{css(colour)}"></div>{line}</div>'
+    )
+
+
+@lru_cache(maxsize=64)
+def formula(latex: str) -> str:
+    """A LaTeX formula as MathML that scrolls instead of being cut off."""
+    return f'<div style="overflow-x:auto;padding:0.3em 0.75em">{convert(latex, display="block")}</div>'

@@ -1,0 +1,128 @@
+"""The target a hand drags: gizmo, ball, and what the controller makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+import viser.transforms as vtf
+
+from app.messages import TaskView
+from app.palette import BAD, RGB
+
+Moved = Callable[[np.ndarray, np.ndarray | None], None]
+
+_BALL = 0.028  # m
+_FRAME = 0.09  # m
+
+
+class TargetGizmo:
+    """A gizmo on a position task, with rotation rings while an orientation task of the same frame is on.
+
+    The ball is where the hand is. If that is out of reach it turns into a red ghost, and a ball in the
+    task's colour with a line to it marks the place the controller was given instead.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        position: TaskView,
+        orientation: TaskView | None,
+        colour: RGB,
+        start: np.ndarray,
+        rotation: np.ndarray,
+        size: float,
+        moved: Moved,
+    ) -> None:
+        """start (3,): where the target is, m; rotation (3, 3); size: of the gizmo, m; moved: called with
+        the raw position and, if rings are shown, the raw rotation."""
+        self.position, self.orientation = position, orientation
+        self._rings = orientation is not None
+        self.dragging = False
+        self._gizmo = scene.add_transform_controls(
+            "/target",
+            scale=size,
+            position=start,
+            wxyz=_wxyz(rotation),
+            active_axes=tuple(axis in position.axes for axis in "xyz"),  # pyright: ignore[reportArgumentType]
+            disable_rotations=orientation is None,
+            depth_test=False,
+            line_width=3.0,
+        )
+        self._ball = scene.add_icosphere("/target/ball", radius=_BALL, color=colour, cast_shadow=False)
+        self._ghost = scene.add_icosphere(
+            "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False
+        )
+        self._label = scene.add_label("/target/label", "", position=(0.0, 0.0, 0.09), visible=False)
+        self._accepted = scene.add_icosphere(
+            "/accepted", radius=_BALL, color=colour, visible=False, cast_shadow=False
+        )
+        self._gap = scene.add_line_segments(
+            "/gap", np.zeros((1, 2, 3), np.float32), BAD, thickness=0.006, visible=False
+        )
+
+        @self._gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            self.dragging = event.phase != "end"
+            moved(self.raw, self.rotation if self._rings else None)
+
+    @property
+    def raw(self) -> np.ndarray:
+        return np.array(self._gizmo.position, float)
+
+    @property
+    def rotation(self) -> np.ndarray:
+        return vtf.SO3(np.array(self._gizmo.wxyz, float)).as_matrix()
+
+    def show_rings(self, on: bool) -> None:
+        """Whether the hand may turn the target."""
+        on = on and self.orientation is not None
+        if on != self._rings:
+            self._rings = on
+            self._gizmo.disable_rotations = not on
+
+    def put(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
+        """Moves the gizmo itself, after a reset."""
+        self._gizmo.position = position
+        if rotation is not None:
+            self._gizmo.wxyz = _wxyz(rotation)
+        self.show_accepted(position, 0.0)
+
+    def show_accepted(self, accepted: np.ndarray, missing: float) -> None:
+        """What the judge said: the place the controller was given, and how far it is from the hand, m."""
+        out = missing > 0.0
+        for handle in (self._ghost, self._label, self._accepted, self._gap):
+            handle.visible = out
+        self._ball.visible = not out
+        if out:
+            self._accepted.position = accepted
+            self._gap.points = np.array([[self.raw, accepted]], np.float32)
+            self._label.text = f"out of reach by {100 * missing:.0f} cm"
+
+
+class Frames:
+    """The filtered target (what the controller follows now) beside the actual frame."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._desired = scene.add_frame(
+            "/desired", axes_length=_FRAME, axes_radius=0.0035, origin_radius=0.009, visible=False
+        )
+        self._actual = scene.add_frame("/actual", axes_length=1.25 * _FRAME, axes_radius=0.0025)
+
+    def show(self, on: bool) -> None:
+        self._desired.visible = self._actual.visible = on
+
+    def actual(self, pose: np.ndarray) -> None:
+        """pose (7,): position and quaternion wxyz."""
+        self._actual.position, self._actual.wxyz = pose[:3], pose[3:]
+
+    def desired(self, position: np.ndarray, xyzw: np.ndarray | None) -> None:
+        if np.isfinite(position).all():
+            self._desired.position = position
+        if xyzw is not None and np.isfinite(xyzw).all():
+            self._desired.wxyz = xyzw[[3, 0, 1, 2]]
+
+
+def _wxyz(rotation: np.ndarray) -> np.ndarray:
+    return vtf.SO3.from_matrix(rotation).wxyz

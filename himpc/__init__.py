@@ -1,0 +1,22 @@
+"""How a robot is controlled: tasks, limits, prediction, the cascade of QPs, controllers."""
+
+from himpc.controllers import CONTROLLERS, HIMPC, Settings
+from himpc.limits import Limits
+from himpc.plan import Plan
+from himpc.stack import Level, Stack
+from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture
+
+__all__ = [
+    "CONTROLLERS",
+    "HIMPC",
+    "Damping",
+    "FrameOrientation",
+    "FramePosition",
+    "Joints",
+    "Level",
+    "Limits",
+    "Plan",
+    "Posture",
+    "Settings",
+    "Stack",
+]

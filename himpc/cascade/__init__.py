@@ -1,0 +1,1 @@
+"""The cascade: one QP per level, strictly ordered."""

@@ -1,0 +1,121 @@
+"""The explicit route: all rows and the equality constraints (33) as printed. The oracle of the structured one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import ActiveRows, LevelProblem, Point
+from himpc.limits.rows import Rows
+from himpc.qp import QPSolution, Solver, solve_qp
+
+Array = NDArray[np.float64]
+
+_BINDING = 1e-9
+"""N·m: a row closer than this to its bound is binding."""
+
+
+def solve_explicit(
+    problem: LevelProblem,
+    rows: Rows,
+    U_above: Array,
+    above: Sequence[tuple[Array, Array]],
+    Z: Array,
+    solver: Solver,
+) -> Point | None:
+    """Problem i over all N·n increments with every bound and every equality (33) handed to the solver.
+
+    Near a singularity the printed equality rows are dependent and active-set solvers may refuse them;
+    the same subspace is then described by orthonormal rows. Knots beyond the level's own horizon
+    keep the increments of the level above.
+
+    Args:
+        problem: the level's data.
+        rows: all bounds.
+        U_above: U_{i−1}, (N, n).
+        above: (B_p, U_p) of every level above.
+        Z: orthonormal bases of what (33) leaves free, (N, n, d).
+        solver: which solver.
+
+    Returns:
+        the optimum, or None if the solver gave no point within the KKT tolerance.
+    """
+    N, n = U_above.shape
+    H, f = _quadratic(problem, n)
+    bounds = _every_joint(rows.L.tobytes(), rows.L.shape, n)
+    lower, upper = rows.lower.ravel(), rows.upper.ravel()
+    if above:
+        # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
+        at = bounds @ U_above.ravel()
+        lower, upper = np.minimum(lower, at), np.maximum(upper, at)
+    tail = np.eye(N * n)[problem.knots * n :]
+    solution = None
+    for equalities in _equalities(above, U_above, Z):
+        E = np.vstack([equalities, tail])
+        target = E @ U_above.ravel()
+        solution = solve_qp(
+            H, f, np.vstack([bounds, E]), np.r_[lower, target], np.r_[upper, target], solver
+        )
+        if solution.solved:
+            return _point(solution, rows, lower, upper, bounds, (N, n))
+    return None
+
+
+def _quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
+    N, m, K = len(problem.B), problem.B.shape[1], problem.knots
+    G = (problem.C[..., None] * problem.B.transpose(1, 0, 2)).reshape(N, m, N * n)[:K].reshape(K * m, N * n)
+    weighted = G * np.tile(problem.root_Q**2, K)[:, None]
+    return G.T @ weighted + np.diag(np.tile(problem.R, N)), weighted.T @ problem.free[:K].ravel()
+
+
+@lru_cache(maxsize=8)
+def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
+    return np.kron(np.frombuffer(L).reshape(shape), np.eye(n))
+
+
+def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) -> list[Array]:
+    """(33) as printed, then the same subspace by orthonormal rows."""
+    N, n = U_above.shape
+    if not above:
+        return [np.empty((0, N * n))]
+    printed = [_block_diagonal(B) for B, _ in above]
+    fixed = []
+    for j in range(N):
+        kept = np.eye(n) - Z[j] @ Z[j].T
+        left, singular, _ = np.linalg.svd(kept)
+        fixed.append(left[:, singular > 0.5].T)
+    rows = np.zeros((sum(len(block) for block in fixed), N * n))
+    start = 0
+    for j, block in enumerate(fixed):
+        rows[start : start + len(block), j * n : (j + 1) * n] = block
+        start += len(block)
+    return [np.vstack(printed), rows]
+
+
+def _block_diagonal(B: Array) -> Array:
+    N, m, n = B.shape
+    blocks = np.zeros((N, m, N, n))
+    index = np.arange(N)
+    blocks[index, :, index] = B
+    return blocks.reshape(N * m, N * n)
+
+
+def _point(
+    solution: QPSolution, rows: Rows, lower: Array, upper: Array, bounds: Array, shape: tuple[int, int]
+) -> Point:
+    count = bounds.shape[0]
+    multipliers = solution.multipliers[:count]
+    value = bounds @ solution.x
+    slack = np.where(multipliers > 0, upper - value, value - lower)
+    # An interior-point-like solver leaves tiny multipliers everywhere: binding means both.
+    active = np.flatnonzero((np.abs(multipliers) > _BINDING) & (slack < 1e3 * _BINDING))
+    row, joint = np.divmod(active, shape[1])
+    return Point(
+        solution.x.reshape(shape),
+        ActiveRows(row, joint, multipliers[active], slack[active]),
+        solution.kkt_residual,
+        solution.status,
+    )

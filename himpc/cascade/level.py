@@ -1,0 +1,116 @@
+"""What goes into a level's QP and what comes out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.rows import Kind, Rows
+
+Array = NDArray[np.float64]
+Rung = Literal["solve", "soften", "previous", "inherit", "damping", "hold"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LevelProblem:
+    """The data of Problem i, (32) or (34): min Σ ‖e_{j+1}‖²_Q + ‖Δτ_j‖²_R, e affine in U.
+
+    Attributes:
+        name: the level's stable identity.
+        B: (N, m, n), Ĵ^j M̄⁻¹ at every knot.
+        C: (N, m, N), effect coefficients of `prediction.task.ResidualModel`.
+        free: (N, m), e for U = 0.
+        root_Q: (m,), √Q.
+        R: (n,).
+        knots: how many knots this level looks ahead, ≤ N.
+    """
+
+    name: str
+    B: Array
+    C: Array
+    free: Array
+    root_Q: Array
+    R: Array
+    knots: int
+
+    def residual(self, U: Array) -> Array:
+        """e at knots 1 … N under U, (N, m)."""
+        pushed = np.matmul(self.B, U[:, :, None])[:, :, 0]
+        return self.free + np.matmul(self.C.transpose(1, 0, 2), pushed.T[:, :, None])[:, :, 0].T
+
+    def cost(self, U: Array, error: Array | None = None) -> float:
+        """The value (32a) or (34a) of U over this level's knots; `error` is Q^½ e if it is known."""
+        e = self.root_Q * self.residual(U)[: self.knots] if error is None else error
+        return float(np.vdot(e, e) + np.vdot(self.R * U[: self.knots], U[: self.knots]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ActiveRows:
+    """Rows of `Rows` that bind: indices of row and joint, multiplier and slack (N·m in the rows' scaling).
+
+    A positive multiplier pushes back from an upper bound, a negative one from a lower bound. It is the
+    cost that one N·m of further room would save.
+    """
+
+    row: NDArray[np.intp]
+    joint: NDArray[np.intp]
+    multiplier: Array
+    slack: Array
+
+    def __len__(self) -> int:
+        return self.row.size
+
+    def labelled(self, rows: Rows) -> list[tuple[Kind, int, int, float, float]]:
+        """(kind, knot, joint index, multiplier, slack) of each active row."""
+        return [
+            (*rows.label(int(r)), int(a), float(m), float(s))
+            for r, a, m, s in zip(self.row, self.joint, self.multiplier, self.slack, strict=True)
+        ]
+
+
+NO_ROWS = ActiveRows(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LevelSolution:
+    """The evidence of one level.
+
+    Attributes:
+        name: the level's identity.
+        U: increments of this level and all above, (N, n) N·m.
+        cost: the optimal value of the level's cost.
+        active: constraints that bind.
+        kkt_residual: of the applied point, scaled; 0 for rungs that apply no optimum.
+        status: "optimal", "empty" (no freedom left) or what the solver said.
+        rung: which step of the fallback ladder gave U.
+        time_us: wall time of this level, microseconds.
+        leak: ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, m/s² or rad/s².
+    """
+
+    name: str
+    U: Array
+    cost: float
+    active: ActiveRows
+    kkt_residual: float
+    status: str
+    rung: Rung
+    time_us: float
+    leak: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Point:
+    """Increments for one level, with what was verified about them.
+
+    Attributes:
+        error: Q^½ e over the level's knots, flattened, if the route has it at hand.
+    """
+
+    U: Array
+    active: ActiveRows
+    kkt_residual: float
+    status: str
+    error: Array | None = None

@@ -1,0 +1,79 @@
+"""Bases of what the priority constraints (33) leave free at each knot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RANK_TOLERANCE = 1e-10
+"""Singular values below this share of ‖B‖ count as zero: such a direction is left to lower levels."""
+
+_CLEARLY_REGULAR = 1e-5
+"""Diagonals of a triangular factor above this share of their level's ‖B‖ prove full rank with room to spare."""
+
+
+def nested_bases(levels: Sequence[Array]) -> list[Array]:
+    """Orthonormal bases Z_i of {z : B_p z = 0 for all p < i} at every knot, for i = 1 … r+1.
+
+    Away from singularities one Householder QR of [B_1ᵀ … B_rᵀ] holds all of them: the columns of Q that
+    follow those of the levels above. Near one, an SVD per level decides the rank.
+
+    Args:
+        levels: B_p = Ĵ_p M̄⁻¹ of each level but the last, (N, m_p, n).
+
+    Returns:
+        r+1 arrays (N, n, d_i), d_1 = n.
+    """
+    if not levels:
+        return []
+    N, _, n = levels[0].shape
+    sizes = np.cumsum([B.shape[1] for B in levels])
+    if sizes[-1] <= n:
+        Q, R = np.linalg.qr(np.concatenate(levels, axis=1).transpose(0, 2, 1), mode="complete")
+        pivots = np.abs(R.diagonal(axis1=1, axis2=2))
+        starts = [0, *sizes[:-1]]
+        if all(
+            float(pivots[:, start:end].min()) > _CLEARLY_REGULAR * float(np.abs(B).max())
+            for start, end, B in zip(starts, sizes, levels, strict=True)
+        ):
+            return [Q[:, :, end:] for end in sizes]
+    bases = []
+    Z = np.broadcast_to(np.eye(n), (N, n, n))
+    for B in levels:
+        Z = shrink(Z, B) if Z.shape[2] else Z
+        bases.append(Z)
+    return bases
+
+
+def shrink(Z: Array, B: Array) -> Array:
+    """Orthonormal bases of {z ∈ span Z_j : B_j z = 0} at every knot j.
+
+    Nothing is inverted: the bases come from an SVD of B_j Z_j. Where the rank differs between knots,
+    surplus columns are zero, so that all knots keep one shape.
+
+    Args:
+        Z: (N, n, d) orthonormal columns (or zero columns).
+        B: (N, m, n).
+
+    Returns:
+        (N, n, d') with d' ≤ d; d' = 0 if no knot has freedom left.
+    """
+    N, n, _ = Z.shape
+    tolerance = RANK_TOLERANCE * np.sqrt((B * B).sum(axis=(1, 2)))
+    _, singular, Vt = np.linalg.svd(B @ Z)
+    free = []
+    for j in range(N):
+        basis = Z[j] @ Vt[j, int((singular[j] > tolerance[j]).sum()) :].T
+        if not Z[j].any(axis=0).all():
+            # Null vectors that only pick zero columns of Z vanish; keep an orthonormal basis of the rest.
+            left, kept, _ = np.linalg.svd(basis, full_matrices=False)
+            basis = left[:, kept > 0.5]
+        free.append(basis)
+    shrunk = np.zeros((N, n, max(basis.shape[1] for basis in free)))
+    for j, basis in enumerate(free):
+        shrunk[j, :, : basis.shape[1]] = basis
+    return shrunk

@@ -1,0 +1,91 @@
+"""Kinematics at one control tick: the measured state and the Jacobians along the previous prediction (30)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from robots import Robot
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+
+
+class Configuration:
+    """Frames and Jacobians at the measured q_k and at the knots q*_{k+j|k−1}, j = 1 … N−1.
+
+    Jacobians are taken once per frame and tick, whatever the number of tasks on it. Only geometry
+    is read: no mass, inertia or gravity, so the controller stays free of a dynamic model.
+
+    Args:
+        robot: gives geometry and names.
+        data: Pinocchio's work space, owned by the caller.
+        q: measured joint positions, (n,) rad or m.
+        v: measured joint velocities, (n,).
+        knots: predicted joint positions at knots 1 … N−1, (N−1, n); empty for N = 1.
+    """
+
+    def __init__(
+        self, robot: Robot, data: pin.Data, q: Array, v: Array, knots: Array | Sequence[Array] = ()
+    ) -> None:
+        self.robot = robot
+        self.q = q
+        self.v = v
+        self.knots = knots
+        self.horizon = len(knots) + 1
+        self._data = data
+        self._jacobians: dict[str, Array] = {}
+        self._placements: dict[str, pin.SE3] = {}
+
+    def frame_jacobians(self, frame: str = "") -> Array:
+        """(N, 6, n) frame Jacobians, linear over angular, world axes, at the frame's origin."""
+        found = self._jacobians.get(frame)
+        if found is None:
+            model, data = self.robot.model, self._data
+            index = self.robot.frame_id(frame or self.robot.tip)
+            compute, axes = pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
+            found = np.empty((self.horizon, 6, self.q.size))
+            # The measured state comes last: data.oMf then holds its placement.
+            for j in range(self.horizon - 1, 0, -1):
+                found[j] = compute(model, data, self.knots[j - 1], index, axes)
+            found[0] = compute(model, data, self.q, index, axes)
+            self._placements[frame] = data.oMf[index].copy()
+            self._jacobians[frame] = found
+        return found
+
+    def placement(self, frame: str = "") -> pin.SE3:
+        """Placement of a frame in the world at the measured state."""
+        if frame not in self._placements:
+            self.frame_jacobians(frame)
+        return self._placements[frame]
+
+    def joint_indices(self, joints: tuple[str, ...]) -> list[int]:
+        """Columns of the named joints; all of them for an empty tuple."""
+        return joint_indices(self.robot, joints)
+
+    def joint_jacobians(self, joints: tuple[str, ...]) -> Array:
+        """(N, m, n) selection of the named joints, the same at every knot."""
+        selection = _joint_selection(self.robot, joints)
+        return np.broadcast_to(selection, (self.horizon, *selection.shape))
+
+
+@lru_cache(maxsize=256)
+def joint_indices(robot: Robot, joints: tuple[str, ...]) -> list[int]:
+    """Columns of the named joints; all of them for an empty tuple.
+
+    Raises:
+        InputError: a name is not a joint of the robot.
+    """
+    for joint in joints:
+        if joint not in robot.joint_names:
+            raise unknown_name(f"joint of robot '{robot.name}' called", joint, robot.joint_names)
+    return [robot.joint_names.index(joint) for joint in joints] or list(range(robot.n))
+
+
+@lru_cache(maxsize=256)
+def _joint_selection(robot: Robot, joints: tuple[str, ...]) -> Array:
+    return np.eye(robot.n)[joint_indices(robot, joints)]

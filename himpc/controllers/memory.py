@@ -1,0 +1,52 @@
+"""What an incremental controller remembers from one tick to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import LevelSolution
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memory:
+    """The time-delayed signals of (9) and the previous plan.
+
+    Attributes:
+        q, v: measured state of the last tick, (n,).
+        period: seconds between that tick and this one.
+        task_velocities: ẋ of the last tick by level name, (m,) each.
+        predicted_q: q* at knots 0 … N of the last plan, (N+1, n).
+        solutions: the last plan's levels by name.
+    """
+
+    q: Array
+    v: Array
+    period: float
+    task_velocities: dict[str, Array] = field(default_factory=dict)
+    predicted_q: Array | None = None
+    solutions: dict[str, LevelSolution] = field(default_factory=dict)
+
+    @classmethod
+    def start(cls, q: Array, v: Array, T_s: float) -> Memory:
+        """The memory of a robot that has moved with constant velocity so far: q̈ and ẍ are zero."""
+        return cls(q, v, T_s)
+
+    def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:
+        """q*_{k+j|k−1}, j = 1 … N−1, re-rooted at the measured q: (N−1, n), see (30).
+
+        The last prediction reaches one knot too short for a longer horizon; it goes on at constant velocity.
+        """
+        if self.predicted_q is None:
+            return q + T_s * np.arange(1.0, N)[:, None] * v
+        path = self.predicted_q[1:]
+        path = path + (q - path[0])
+        missing = N - len(path)
+        if missing > 0:
+            step = path[-1] - path[-2] if len(path) > 1 else T_s * v
+            path = np.vstack([path, path[-1] + np.arange(1.0, missing + 1)[:, None] * step])
+        return path[1:N]

@@ -1,0 +1,7 @@
+"""Limits: torque, velocity and position bounds, and the rows they become."""
+
+from himpc.limits.limits import Limits, LimitsInForce, in_force
+from himpc.limits.ramp import ramp
+from himpc.limits.rows import Rows, build_rows
+
+__all__ = ["Limits", "LimitsInForce", "Rows", "build_rows", "in_force", "ramp"]

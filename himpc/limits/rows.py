@@ -1,0 +1,142 @@
+"""The bounds (32d)–(32f) over the horizon as rows on the increments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.limits import Limits, LimitsInForce
+from himpc.limits.viability import viability_bounds
+from himpc.prediction.joint import JointState
+
+Array = NDArray[np.float64]
+Kind = Literal["torque", "velocity", "position"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """lower ≤ L U ≤ upper, U = (N, n) increments; every joint has the same L.
+
+    All rows are in N·m: a velocity row is scaled by M̄/T_s, a position row by M̄/T_s², so that one
+    tolerance fits all.
+
+    Attributes:
+        L: (r, N) lower-triangular Toeplitz blocks, one per kind.
+        lower, upper: (r, n), ±inf where there is no bound.
+        kinds: kind of each block of N rows.
+    """
+
+    L: Array
+    lower: Array
+    upper: Array
+    kinds: tuple[Kind, ...]
+
+    def label(self, row: int) -> tuple[Kind, int]:
+        """Kind of a row and the knot (1 … N; torque: 0 … N−1) whose value it bounds."""
+        N = self.L.shape[1]
+        kind = self.kinds[row // N]
+        return kind, row % N + (kind != "torque")
+
+    def widened(self, slack: Array) -> Rows:
+        """The rows with both bounds moved outward by `slack`, (r, n) ≥ 0."""
+        return Rows(self.L, self.lower - slack, self.upper + slack, self.kinds)
+
+    def torque_only(self) -> Rows:
+        """The torque rows (32f) alone."""
+        N = self.L.shape[1]
+        return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
+
+
+@lru_cache(maxsize=64)
+def _toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
+    lag = np.subtract.outer(np.arange(N), np.arange(N)).astype(float)
+    blocks = {
+        "torque": np.where(lag >= 0, 1.0, 0.0),
+        "velocity": np.where(lag >= 0, lag + 1.0, 0.0),
+        "position": np.where(lag >= 0, lag * (lag + 1.0) / 2.0, 0.0),
+    }
+    return np.vstack([blocks[kind] for kind in kinds])
+
+
+@lru_cache(maxsize=64)
+def _remaining(N: int, rate: float) -> Array:
+    return (1.0 - rate) ** np.arange(1.0, N + 1)[:, None]
+
+
+def build_rows(
+    state: JointState, tau_0: Array, M_bar: Array, limits: Limits, force: LimitsInForce, N: int, T_s: float
+) -> Rows:
+    """Bounds on torque, velocity and position at every knot.
+
+    With `limits.position == "viability"` the position limit enters through the velocity rows, all
+    knots using the measured q_k; with "paper" the rows are those of (32d): at knot 1 no Δτ can
+    influence them, and nothing foresees the distance that stopping takes.
+
+    Args:
+        state: measured joint state, (n,) each.
+        tau_0: torque applied last, (n,) N·m.
+        M_bar: diagonal of M̄, (n,).
+        limits: which bounds are imposed.
+        force: their values.
+        N: horizon.
+        T_s: control period, s.
+    """
+    n = M_bar.size
+    paper = limits.position == "paper"
+    kinds: tuple[Kind, ...] = ("torque", "velocity", "position") if paper else ("torque", "velocity")
+    # [lower, upper] side by side halves the number of array operations.
+    bounds = np.empty((2, len(kinds) * N, n))
+    bounds[0, :N] = force.tau_lower - tau_0
+    bounds[1, :N] = force.tau_upper - tau_0
+
+    if limits.position == "viability":
+        v = viability_bounds(state.q, force.q_lower, force.q_upper, force.v_limit, force.a_max, T_s)
+    else:
+        v = np.stack((-force.v_limit, force.v_limit))
+    if limits.velocity_approach:
+        share = _remaining(N, min(1.0, limits.velocity_approach * T_s))
+        v = v[:, None] + share * (state.v - v)[:, None]
+    else:
+        v = v[:, None]
+    scale = M_bar / T_s
+    bounds[:, N : 2 * N] = (v - state.free_velocity(N, T_s)) * scale
+    if paper:
+        q = np.stack((force.q_lower, force.q_upper))[:, None]
+        bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)
+    return Rows(_toeplitz(N, kinds), bounds[0], bounds[1], kinds)
+
+
+def least_slack(rows: Rows) -> Array:
+    """How far the state rows must give way so that some increments satisfy all rows.
+
+    The rows couple no two joints and the torque of each knot is free within its box, so a greedy walk
+    finds increments that come closest: at every knot the torque that brings the velocity nearest to
+    where the velocity row wants it now and the position row at the next knot. What these increments
+    violate is the slack; they prove that the widened rows can be met.
+
+    Returns:
+        slack, (r, n) ≥ 0 N·m (in the rows' scaling), zero on torque rows.
+    """
+    N = rows.L.shape[1]
+    walk = np.zeros((N, rows.lower.shape[1]))
+    paper = len(rows.kinds) == 3
+    for j in range(N):
+        so_far = walk[:j]
+        # State rows at knot j+1 are linear in walk[j] with coefficient 1; so far it is zero there.
+        reached = rows.L[N + j, :j] @ so_far
+        low, high = rows.lower[N + j] - reached, rows.upper[N + j] - reached
+        if paper and j + 1 < N:
+            ahead = rows.L[2 * N + j + 1, :j] @ so_far
+            low = np.maximum(low, rows.lower[2 * N + j + 1] - ahead)
+            high = np.minimum(high, rows.upper[2 * N + j + 1] - ahead)
+        applied = so_far.sum(axis=0)
+        wanted = np.clip(0.0, np.minimum(low, high), np.maximum(low, high))
+        walk[j] = np.clip(wanted, rows.lower[j] - applied, rows.upper[j] - applied)
+    value = rows.L @ walk
+    slack = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
+    slack[:N] = 0.0
+    return slack

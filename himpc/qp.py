@@ -1,0 +1,117 @@
+"""The only door to the QP solvers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import daqp
+import numpy as np
+import proxsuite
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Solver = Literal["daqp", "proxqp"]
+SOLVERS: tuple[Solver, ...] = ("daqp", "proxqp")
+
+KKT_TOLERANCE = 1e-6
+"""A point whose scaled KKT residual is larger counts as unsolved, whatever the solver says."""
+
+_PRIMAL_TOLERANCE = 1e-9
+_DAQP_INFINITY = 1e30
+_DAQP_EQUALITY = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class QPSolution:
+    """A point, its multipliers (> 0 at an upper bound, < 0 at a lower one) and its verified residual."""
+
+    x: Array
+    multipliers: Array
+    kkt_residual: float
+    status: str
+
+    @property
+    def solved(self) -> bool:
+        return self.kkt_residual <= KKT_TOLERANCE
+
+
+def solve_qp(
+    H: Array, f: Array, A: Array, lower: Array, upper: Array, solver: Solver = "daqp"
+) -> QPSolution:
+    """min ½xᵀHx + fᵀx subject to lower ≤ Ax ≤ upper; a row with lower = upper is an equality.
+
+    Args:
+        H: (k, k), positive definite.
+        f: (k,).
+        A: (r, k).
+        lower, upper: (r,), ±inf where there is no bound.
+        solver: which of SOLVERS.
+
+    Returns:
+        The solver's point with the residual that we computed ourselves: never trust the status.
+    """
+    x, multipliers, status = (_daqp if solver == "daqp" else _proxqp)(H, f, A, lower, upper)
+    return QPSolution(x, multipliers, kkt_residual(H, f, A, lower, upper, x, multipliers), status)
+
+
+def _daqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:
+    sense = np.where(lower == upper, _DAQP_EQUALITY, 0).astype(np.int32)
+    x, _, flag, info = daqp.solve(
+        H,
+        f,
+        A,
+        np.minimum(upper, _DAQP_INFINITY),
+        np.maximum(lower, -_DAQP_INFINITY),
+        sense,
+        primal_tol=_PRIMAL_TOLERANCE,
+    )
+    return x, info["lam"], "optimal" if flag == 1 else f"daqp {flag}"
+
+
+def _proxqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:
+    equal = lower == upper
+    free = ~equal
+    qp = proxsuite.proxqp.dense.QP(f.size, int(equal.sum()), int(free.sum()))
+    qp.settings.eps_abs = _PRIMAL_TOLERANCE
+    qp.settings.max_iter = 1000
+    qp.init(H, f, A[equal], lower[equal], A[free], lower[free], upper[free])
+    qp.solve()
+    multipliers = np.empty(len(A))
+    multipliers[equal], multipliers[free] = qp.results.y, qp.results.z
+    status = str(qp.results.info.status).rsplit(".", 1)[-1]
+    return qp.results.x, multipliers, "optimal" if status == "PROXQP_SOLVED" else status.lower()
+
+
+def kkt_residual(
+    H: Array, f: Array, A: Array, lower: Array, upper: Array, x: Array, multipliers: Array
+) -> float:
+    """Largest violation of the KKT conditions, scaled by max(1, ‖H‖‖x‖, ‖f‖) where it has the gradient's unit.
+
+    Stationarity, the multipliers' signs and complementarity are scaled; feasibility is absolute.
+    A point that is not finite has an infinite residual.
+    """
+    gradient = H @ x + f + A.T @ multipliers
+    scale = max(1.0, _norm(H) * _norm(x), _norm(f))
+    value = A @ x
+    residual = max(
+        float(np.abs(gradient).max()) / scale, row_residual(value, lower, upper, multipliers, scale)
+    )
+    return residual if residual >= 0 else float("inf")
+
+
+def _norm(x: Array) -> float:
+    return math.sqrt(float(np.vdot(x, x)))
+
+
+def row_residual(value: Array, lower: Array, upper: Array, multipliers: Array, scale: float) -> float:
+    """Feasibility, and complementarity with the right signs, of rows lower ≤ value ≤ upper."""
+    if not value.size:
+        return 0.0
+    gap = np.minimum(upper - value, value - lower)
+    # A multiplier belongs to the bound it pushes from: its product with that bound's gap must vanish.
+    # A gap that is infinite times a multiplier that is zero is fine, hence the cap.
+    own = np.where(multipliers > 0, upper - value, value - lower)
+    product = np.abs(multipliers) * np.minimum(np.abs(own), 1e6)
+    return max(-float(gap.min()), float(product.max()) / scale, 0.0)

@@ -1,0 +1,24 @@
+"""References: desired motions with a preview over the horizon."""
+
+from himpc.references.curves import Circle, FigureEight, Sinusoid
+from himpc.references.hold import Hold
+from himpc.references.phase import Phase
+from himpc.references.preview import Preview, Reference
+from himpc.references.target import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Caps, Target
+from himpc.references.waypoints import Waypoints
+
+__all__ = [
+    "JOINT_CAPS",
+    "POSITION_CAPS",
+    "ROTATION_CAPS",
+    "Caps",
+    "Circle",
+    "FigureEight",
+    "Hold",
+    "Phase",
+    "Preview",
+    "Reference",
+    "Sinusoid",
+    "Target",
+    "Waypoints",
+]

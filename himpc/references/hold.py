@@ -1,0 +1,35 @@
+"""Stay where you are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from himpc.references.preview import Array, Preview
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """A constant x_d.
+
+    Attributes:
+        value: (m,) coordinates, or a rotation matrix (3, 3).
+        m: number of coordinates the task controls; needed only where it differs from the value's size
+            (an orientation task on fewer than three axes).
+    """
+
+    value: Array
+    m: int | None = None
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        zeros = _zeros(N, self.m or self.value.shape[0])
+        return Preview(self.value, zeros, zeros, zeros)
+
+
+@lru_cache(maxsize=64)
+def _zeros(N: int, m: int) -> Array:
+    zeros = np.zeros((N + 1, m))
+    zeros.setflags(write=False)
+    return zeros

@@ -1,0 +1,34 @@
+"""Time laws: how far along its path a reference is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from himpc.references.preview import Array
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A phase φ(t), its rate and its acceleration.
+
+    `uniform` is φ = ωt + φ₀; `eased` is φ = ωt − sin ωt + φ₀, which starts and ends each turn at rest.
+
+    Attributes:
+        omega: angular frequency ω, rad/s.
+        law: "uniform" or "eased".
+        offset: φ₀, rad.
+    """
+
+    omega: float
+    law: Literal["uniform", "eased"] = "uniform"
+    offset: float = 0.0
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """(φ, φ̇, φ̈) at times t in seconds."""
+        w, wt = self.omega, self.omega * t
+        if self.law == "uniform":
+            return wt + self.offset, np.full_like(wt, w), np.zeros_like(wt)
+        return wt - np.sin(wt) + self.offset, w * (1 - np.cos(wt)), w * w * np.sin(wt)

@@ -1,0 +1,46 @@
+"""What a controller is told about a task's desired motion: now and over the horizon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """x̄_d = col(x_d, ẋ_d, ẍ_d) of (28) at k … k+N.
+
+    Attributes:
+        value: x_d at k: (m,) or a rotation matrix (3, 3).
+        displacement: x_d(k+j) ⊖ x_d(k), j = 0 … N, (N+1, m); for rotations the vector log₃(R_d(k+j) R_d(k)ᵀ).
+        velocity: ẋ_d at k+j, (N+1, m).
+        acceleration: ẍ_d at k+j, (N+1, m).
+    """
+
+    value: Array
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Reference(Protocol):
+    """A desired motion in time."""
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        """The desired motion at t, t + T_s, …, t + N·T_s (seconds)."""
+        ...
+
+
+def sampled(position: Array, velocity: Array, acceleration: Array) -> Preview:
+    """Preview of a vector-valued motion from its samples, each (N+1, m)."""
+    return Preview(position[0], position - position[0], velocity, acceleration)
+
+
+def times(t: float, T_s: float, N: int) -> Array:
+    """t + T_s·(0 … N), seconds."""
+    return t + T_s * np.arange(N + 1)

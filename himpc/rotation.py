@@ -1,0 +1,33 @@
+"""The few maps between rotation vectors and rotation matrices that the controllers need."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def log3(R: Array) -> Array:
+    """Rotation vector of R, (3,) rad, ‖·‖ ≤ π."""
+    return pin.log3(R)
+
+
+def exp3(w: Array) -> Array:
+    """Rotation matrix (3, 3) of the rotation vector w, rad."""
+    return pin.exp3(w)
+
+
+def quaternion(R: Array) -> Array:
+    """Unit quaternion (x, y, z, w) of R, with w ≥ 0."""
+    q = pin.Quaternion(R).coeffs()
+    return q if q[3] >= 0 else -q
+
+
+def from_quaternion(xyzw: Array) -> Array:
+    """Rotation matrix of a quaternion (x, y, z, w) of any non-zero length."""
+    x, y, z, w = np.asarray(xyzw, float) / math.sqrt(float(np.dot(xyzw, xyzw)))
+    return pin.Quaternion(w, x, y, z).toRotationMatrix()

@@ -1,0 +1,116 @@
+"""The hierarchy: ordered levels of tasks."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.tasks import Damping, Task
+from robots import InputError, Robot
+
+Array = NDArray[np.float64]
+Weight = float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Level:
+    """One priority level: its tasks and the weights of the stage cost (31).
+
+    Attributes:
+        tasks: tasks of equal priority.
+        Q: weight of the residual e (28), scalar or one per coordinate, > 0.
+        R: weight of the increments Δτ, scalar or one per joint, > 0.
+        horizon: knots this level looks ahead, at most the controller's N (Remark 8); None: all of them.
+        enabled: whether the level takes part.
+    """
+
+    tasks: tuple[Task, ...]
+    Q: Weight = 200.0
+    R: Weight = 10.0
+    horizon: int | None = None
+    enabled: bool = True
+
+    @property
+    def name(self) -> str:
+        """Stable identity of the level, whatever its place in the stack."""
+        return "+".join(task.name for task in self.tasks)
+
+    def __post_init__(self) -> None:
+        if not self.tasks:
+            raise InputError("a level needs at least one task: add one or remove the level")
+        for field in ("Q", "R"):
+            values = np.asarray(getattr(self, field), float)
+            if not (np.isfinite(values).all() and (values > 0).all()):
+                raise InputError(
+                    f"{field} of level '{self.name}' is {getattr(self, field)}: "
+                    "give finite numbers above 0, e.g. " + ("200" if field == "Q" else "10")
+                )
+        if self.horizon is not None and self.horizon < 1:
+            raise InputError(f"horizon of level '{self.name}' is {self.horizon}: give 1 or more knots")
+        for task in self.tasks:
+            for field in ("K_p", "K_v"):
+                values = np.asarray(getattr(task, field), float)
+                if not (np.isfinite(values).all() and (values >= 0).all()):
+                    raise InputError(f"{field} of task '{task.name}' is not a finite number ≥ 0")
+
+
+Stack = tuple[Level, ...]
+
+
+def check_names(stack: Stack) -> None:
+    """Raises InputError if two tasks share a name: events and telemetry could not tell them apart."""
+    names = [task.name for level in stack for task in level.tasks]
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise InputError(f"task name {json.dumps(min(twice))} stands twice in the stack: rename one of them")
+
+
+def active_levels(stack: Stack, damping: bool, freedom: int) -> Stack:
+    """The levels a controller solves, highest priority first.
+
+    Args:
+        stack: all levels.
+        damping: whether the last level may be added.
+        freedom: directions that the enabled levels leave free (`freedom_left`).
+    """
+    enabled = tuple(level for level in stack if level.enabled)
+    return (*enabled, DAMPING_LEVEL) if damping and freedom else enabled
+
+
+DAMPING_LEVEL = Level((Damping(name="damping"),), Q=200.0, R=10.0)
+
+
+def freedom_left(robot: Robot, stack: Stack) -> int:
+    """n minus the generic rank of the enabled levels' stacked Jacobian.
+
+    Generic: the largest rank over a few random configurations, so that a passing singularity does
+    not count as freedom.
+    """
+    tasks = [task for level in stack if level.enabled for task in level.tasks]
+    if not tasks:
+        return robot.n
+    rng = np.random.default_rng(0)
+    data = robot.model.createData()
+    low, high = np.maximum(robot.q_lower, -np.pi), np.minimum(robot.q_upper, np.pi)
+    rank = 0
+    for _ in range(5):
+        configuration = Configuration(robot, data, rng.uniform(low, high), np.zeros(robot.n))
+        rows = np.vstack([task.jacobian(configuration)[0] for task in tasks])
+        rank = max(rank, int(np.linalg.matrix_rank(rows, tol=1e-6)))
+    return robot.n - rank
+
+
+def with_level(stack: Stack, name: str, **changes: object) -> Stack:
+    """The stack with fields of one level replaced."""
+    return tuple(replace(level, **changes) if level.name == name else level for level in stack)
+
+
+def frames_used(stack: Stack) -> set[str]:
+    """Frames named by the stack's tasks ('' stands for the robot's tip)."""
+    return {getattr(task, "frame", "") for level in stack for task in level.tasks}
+
+

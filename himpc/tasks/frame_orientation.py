@@ -1,0 +1,35 @@
+"""Orientation of a frame in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from himpc.rotation import log3
+from himpc.tasks.frame import FrameTask
+from himpc.tasks.task import Array
+
+if TYPE_CHECKING:
+    from himpc.configuration import Configuration
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameOrientation(FrameTask):
+    """x̃ = log₃(R R_dᵀ) in world axes, ẋ = ω (level 2 of Table IV).
+
+    The value is the rotation matrix R (3, 3); the error is in radians along the chosen world axes.
+    """
+
+    K_p: float | tuple[float, ...] = 50.0
+    K_v: float | tuple[float, ...] = 5.0
+
+    unit: ClassVar[Literal["m", "rad"]] = "rad"
+
+    def rows(self) -> list[int]:
+        return [3 + c for c in self.components]
+
+    def value(self, configuration: Configuration) -> Array:
+        return configuration.placement(self.frame).rotation
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return log3(value @ desired.T)[self.components]

@@ -1,0 +1,28 @@
+"""Position of a frame's origin in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from himpc.tasks.frame import FrameTask
+from himpc.tasks.task import Array
+
+if TYPE_CHECKING:
+    from himpc.configuration import Configuration
+
+
+@dataclass(frozen=True, kw_only=True)
+class FramePosition(FrameTask):
+    """x = position of the frame's origin along the chosen world axes, in metres (level 1 of Table IV)."""
+
+    unit: ClassVar[Literal["m", "rad"]] = "m"
+
+    def rows(self) -> list[int]:
+        return self.components
+
+    def value(self, configuration: Configuration) -> Array:
+        return configuration.placement(self.frame).translation[self.components]
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return value - desired

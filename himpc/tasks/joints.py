@@ -1,0 +1,61 @@
+"""Joint-space tasks: chosen joints, the whole posture, and pure damping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from himpc.tasks.task import Array, Task
+
+if TYPE_CHECKING:
+    from himpc.configuration import Configuration
+    from robots import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joints(Task):
+    """x = some joint positions (level 3 of Table IV: q₁). J is a constant selection matrix.
+
+    Attributes:
+        joints: joint names; empty means all of them (a posture task).
+    """
+
+    joints: tuple[str, ...] = ()
+    K_p: float | tuple[float, ...] = 50.0
+    K_v: float | tuple[float, ...] = 5.0
+
+    unit: ClassVar[Literal["m", "rad"]] = "rad"
+
+    def coordinates(self, robot: Robot) -> tuple[str, ...]:
+        return self.joints or robot.joint_names
+
+    def value(self, configuration: Configuration) -> Array:
+        return configuration.q[configuration.joint_indices(self.joints)]
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return value - desired
+
+    def jacobian(self, configuration: Configuration) -> Array:
+        return configuration.joint_jacobians(self.joints)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Posture(Joints):
+    """All joints towards one posture."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping(Joints):
+    """All joints, K_p = 0: the residual of (4) is q̈ + K_v q̇, so what nothing else controls comes to rest.
+
+    R in (31) weighs Δτ only: the torque of an untasked direction is frozen, not damped, and a push
+    accelerates that direction for ever. This task, as the last level, is the cure.
+    """
+
+    K_p: float | tuple[float, ...] = 0.0
+    K_v: float | tuple[float, ...] = 5.0
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return np.zeros_like(value)

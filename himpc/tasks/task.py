@@ -1,0 +1,57 @@
+"""A task: coordinates x_i = f_i(q) with the gains of the target motion dynamics (4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from himpc.configuration import Configuration
+    from robots import Robot
+
+Array = NDArray[np.float64]
+Gain = float | tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What a hierarchy level asks for: coordinates, Jacobian and gains, nothing else.
+
+    The closed loop aimed at is (4) of the HIMPC paper: x̃'' + K_v x̃' + K_p x̃ = 0 with x̃ = x − x_d.
+
+    Attributes:
+        name: stable identity; events, telemetry and references refer to it.
+        K_p: stiffness, 1/s² (scalar or one per coordinate).
+        K_v: damping, 1/s (scalar or one per coordinate).
+    """
+
+    name: str
+    K_p: Gain = 200.0
+    K_v: Gain = 10.0
+
+    unit: ClassVar[Literal["m", "rad"]] = "m"
+
+    def coordinates(self, robot: Robot) -> tuple[str, ...]:
+        """Names of the m coordinates, in the order of the error's components."""
+        raise NotImplementedError
+
+    def value(self, configuration: Configuration) -> Array:
+        """x_i of (2) at the measured state: (m,) coordinates, or a rotation matrix (3, 3)."""
+        raise NotImplementedError
+
+    def error(self, value: Array, desired: Array) -> Array:
+        """x̃ = x − x_d, shape (m,), in the task's unit."""
+        raise NotImplementedError
+
+    def jacobian(self, configuration: Configuration) -> Array:
+        """J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
+        raise NotImplementedError
+
+    def gains(self, m: int) -> tuple[Array, Array]:
+        """K_p and K_v as (m,) arrays."""
+        return np.broadcast_to(np.asarray(self.K_p, float), (m,)), np.broadcast_to(
+            np.asarray(self.K_v, float), (m,)
+        )

@@ -1,0 +1,137 @@
+"""One row of numbers per control tick: what recordings, plots and summaries are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.cascade import RUNGS
+from himpc.configuration import Configuration
+from himpc.plan import Plan
+from himpc.rotation import quaternion
+from himpc.stack import DAMPING_LEVEL, Stack
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+__all__ = ["AT_POSITION", "AT_TORQUE", "AT_VELOCITY", "RUNGS", "Layout", "TaskInfo", "layout_of", "write_plan"]
+
+AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
+"""Bits of the field `at_bound`."""
+
+_SCALARS = ("t", "step_us", "priority_leak", "dynamic_leak", "gauge_norm", "gauge_radius", "unsolved")
+_PER_JOINT = (
+    "q",
+    "v",
+    "tau",
+    "tau_demand",
+    "tau_lower",
+    "tau_upper",
+    "v_limit",
+    "q_lower",
+    "q_upper",
+    "at_bound",
+    "delta_tau",
+)
+_PER_LEVEL = ("cost", "kkt", "rung", "time_us", "leak", "active")
+
+
+@dataclass(frozen=True)
+class TaskInfo:
+    """A task as telemetry sees it: stable name, its level's name, coordinates and unit ("m" or "rad")."""
+
+    name: str
+    level: str
+    coordinates: tuple[str, ...]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each field of a row lies.
+
+    Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`,
+    `v_d/<task>`, `a_d/<task>` (m each); per level the fields cost, kkt, rung (index into RUNGS),
+    time_us, leak and active (number of binding constraints), NaN where the level was not solved.
+    """
+
+    size: int
+    fields: dict[str, slice]
+    tasks: tuple[TaskInfo, ...]
+    levels: tuple[str, ...]
+    joints: tuple[str, ...]
+
+
+def layout_of(robot: Robot, stack: Stack) -> Layout:
+    """The layout for a robot and all levels of a stack, whatever their order; damping comes last."""
+    fields: dict[str, slice] = {}
+    size = 0
+
+    def add(name: str, width: int) -> None:
+        nonlocal size
+        fields[name] = slice(size, size + width)
+        size += width
+
+    for name in _SCALARS:
+        add(name, 1)
+    for name in _PER_JOINT:
+        add(name, robot.n)
+    tasks = []
+    probe = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
+    for level in sorted(stack, key=lambda level: level.name):
+        for task in level.tasks:
+            coordinates = task.coordinates(robot)
+            tasks.append(TaskInfo(task.name, level.name, coordinates, task.unit))
+            width = 4 if task.value(probe).ndim == 2 else len(coordinates)
+            add(f"x/{task.name}", width)
+            add(f"x_d/{task.name}", width)
+            for name in ("error", "v_d", "a_d"):
+                add(f"{name}/{task.name}", len(coordinates))
+    levels = (*(level.name for level in sorted(stack, key=lambda level: level.name)), DAMPING_LEVEL.name)
+    for level in levels:
+        for name in _PER_LEVEL:
+            add(f"{name}/{level}", 1)
+    return Layout(size, fields, tuple(tasks), levels, robot.joint_names)
+
+
+def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
+    """Writes what a plan knows into a row; the session adds time, plant state and the honest leak."""
+    fields = layout.fields
+    row[fields["step_us"]] = plan.step_us
+    row[fields["priority_leak"]] = np.nan if plan.leak is None else plan.leak
+    row[fields["unsolved"]] = plan.unsolved
+    row[fields["tau_demand"]] = plan.tau
+    row[fields["tau_lower"]] = plan.limits.tau_lower
+    row[fields["tau_upper"]] = plan.limits.tau_upper
+    row[fields["v_limit"]] = plan.limits.v_limit
+    row[fields["q_lower"]] = plan.limits.q_lower
+    row[fields["q_upper"]] = plan.limits.q_upper
+    row[fields["delta_tau"]] = plan.tau - plan.tau_0
+    for name, value in plan.values.items():
+        if f"x/{name}" in fields:
+            row[fields[f"x/{name}"]] = quaternion(value) if value.ndim == 2 else value
+            row[fields[f"error/{name}"]] = plan.errors[name]
+    at_bound = np.zeros(len(layout.joints))
+    for level in plan.levels:
+        values = (
+            level.cost,
+            level.kkt_residual,
+            RUNGS.index(level.rung),
+            level.time_us,
+            level.leak,
+            len(level.active),
+        )
+        # The per-level fields stand side by side in the order of _PER_LEVEL.
+        start = fields[f"cost/{level.name}"].start
+        row[start : start + len(values)] = values
+        if len(level.active):
+            block = level.active.row // plan.rows.L.shape[1]
+            for bit, kind in enumerate(("torque", "velocity", "position")):
+                mine = [k == kind for k in plan.rows.kinds]
+                hit = level.active.joint[np.asarray(mine)[block]]
+                at_bound[hit] = at_bound[hit].astype(int) | (1 << bit)
+    row[fields["at_bound"]] = at_bound
+
+

@@ -1,0 +1,1 @@
+"""What is taught: scenes, the headless session, lessons and the papers' experiments."""

@@ -1,0 +1,52 @@
+"""The scenes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lessons.scene import Scene
+from lessons.scenes.circle import iiwa14_circle
+from lessons.scenes.hold import hold, hold_of
+from robots import InputError
+from robots.errors import unknown_name
+
+SCENES: dict[str, str] = {
+    "iiwa14-hold": "KUKA iiwa 14: drag the target; position, then orientation, then posture",
+    "panda-hold": "Franka Panda: the same three levels",
+    "planar3-hold": "planar 3-joint arm: the same, in its plane",
+    "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
+    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, level 2 upright, level 3 swings joint 1",
+}
+"""One line per scene."""
+
+_MAKERS: dict[str, Callable[[], Scene]] = {
+    "iiwa14-hold": lambda: hold_of("iiwa14"),
+    "panda-hold": lambda: hold_of("panda"),
+    "planar3-hold": lambda: hold_of("planar3"),
+    "iiwa14-circle": iiwa14_circle,
+}
+
+
+def load_scene(
+    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
+) -> Scene:
+    """A scene by its name.
+
+    Args:
+        name: a key of SCENES.
+        urdf: path of a URDF file or catalog name, for the scene "hold".
+        tip: end-effector frame, for the scene "hold".
+        urdf_text: a URDF's text instead of its path (uploads).
+
+    Raises:
+        InputError: unknown scene, a URDF where none fits or none where one is needed, or a bad one.
+    """
+    if name not in SCENES:
+        raise unknown_name("scene", name, SCENES)
+    if name == "hold":
+        if urdf is None and urdf_text is None:
+            raise InputError("scene 'hold' needs a robot: add --urdf FILE.urdf, or take iiwa14-hold")
+        return hold(urdf, tip, urdf_text)
+    if urdf is not None or urdf_text is not None or tip is not None:
+        raise InputError(f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf and --tip")
+    return _MAKERS[name]()

@@ -1,0 +1,63 @@
+"""The draggable scenes: EE position, EE orientation, posture, in this order of priority."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from himpc.stack import Level, freedom_left
+from himpc.tasks import FrameOrientation, FramePosition, Posture
+from lessons.scene import Scene
+from lessons.settings import SceneSettings
+from robots import PlantSettings, Robot, load_robot, load_urdf_text
+
+PLANAR3_PLANT = PlantSettings(armature=(0.05, 0.05, 0.03))
+"""The paper's M̄ = 0.033 supposes geared motors: without armature the loop would be unstable."""
+
+
+def hold_of(name: str) -> Scene:
+    """The hold scene of a catalog robot."""
+    robot = load_robot(name)
+    plant = PLANAR3_PLANT if name == "planar3" else PlantSettings()
+    return replace(_hold(robot, plant), name=f"{name}-hold", sources={})
+
+
+def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> Scene:
+    """The hold scene of any robot: a URDF path, a catalog name or a URDF's text.
+
+    Raises:
+        InputError: the URDF cannot be used, or the tip is no frame of it.
+    """
+    robot = load_urdf_text(urdf_text, tip) if urdf_text is not None else load_robot(str(urdf), tip)
+    plant = PLANAR3_PLANT if robot.name == "planar3" else PlantSettings()
+    return _hold(robot, plant)
+
+
+def _hold(robot: Robot, plant: PlantSettings) -> Scene:
+    position_axes, orientation_axes = _free_axes(robot)
+    levels = [Level((FramePosition(name="position", axes=position_axes),))]
+    if orientation_axes:
+        levels.append(Level((FrameOrientation(name="orientation", axes=orientation_axes),)))
+    levels.append(Level((Posture(name="posture"),)))
+    return Scene(
+        name="hold",
+        title=f"{robot.name}: drag the target; position, then orientation, then posture",
+        robot=robot,
+        settings=SceneSettings(levels=tuple(levels), M_bar=tuple(robot.M_bar), plant=plant),
+        references=lambda robot, stack: {},
+        q_0=robot.home,
+        v_0=np.zeros(robot.n),
+        duration=4.0,
+        sources={"urdf_text": robot.urdf_text, "tip": robot.tip},
+    )
+
+
+def _free_axes(robot: Robot) -> tuple[str, str]:
+    """World axes the tip can move along and turn about at all: a planar arm has no z."""
+
+    def movable(task: type[FramePosition] | type[FrameOrientation], axis: str) -> bool:
+        return freedom_left(robot, (Level((task(name="probe", axes=axis),)),)) < robot.n
+
+    position = "".join(axis for axis in "xyz" if movable(FramePosition, axis)) or "xyz"
+    return position, "".join(axis for axis in "xyz" if movable(FrameOrientation, axis))

@@ -1,0 +1,297 @@
+"""The headless loop: one scene, one controller, one plant, one mailbox."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.controllers import HIMPC
+from himpc.plan import Binding, Plan
+from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Preview, Reference, Target
+from himpc.rotation import from_quaternion, quaternion
+from himpc.stack import Stack
+from himpc.tasks import FrameOrientation, FramePosition, Task
+from himpc.telemetry import Layout, layout_of, write_plan
+from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.scene import Scene
+from lessons.settings import SceneSettings, changed
+from robots import InputError, Plant, convergence_gauge
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+
+GAUGE_TICKS = 20
+"""The gauge of M̄ changes with the configuration only: it is refreshed this often."""
+
+LOST_POSITION = 0.5
+"""m: a level-1 position error above this counts as divergence."""
+LOST_SPEED = 20.0
+"""A joint faster than this many times its limit counts as divergence."""
+
+
+class Session:
+    """One learner's run. `tick` advances one control period; events wait in the mailbox until then.
+
+    Attributes:
+        scene: what it started from.
+        seed: seed of the run; all randomness must come from it.
+        robot: the scene's robot.
+        plant: the simulation.
+        settings: the settings in force.
+        layout: where the fields of a row lie.
+        plan: the last plan, None before the first tick.
+        notices: sentences for the learner (refused events, divergence); drain them.
+        log: (time, event) of every event that took effect.
+    """
+
+    def __init__(self, scene: Scene, seed: int = 0) -> None:
+        """Raises InputError if the scene's settings do not fit its robot."""
+        self.scene = scene
+        self.seed = seed
+        self.robot = scene.robot
+        self.settings: SceneSettings = scene.settings
+        self.plant = Plant(scene.robot, scene.settings.plant)
+        self.controller = HIMPC(scene.robot, scene.settings.for_controller())
+        self.layout: Layout = layout_of(scene.robot, scene.settings.levels)
+        self.notices: list[str] = []
+        self.log: list[tuple[float, Event]] = []
+        self._mailbox: deque[Event] = deque()
+        self._data = scene.robot.model.createData()
+        self._row = np.full(self.layout.size, np.nan)
+        self.reset()
+
+    # ------------------------------------------------------------- state
+
+    @property
+    def t(self) -> float:
+        """Simulated time since the last reset, s."""
+        return self.plant.t
+
+    def reset(self) -> None:
+        """Back to the scene's start with the settings as they are."""
+        scene = self.scene
+        self.plant.reset(scene.q_0, scene.v_0, scene.tau_0)
+        self.controller.reset(self.plant.tau)
+        self.references = self._fresh_references()
+        self.plan: Plan | None = None
+        self.diverged_at: float | None = None
+        self._script = deque(scene.events)
+        self._push_until = math.inf
+        self._ticks = 0
+        self._gauge = (math.nan, math.nan)
+
+    def _fresh_references(self) -> dict[str, Reference]:
+        given = dict(self.scene.references(self.robot, self.settings.levels))
+        start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
+        for task in _tasks(self.settings.levels):
+            if task.name not in given:
+                given[task.name] = _target_at(task, task.value(start))
+        return given
+
+    def target(self, task: str) -> Target | None:
+        """The draggable target of a task, None if its reference is a fixed motion."""
+        reference = self.references.get(task)
+        return reference if isinstance(reference, Target) else None
+
+    # ------------------------------------------------------------- events
+
+    def post(self, event: Event) -> None:
+        """Puts an event in the mailbox; it takes effect at the next tick, or leaves a notice."""
+        self._mailbox.append(event)
+
+    def _drain(self) -> None:
+        while self._script and self._script[0][0] <= self.t + 1e-9:
+            self._mailbox.append(self._script.popleft()[1])
+        while self._mailbox:
+            event = self._mailbox.popleft()
+            try:
+                self._take(event)
+                self.log.append((self.t, event))
+            except InputError as error:
+                self.notices.append(str(error))
+        if self.t >= self._push_until - 1e-9:
+            self.plant.push(None)
+            self._push_until = math.inf
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Set(path, value):
+                self._adopt(changed(self.settings, path, value))
+            case MoveLevel(level, to):
+                self._adopt(replace(self.settings, levels=_moved(self.settings.levels, level, to)))
+            case MoveTarget(task, value):
+                self._move_target(task, value)
+            case Push(body, force, torque, seconds):
+                if not (math.isfinite(seconds) and seconds > 0):
+                    raise InputError(f"a push of {seconds} s cannot be: give a time above 0")
+                try:
+                    self.plant.push(body, force, torque)
+                except InputError:
+                    raise
+                except ValueError as error:
+                    raise InputError(f"the push was not applied: {error}") from None
+                self._push_until = self.t + seconds
+            case Reset():
+                self.reset()
+
+    def _adopt(self, settings: SceneSettings) -> None:
+        if settings.plant != self.settings.plant:
+            self.plant.configure(settings.plant)
+        self.controller.configure(settings.for_controller())
+        self.settings = settings
+
+    def _move_target(self, name: str, value: tuple[float, ...]) -> None:
+        tasks = {task.name: task for task in _tasks(self.settings.levels)}
+        if name not in tasks:
+            raise unknown_name("task", name, tasks)
+        target = self.target(name)
+        if target is None:
+            raise InputError(f"the target of task '{name}' follows a fixed motion in this scene: take a hold scene")
+        array = np.array(value, float)
+        if not np.isfinite(array).all():
+            raise InputError(f"the target of task '{name}' is not finite: give finite numbers")
+        task = tasks[name]
+        if isinstance(task, FrameOrientation):
+            if array.size != 4 or not array.any():
+                raise InputError(f"the target of task '{name}' must be a quaternion x y z w")
+            target.move(from_quaternion(array))
+            return
+        if isinstance(task, FramePosition) and array.size == 3:
+            array = array[task.components]
+        if array.shape != target.raw.shape:
+            raise InputError(f"the target of task '{name}' needs {target.raw.size} numbers, not {array.size}")
+        target.move(array)
+
+    # ------------------------------------------------------------- the loop
+
+    def tick(self) -> Array:
+        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it).
+
+        A row holds the true joint state, the references, what the controller decided, and the torque
+        applied from this tick on.
+        """
+        self._drain()
+        settings, plant = self.settings, self.plant
+        T_s, N, t = settings.T_s, settings.horizon, plant.t
+        q, v = plant.q, plant.v
+        state = plant.measure(T_s)
+        previews = {name: reference.preview(t, T_s, N) for name, reference in self.references.items()}
+        plan = self.controller.step(state.q, state.v, previews, plant.tau)
+        row = self._row
+        row.fill(np.nan)
+        fields = self.layout.fields
+        row[fields["t"]] = t
+        row[fields["q"]] = q
+        row[fields["v"]] = v
+        write_plan(row, self.layout, plan)
+        self._write_references(row, previews)
+        self._write_truth(row, plan, q)
+        self.plan = plan
+        row[fields["tau"]] = plant.step(plan.tau, T_s)
+        self._ticks += 1
+        if self.diverged_at is None and self._is_lost(q, v, plan):
+            self.diverged_at = t
+            self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+        return row
+
+    def _write_references(self, row: Array, previews: Mapping[str, Preview]) -> None:
+        fields = self.layout.fields
+        for task in self.layout.tasks:
+            preview = previews[task.name]
+            value = preview.value
+            row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
+            row[fields[f"v_d/{task.name}"]] = preview.velocity[0]
+            row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
+
+    def _write_truth(self, row: Array, plan: Plan, q: Array) -> None:
+        """What only the plant's M can tell: the gauge of M̄ and the honest leak."""
+        fields = self.layout.fields
+        solved = [level for level in plan.levels if level.rung != "hold"]
+        if np.isfinite(q).all():
+            M = self.plant.mass_matrix()
+            if self._ticks % GAUGE_TICKS == 0:
+                M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
+                self._gauge = convergence_gauge(M, M_bar)
+            if len(solved) > 1:
+                row[fields["dynamic_leak"]] = self._dynamic_leak(M, plan, q)
+        row[fields["gauge_norm"]], row[fields["gauge_radius"]] = self._gauge
+
+    def _dynamic_leak(self, M: Array, plan: Plan, q: Array) -> float:
+        """max over p of ‖J_p M⁻¹(τ − τ_{≤p})‖∞ with the plant's M: what lower levels really do to upper ones."""
+        first = np.array([level.U[0] for level in plan.levels])
+        acceleration = np.linalg.solve(M, (first[-1] - first[:-1]).T)
+        tasks = {level.name: level.tasks for level in self.settings.levels}
+        configuration = Configuration(self.robot, self._data, q, q)
+        leak = 0.0
+        for level, column in zip(plan.levels[:-1], acceleration.T, strict=True):
+            for task in tasks.get(level.name, ()):
+                leak = max(leak, float(np.abs(task.jacobian(configuration)[0] @ column).max()))
+        return leak
+
+    def _is_lost(self, q: Array, v: Array, plan: Plan) -> bool:
+        # A comparison with NaN is false, so "all within" also catches what is not finite.
+        if not (np.abs(v) <= LOST_SPEED * self.robot.v_limit).all() or not np.isfinite(q).all():
+            return True
+        for level in self.settings.levels:
+            if level.enabled:
+                return any(
+                    isinstance(task, FramePosition) and np.linalg.norm(plan.errors[task.name]) > LOST_POSITION
+                    for task in level.tasks
+                    if task.name in plan.errors
+                )
+        return False
+
+    # ------------------------------------------------------------- views
+
+    def predicted_path(self, frame: str = "") -> Array:
+        """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""
+        if self.plan is None:
+            return np.empty((0, 3))
+        return np.array(
+            [Configuration(self.robot, self._data, q, q).placement(frame).translation for q in self.plan.q]
+        )
+
+    def reference_path(self, task: str, points: int = 200) -> Array | None:
+        """One turn of a periodic position reference, (points, 3) m; None for anything else."""
+        reference = self.references.get(task)
+        phase = getattr(reference, "phase", None)
+        tasks = {each.name: each for each in _tasks(self.settings.levels)}
+        found = tasks.get(task)
+        if reference is None or phase is None or not isinstance(found, FramePosition):
+            return None
+        preview = reference.preview(0.0, 2 * np.pi / phase.omega / (points - 1), points - 1)
+        start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
+        path = np.tile(start.placement(found.frame).translation, (points, 1))
+        path[:, found.components] = preview.value + preview.displacement
+        return path
+
+    def binding(self) -> list[Binding]:
+        """The constraints that bind in the last plan."""
+        return [] if self.plan is None else self.plan.binding(self.robot.joint_names)
+
+
+def _tasks(stack: Stack) -> list[Task]:
+    return [task for level in stack for task in level.tasks]
+
+
+def _target_at(task: Task, value: Array) -> Target:
+    if isinstance(task, FrameOrientation):
+        return Target(value, ROTATION_CAPS, task.components)
+    return Target(value, POSITION_CAPS if task.unit == "m" else JOINT_CAPS)
+
+
+def _moved(stack: Stack, name: str, to: int) -> Stack:
+    names = [level.name for level in stack]
+    if name not in names:
+        raise unknown_name("level", name, names)
+    if not 0 <= to < len(stack):
+        raise InputError(f"level '{name}' cannot go to place {to}: the stack has places 0 to {len(stack) - 1}")
+    levels = list(stack)
+    levels.insert(to, levels.pop(names.index(name)))
+    return tuple(levels)

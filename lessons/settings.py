@@ -1,0 +1,208 @@
+"""Everything a learner can change, as one frozen tree, and the paths that reach into it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from himpc.controllers import CONTROLLERS, Settings
+from himpc.limits import Limits
+from himpc.stack import Level, Stack
+from robots import InputError, PlantSettings
+from robots.errors import unknown_name
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """Settings of a run; see `himpc.controllers.himpc.Settings` for the controller's own.
+
+    Attributes:
+        levels: the stack.
+        M_bar: diagonal of M̄ before scaling.
+        M_bar_scale: factor on all of it.
+        plant: what the plant really is.
+    """
+
+    levels: Stack
+    M_bar: tuple[float, ...]
+    controller: str = "himpc"
+    M_bar_scale: float = 1.0
+    horizon: int = 5
+    T_s: float = 1e-3
+    R_on: Literal["torque", "acceleration"] = "torque"
+    route: Literal["structured", "explicit"] = "structured"
+    solver: Literal["daqp", "proxqp"] = "daqp"
+    damping: bool = True
+    limits: Limits = field(default_factory=Limits)
+    plant: PlantSettings = field(default_factory=PlantSettings)
+
+    def for_controller(self) -> Settings:
+        """The controller's part. Raises InputError for values that cannot be."""
+        if self.controller not in CONTROLLERS:
+            raise unknown_name("controller", self.controller, CONTROLLERS)
+        if not (math.isfinite(self.M_bar_scale) and self.M_bar_scale > 0):
+            raise InputError(f"M_bar_scale is {self.M_bar_scale}: give a finite number above 0, e.g. 1")
+        return Settings(
+            stack=self.levels,
+            M_bar=tuple(float(value) * self.M_bar_scale for value in self.M_bar),
+            horizon=self.horizon,
+            T_s=self.T_s,
+            limits=self.limits,
+            route=self.route,
+            solver=self.solver,
+            R_on=self.R_on,
+            damping=self.damping,
+        )
+
+
+_LEVEL_KEYS = ("Q", "R", "horizon", "enabled", "K_p", "K_v")
+_TASK_KEYS = ("K_p", "K_v")
+_EVERY_LEVEL = ("Q", "R")
+
+
+def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
+    """The settings with the value at a path replaced.
+
+    Paths: a field ("horizon", "M_bar", …); "Q" or "R" for all levels (one number, or one per level);
+    "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p, K_v
+    (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "plant.KEY".
+
+    Raises:
+        InputError: unknown path (naming the nearest), or a value of the wrong type or range.
+    """
+    head, _, rest = path.partition(".")
+    if head in _EVERY_LEVEL and not rest:
+        return _every_level(settings, head, value)
+    if head == "levels":
+        return _in_level(settings, path, rest, value)
+    if head == "tasks":
+        return _in_task(settings, path, rest, value)
+    if head in ("limits", "plant"):
+        part = getattr(settings, head)
+        names = [f.name for f in fields(part)]
+        if rest not in names:
+            raise _unknown_path(settings, path)
+        return replace(settings, **{head: replace(part, **{rest: _typed(path, getattr(part, rest), value)})})
+    if rest or head not in _plain_fields():
+        raise _unknown_path(settings, path)
+    updated = replace(settings, **{head: _typed(path, getattr(settings, head), value)})
+    updated.for_controller()
+    return updated
+
+
+def paths(settings: SceneSettings) -> list[str]:
+    """Every path that `changed` takes for these settings."""
+    return [
+        *_plain_fields(),
+        *_EVERY_LEVEL,
+        *(f"levels.{place}.{key}" for place in range(1, len(settings.levels) + 1) for key in _LEVEL_KEYS),
+        *(f"levels.{level.name}.{key}" for level in settings.levels for key in _LEVEL_KEYS),
+        *(
+            f"tasks.{task.name}.{key}"
+            for level in settings.levels
+            for task in level.tasks
+            for key in _TASK_KEYS
+        ),
+        *(f"limits.{f.name}" for f in fields(settings.limits)),
+        *(f"plant.{f.name}" for f in fields(settings.plant)),
+    ]
+
+
+def _plain_fields() -> list[str]:
+    return [f.name for f in fields(SceneSettings) if f.name not in ("levels", "limits", "plant")]
+
+
+def _unknown_path(settings: SceneSettings, path: str) -> InputError:
+    return unknown_name("setting", path, paths(settings))
+
+
+def _every_level(settings: SceneSettings, key: str, value: Any) -> SceneSettings:
+    values = value if isinstance(value, (list, tuple)) else [value] * len(settings.levels)
+    if len(values) != len(settings.levels):
+        raise InputError(f"{key} has {len(values)} values: give one number, or one per level")
+    levels = [
+        replace(level, **{key: _weight(f"{key} of level '{level.name}'", each)})
+        for level, each in zip(settings.levels, values, strict=True)
+    ]
+    return replace(settings, levels=tuple(levels))
+
+
+def _in_level(settings: SceneSettings, path: str, rest: str, value: Any) -> SceneSettings:
+    name, _, key = rest.rpartition(".")
+    names = [level.name for level in settings.levels]
+    if name.isdigit() and 1 <= int(name) <= len(names):
+        name = names[int(name) - 1]
+    if name not in names or key not in _LEVEL_KEYS:
+        raise _unknown_path(settings, path)
+
+    def update(level: Level) -> Level:
+        if key in _TASK_KEYS:
+            gain = _weight(path, value)
+            return replace(level, tasks=tuple(replace(task, **{key: gain}) for task in level.tasks))
+        if key in ("Q", "R"):
+            return replace(level, **{key: _weight(path, value)})
+        if key == "horizon":
+            return replace(level, horizon=None if value is None else _typed(path, 1, value))
+        return replace(level, enabled=_typed(path, True, value))
+
+    return _updated(settings, name, update)
+
+
+def _in_task(settings: SceneSettings, path: str, rest: str, value: Any) -> SceneSettings:
+    name, _, key = rest.rpartition(".")
+    owner = {task.name: level.name for level in settings.levels for task in level.tasks}
+    if name not in owner or key not in _TASK_KEYS:
+        raise _unknown_path(settings, path)
+    gain = _weight(path, value)
+
+    def update(level: Level) -> Level:
+        tasks = (replace(task, **{key: gain}) if task.name == name else task for task in level.tasks)
+        return replace(level, tasks=tuple(tasks))
+
+    return _updated(settings, owner[name], update)
+
+
+def _updated(settings: SceneSettings, name: str, update: Callable[[Level], Level]) -> SceneSettings:
+    levels = tuple(update(level) if level.name == name else level for level in settings.levels)
+    return replace(settings, levels=levels)
+
+
+def _weight(path: str, value: Any) -> float | tuple[float, ...]:
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return tuple(_number(path, each) for each in value)
+    return _number(path, value)
+
+
+def _number(path: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise InputError(f"{path} is {value!r}: give a number")
+    if not math.isfinite(value):
+        raise InputError(f"{path} is {value}: give a finite number")
+    return float(value)
+
+
+def _typed(path: str, old: Any, value: Any) -> Any:
+    """The value in the type of the one it replaces."""
+    if isinstance(old, bool):
+        if isinstance(value, bool):
+            return value
+        raise InputError(f"{path} is {value!r}: give true or false")
+    if isinstance(old, str):
+        if isinstance(value, str):
+            return value
+        raise InputError(f"{path} is {value!r}: give a word")
+    if isinstance(old, int):
+        number = _number(path, value)
+        if number != int(number):
+            raise InputError(f"{path} is {value}: give a whole number")
+        return int(number)
+    if isinstance(old, tuple) and not isinstance(value, (list, tuple, np.ndarray)):
+        _number(path, value)
+        if path.startswith("plant."):
+            return float(value)
+        raise InputError(f"{path} is {value!r}: give a list of {len(old)} numbers, e.g. {list(old)}")
+    return _weight(path, value)

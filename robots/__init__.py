@@ -1,0 +1,28 @@
+"""What the robot is: its description, its catalog, and the simulated plant."""
+
+from robots.catalog import CATALOG
+from robots.errors import InputError
+from robots.inertia import convergence_gauge, suggest_M_bar
+from robots.load import load_robot, load_urdf_text
+from robots.plant import Plant
+from robots.report import Finding, ImportReport
+from robots.robot import Robot
+from robots.settings import PlantSettings
+from robots.signals import PlantState
+from robots.urdf import check_urdf
+
+__all__ = [
+    "CATALOG",
+    "Finding",
+    "ImportReport",
+    "InputError",
+    "Plant",
+    "PlantSettings",
+    "PlantState",
+    "Robot",
+    "check_urdf",
+    "convergence_gauge",
+    "load_robot",
+    "load_urdf_text",
+    "suggest_M_bar",
+]

@@ -1,0 +1,63 @@
+"""The robots that come with the project: a URDF of ours per folder, and what a URDF cannot say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+_HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class CatalogEntry:
+    """One robot of the catalog. Angles in degrees here, because that is how the sources print them."""
+
+    name: str
+    title: str
+    tip: str
+    home_deg: tuple[float, ...]
+    a_max: tuple[float, ...]  # rad/s²
+    M_bar: tuple[float, ...]  # kg·m²
+
+    @property
+    def path(self) -> Path:
+        """The robot's URDF."""
+        return _HERE / self.name / f"{self.name}.urdf"
+
+    @property
+    def home(self) -> np.ndarray:
+        """(n,) rad."""
+        return np.radians(self.home_deg)
+
+
+CATALOG: dict[str, CatalogEntry] = {
+    entry.name: entry
+    for entry in (
+        CatalogEntry(
+            name="planar3",
+            title="Three-joint arm in the horizontal plane (HIMPC paper, section V)",
+            tip="ee",
+            home_deg=(0.0, 90.0, -90.0),
+            a_max=(20.0, 20.0, 20.0),  # project design notes: enough for the viability bound
+            M_bar=(0.033, 0.033, 0.033),  # HIMPC paper, section V-A
+        ),
+        CatalogEntry(
+            name="iiwa14",
+            title="KUKA LBR iiwa 14 R820, seven joints (HIMPC paper, section VI)",
+            tip="flange",
+            home_deg=(0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0),  # elbow up, flange pointing down
+            a_max=(10.0,) * 7,  # project design notes
+            M_bar=(0.1, 0.21, 0.033, 0.042, 0.001, 0.001, 0.0003),  # HIMPC paper, section VI-A
+        ),
+        CatalogEntry(
+            name="panda",
+            title="Franka Emika Panda with hand, seven joints",
+            tip="hand_tcp",
+            home_deg=(0.0, -45.0, 0.0, -135.0, 0.0, 90.0, 45.0),  # Franka's ready pose
+            a_max=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),  # Franka Control Interface documentation
+            M_bar=(0.018, 0.2, 0.009, 0.051, 0.006, 0.0116, 0.0024),  # suggest_M_bar, two or three digits
+        ),
+    )
+}

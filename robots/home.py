@@ -1,0 +1,115 @@
+"""For robots nobody described by hand: a tip, a home configuration, and accelerations to count on."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pinocchio as pin
+
+from robots.inertia import finite_range, mass_matrix, sample_configurations
+
+_TIP_NAMES = re.compile(
+    r"(hand_?tcp|tcp|tool_?0|tool_?frame|ee_?link|link_?eef|end_?effector|(^|_)ee$|eef|flange|tool)",
+    re.IGNORECASE,
+)
+_CANDIDATES = 300
+_STEPS = 60
+_PLAIN = 0.05  # score given up for a joint that rests at the middle of its range
+
+
+def choose_tip(model: pin.Model, frames: dict[str, int]) -> str:
+    """The frame at the end of the longest chain of joints, with a name such as `tool0` if one has it."""
+    depth = {name: len(model.supports[model.frames[i].parentJoint]) - 1 for name, i in frames.items()}
+    deepest = max(depth.values())
+    ends = [name for name in frames if depth[name] == deepest]
+    for preferred in (0, 1):
+        for name in reversed(ends) if preferred else ends:
+            match = _TIP_NAMES.search(name)
+            if match or preferred:
+                return name
+    return ends[-1]
+
+
+def find_home(
+    model: pin.Model, frame: int, q_lower: np.ndarray, q_upper: np.ndarray, seed: int = 0
+) -> np.ndarray:
+    """(n,) rad a configuration inside the limits, away from singularities and from the limits.
+
+    Maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖² over samples and then by coordinate
+    steps, J with its linear part over the reach; deterministic. Joints that do not move the frame rest
+    at the middle of their range (unbounded ones at 0). A chain that dips below
+    the floor (z = 0, or the first joint if lower) loses, an elbow above the tip wins.
+    """
+    lower, upper = finite_range(q_lower, q_upper)
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    moving = np.array([joint - 1 for joint in model.supports[model.frames[frame].parentJoint] if joint > 0])
+    if len(moving) == 0:
+        return middle
+    data = model.createData()
+    reach = max(_reach(model, frame), 1e-3)
+
+    chain = [int(joint) + 1 for joint in moving]
+    pin.forwardKinematics(model, data, middle)
+    floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
+
+    def score(q: np.ndarray) -> float:
+        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:, moving]
+        jacobian[:3] /= reach
+        pin.forwardKinematics(model, data, q)
+        tip = pin.updateFramePlacement(model, data, frame)
+        heights = [float(data.oMi[j].translation[2]) for j in chain]
+        height = float(tip.translation[2])
+        lowest = min(height, *heights)
+        elbow = min(max(heights) - height, 0.3 * reach) / reach
+        singular = np.linalg.svd(jacobian, compute_uv=False)
+        margin = float(((half - np.abs(q - middle)) / half)[moving].min())
+        bend = float(np.square((q - middle)[moving] / np.pi).mean())
+        below = 8.0 * max(0.0, floor - lowest) / reach
+        return float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)) - bend - below + elbow)
+
+    samples = sample_configurations(
+        np.maximum(q_lower, middle - np.pi), np.minimum(q_upper, middle + np.pi), _CANDIDATES, seed
+    )
+    full = np.tile(middle, (_CANDIDATES, 1))
+    full[:, moving] = samples[:, moving]
+    best = max((*full, middle), key=score)
+    best_score = score(best)
+    rng = np.random.default_rng(seed)
+    for k in range(_STEPS):
+        trial = best.copy()
+        step = rng.normal(size=len(moving)) * 0.3 * 0.97**k
+        trial[moving] = np.clip(
+            best[moving] + step, (middle - 0.9 * half)[moving], (middle + 0.9 * half)[moving]
+        )
+        trial_score = score(trial)
+        if trial_score > best_score:
+            best, best_score = trial, trial_score
+    for joint in moving:
+        trial = best.copy()
+        trial[joint] = middle[joint]
+        if score(trial) > best_score - _PLAIN:
+            best, best_score = trial, score(trial)
+    return np.round(best, 3) if np.all(np.abs(np.round(best, 3) - middle) <= half) else best
+
+
+def sensible_a_max(
+    model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray, tau_limit: np.ndarray
+) -> np.ndarray:
+    """(n,) rad/s² half of what the torque left after gravity can do to each joint, within [1, 15].
+
+    a_i = ½ min over samples of (τ_i − |g_i|)/M_ii: the other half is for coupling and tracking.
+    """
+    data = model.createData()
+    accelerations = []
+    for q in sample_configurations(q_lower, q_upper, 64):
+        gravity = np.abs(pin.computeGeneralizedGravity(model, data, q))
+        accelerations.append((tau_limit - gravity) / np.diag(mass_matrix(model, data, q)))
+    return np.clip(0.5 * np.min(accelerations, axis=0), 1.0, 15.0)
+
+
+def _reach(model: pin.Model, frame: int) -> float:
+    """m, the length of the chain from the first joint to the frame."""
+    chain = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0][1:]
+    lengths = [float(np.linalg.norm(model.jointPlacements[joint].translation)) for joint in chain]
+    return sum(lengths) + float(np.linalg.norm(model.frames[frame].placement.translation))

@@ -1,0 +1,74 @@
+"""M̄ of time-delay estimation: a suggestion for any robot, and the gauge of its convergence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+_WIDEST = 40.0  # rad or m: a joint allowed many turns is the same robot in each of them
+
+
+def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Limits to sample in: ±π for an unbounded joint, one turn from the end of a one-sided one."""
+    turn = 2.0 * np.pi
+    from_above = np.where(np.isfinite(q_upper), q_upper - turn, -np.pi)
+    from_below = np.where(np.isfinite(q_lower), q_lower + turn, np.pi)
+    lower = np.where(np.isfinite(q_lower), q_lower, from_above)
+    upper = np.where(np.isfinite(q_upper), q_upper, from_below)
+    middle, half = 0.5 * (lower + upper), np.minimum(0.5 * (upper - lower), 0.5 * _WIDEST)
+    return middle - half, middle + half
+
+
+def sample_configurations(
+    q_lower: np.ndarray, q_upper: np.ndarray, samples: int, seed: int = 0
+) -> np.ndarray:
+    """(samples, n) configurations, uniform inside the limits; unbounded joints within ±π."""
+    lower, upper = finite_range(q_lower, q_upper)
+    return np.random.default_rng(seed).uniform(lower, upper, size=(samples, len(lower)))
+
+
+def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
+    """M(q), kg·m², symmetric (Pinocchio's `crba` fills the upper triangle only)."""
+    upper = np.triu(pin.crba(model, data, q))
+    return upper + np.triu(upper, 1).T
+
+
+def suggest_M_bar(
+    model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray, samples: int = 200, seed: int = 0
+) -> np.ndarray:
+    """(n,) a constant diagonal M̄, kg·m², for which time-delay estimation converges on all samples.
+
+    The estimation error is multiplied by I − M⁻¹M̄ from one period to the next, so its spectral radius has
+    to be below 1 (HIMPC, T-RO 2024, Remark 4). M⁻¹M̄ is similar to S = M̄^½ M⁻¹ M̄^½, symmetric and positive
+    definite, so its eigenvalues are real and positive, and the radius is below 1 iff λ_max(S) < 2. Steps:
+
+    1. shape: D_i = min over samples of 1/(M⁻¹)_ii, the least inertia joint i ever shows when the other
+       joints are free, so joints of very different size each get their own scale;
+    2. size: M̄ = D / max over samples of λ_max(D^½ M⁻¹ D^½). Then λ(S) ∈ (0, 1]: half of what stability
+       allows, the place where the fastest mode is cancelled in one period and none alternates in sign.
+
+    Larger M̄ estimates better and amplifies noise (Remark 4): a scale of 2 is the edge.
+    """
+    data = model.createData()
+    inverses = [
+        np.linalg.inv(mass_matrix(model, data, q))
+        for q in sample_configurations(q_lower, q_upper, samples, seed)
+    ]
+    stack = np.array(inverses)
+    shape = 1.0 / np.diagonal(stack, axis1=1, axis2=2).max(axis=0)
+    root = np.sqrt(shape)
+    largest = np.linalg.eigvalsh(root[:, None] * stack * root[None, :])[:, -1].max()
+    return shape / largest
+
+
+def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
+    """(‖I − M⁻¹M̄‖₂, spectral radius of I − M⁻¹M̄) for a mass matrix M (n, n) and a diagonal M̄ (n,), kg·m².
+
+    Below 1 in the norm: every error shrinks at every step (the paper's condition). Below 1 in the radius
+    only: errors die out, but may grow first. Raises LinAlgError if M is singular.
+    """
+    diagonal = np.asarray(M_bar, dtype=float)
+    norm = np.linalg.norm(np.eye(len(diagonal)) - np.linalg.solve(M, np.diag(diagonal)), 2)
+    root = np.sqrt(diagonal)
+    eigenvalues = np.linalg.eigvalsh(root[:, None] * np.linalg.inv(M) * root[None, :])
+    return float(norm), float(np.abs(1.0 - eigenvalues).max())

@@ -1,0 +1,298 @@
+"""The plant: MuJoCo's simulation of a robot, built from its Pinocchio model. The only door to mujoco.
+
+Building it this way, not from the URDF, makes the joint order Pinocchio's and M, C·v + g, kinematics and
+accelerations equal to 1e-9. There are no geometries, no contacts and no joint stops: a joint pushed past
+its limit goes on, and the run shows it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from robots.errors import InputError
+from robots.robot import Robot
+from robots.settings import PlantSettings
+from robots.signals import Encoders, Motors, PlantState
+from robots.truth import joint_axis, true_model
+
+_ZERO = (0.0, 0.0, 0.0)
+# MuJoCo's friction is a spring-damper in disguise. Its default lets a stuck light joint slide at tenths of
+# rad/s; this is the stiffest setting RK4 still integrates quietly, and creep falls by four decades.
+_STICTION_SOLREF = (0.002, 1.0)
+_STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+# Divergence shows as q that is not finite; MuJoCo would print and leave a log file in the user's folder.
+mujoco.set_mju_user_warning(lambda _: None)
+
+
+class Plant:
+    """A robot in MuJoCo under torque control, integrated with RK4. SI units, world axes, joints in
+    Pinocchio's order. Same calls, same numbers, to the bit.
+
+    Queries (`mass_matrix`, `bias`, `jacobian`, `frame_pose`, `acceleration`, `holding_torque`) are about
+    the plant as its settings make it, and never disturb the simulation.
+    """
+
+    def __init__(self, robot: Robot, settings: PlantSettings | None = None, timestep: float = 1e-3) -> None:
+        """timestep: s, the longest internal step. Raises InputError for settings or a step that cannot be."""
+        if not (math.isfinite(timestep) and 0.0 < timestep <= 0.01):
+            raise InputError(f"plant timestep is {timestep} s; give a value above 0 and at most 0.01.")
+        self.robot = robot
+        self.timestep = timestep
+        self._push: tuple[str | None, np.ndarray] = (None, np.zeros(6))
+        self._build(PlantSettings() if settings is None else settings)
+        self.reset(robot.home)
+
+    def _build(self, settings: PlantSettings) -> None:
+        robot = self.robot
+        self._model = _compile(robot, settings)
+        self.settings = settings
+        self._data = mujoco.MjData(self._model)
+        self._probe = mujoco.MjData(self._model)
+        self._fresh = False
+        resolution = math.radians(settings.encoder_resolution_deg)
+        revolute = [not joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
+        self._resolution = np.where(revolute, resolution, 0.0)
+        self._reads_encoders = resolution > 0.0 and any(revolute)
+        limit = robot.tau_limit if settings.saturate else np.full(robot.n, np.inf)
+        self._tau_lower, self._tau_upper = -limit, limit
+        self._lag, self._delay = 1e-3 * settings.torque_lag_ms, 1e-3 * settings.delay_ms
+
+    # ---------------------------------------------------------------- state
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.robot.n
+
+    @property
+    def t(self) -> float:
+        """Time since the reset, s."""
+        return float(self._data.time)
+
+    @property
+    def q(self) -> np.ndarray:
+        """(n,) rad, the true position."""
+        return self._data.qpos.copy()
+
+    @property
+    def v(self) -> np.ndarray:
+        """(n,) rad/s, the true velocity."""
+        return self._data.qvel.copy()
+
+    @property
+    def tau(self) -> np.ndarray:
+        """(n,) N·m, the torque acting on the joints, after saturation, delay and lag."""
+        return self._motors.torque.copy()
+
+    def reset(self, q: np.ndarray, v: np.ndarray | None = None, tau: np.ndarray | None = None) -> None:
+        """Puts the robot at q (rad) with velocity v (default 0); t = 0; a push is cleared.
+
+        tau: N·m, the torque the motors were giving before; default: `holding_torque`, as when the brakes
+        open. Raises ValueError for vectors of the wrong length or with non-finite entries.
+        """
+        position = self._vector("q", q)
+        velocity = np.zeros(self.n) if v is None else self._vector("v", v)
+        torque = None if tau is None else self._vector("tau", tau)
+        mujoco.mj_resetData(self._model, self._data)
+        self._data.qpos[:] = position
+        self._data.qvel[:] = velocity
+        self._push = (None, np.zeros(6))
+        self._fresh = False
+        torque = self._clip(self.holding_torque() if torque is None else torque)
+        self._motors = Motors(torque, 0.0)
+        self._encoders = Encoders(position, velocity, 0.0)
+
+    def measure(self, period: float) -> PlantState:
+        """The state as the sensors see it. With ideal encoders that is the true one; else q is rounded and
+        v is its backward difference over `period` (s, the control period). Calling it changes nothing.
+        """
+        if not self._reads_encoders:
+            return PlantState(self.t, self.q, self.v)
+        q, v = self._encoders.read(period, self._resolution)
+        return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self._data.qvel))
+
+    # ---------------------------------------------------------------- motion
+
+    def step(self, tau: np.ndarray, period: float) -> np.ndarray:
+        """Holds the command tau (n,), N·m, for `period` (s), in equal internal steps no longer than the
+        timestep; returns the torque (n,) acting at the end. Raises ValueError for a command that is not n
+        finite numbers: nothing is simulated then.
+        """
+        if not (math.isfinite(period) and period > 0.0):
+            raise ValueError(f"the period is {period} s; it must be positive")
+        model, data, motors = self._model, self._data, self._motors
+        motors.command(self._clip(self._vector("tau", tau)), data.time)
+        count = max(1, math.ceil(period / self.timestep - 1e-9))
+        h = period / count
+        model.opt.timestep = h
+        for _ in range(count):
+            data.ctrl[:] = motors.advance(data.time, h, self._delay, self._lag)
+            mujoco.mj_step(model, data)
+            self._encoders.record(data.qpos.copy(), data.time)
+        self._fresh = False
+        return motors.torque.copy()
+
+    def push(
+        self,
+        body: str | None,
+        force: tuple[float, float, float] | np.ndarray = _ZERO,
+        torque: tuple[float, float, float] | np.ndarray = _ZERO,
+    ) -> None:
+        """Applies a force (N) and torque (N·m), world axes, at the centre of mass of a moving body until
+        changed; None ends it. body: the joint that moves it, or any frame on it. Raises InputError for an
+        unknown body or one fixed to the world, ValueError for a wrench that is not finite.
+        """
+        wrench = np.concatenate([np.asarray(force, dtype=float), np.asarray(torque, dtype=float)])
+        if wrench.shape != (6,) or not np.all(np.isfinite(wrench)):
+            raise ValueError("force and torque of a push must be three finite numbers each")
+        self._data.xfrc_applied[:] = 0.0
+        self._push = (None, np.zeros(6))
+        if body is not None:
+            self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
+            self._push = (body, wrench)
+        self._fresh = False
+
+    def configure(self, settings: PlantSettings) -> None:
+        """Changes the plant while it runs: t, q, v, push, and the motors' and encoders' memory stay."""
+        old, (body, wrench) = self._data, self._push
+        self._build(settings)
+        self._motors.limit(self._tau_lower, self._tau_upper)
+        self._data.time = old.time
+        self._data.qpos[:] = old.qpos
+        self._data.qvel[:] = old.qvel
+        self._data.qacc_warmstart[:] = old.qacc_warmstart
+        if body is not None:
+            self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
+
+    # ---------------------------------------------------------------- queries
+
+    def mass_matrix(self) -> np.ndarray:
+        """(n, n) kg·m², M(q) with payload and armature."""
+        M = np.zeros((self.n, self.n))
+        mujoco.mj_fullM(self._model, self._look(), M)
+        return M
+
+    def bias(self) -> np.ndarray:
+        """(n,) N·m, C(q, v)·v + g(q): M q̈ + bias = τ − friction + push."""
+        return self._look().qfrc_bias.copy()
+
+    def holding_torque(self) -> np.ndarray:
+        """(n,) N·m that keeps the plant at q: inverse dynamics with v = 0, q̈ = 0 (no push, no friction)."""
+        probe = self._probe
+        probe.qpos[:] = self._data.qpos
+        probe.qvel[:] = 0.0
+        mujoco.mj_fwdPosition(self._model, probe)
+        mujoco.mj_fwdVelocity(self._model, probe)
+        self._fresh = False
+        return probe.qfrc_bias.copy()
+
+    def jacobian(self, frame: str) -> np.ndarray:
+        """(6, n) linear over angular velocity of a frame's origin, world axes; m/rad and rad/rad."""
+        J = np.zeros((6, self.n))
+        mujoco.mj_jacSite(self._model, self._look(), J[:3], J[3:], self._site(frame))
+        return J
+
+    def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """(R (3, 3), p (3,) m) of a frame in the world."""
+        site = self._site(frame)
+        probe = self._look()
+        return probe.site_xmat[site].reshape(3, 3).copy(), probe.site_xpos[site].copy()
+
+    def acceleration(self, tau: np.ndarray) -> np.ndarray:
+        """(n,) rad/s² if the torque tau (N·m) acted on the joints now: friction, damping and push included,
+        saturation, delay and lag not.
+        """
+        probe = self._probe
+        probe.qpos[:], probe.qvel[:] = self._data.qpos, self._data.qvel
+        probe.xfrc_applied[:] = self._data.xfrc_applied
+        probe.qacc_warmstart[:] = self._data.qacc_warmstart
+        probe.ctrl[:] = self._vector("tau", tau)
+        mujoco.mj_forward(self._model, probe)
+        self._fresh = True
+        return probe.qacc.copy()
+
+    # ---------------------------------------------------------------- inside
+
+    def _look(self) -> mujoco.MjData:
+        if not self._fresh:
+            self._probe.qpos[:], self._probe.qvel[:] = self._data.qpos, self._data.qvel
+            mujoco.mj_fwdPosition(self._model, self._probe)
+            mujoco.mj_fwdVelocity(self._model, self._probe)
+            self._fresh = True
+        return self._probe
+
+    def _clip(self, tau: np.ndarray) -> np.ndarray:
+        return np.minimum(np.maximum(tau, self._tau_lower), self._tau_upper)
+
+    def _vector(self, name: str, value: np.ndarray) -> np.ndarray:
+        array = np.array(value, dtype=float)
+        if array.shape != (self.n,) or not np.isfinite(array).all():
+            raise ValueError(f"{name} must be {self.n} finite numbers, not {array}")
+        return array
+
+    def _site(self, frame: str) -> int:
+        index = self.robot.frame_id(frame)
+        return self._model.site(_site_name(index)).id
+
+
+def _site_name(frame_index: int) -> str:
+    return f"frame{frame_index}"
+
+
+def _compile(robot: Robot, settings: PlantSettings) -> mujoco.MjModel:
+    """MuJoCo model: body i carries joint i of Pinocchio's tree, site k is its frame k."""
+    truth = true_model(robot, settings)
+    friction, damping = settings.per_joint("friction", robot.n), settings.per_joint("damping", robot.n)
+    spec = mujoco.MjSpec()
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.compiler.degree = False
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.gravity = truth.gravity.linear
+    # Without this MuJoCo silently restarts a diverging simulation; we want to see it diverge.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_CONTACT
+    bodies = [spec.worldbody]
+    for joint in range(1, truth.njoints):
+        body = bodies[truth.parents[joint]].add_body(
+            name=f"body{joint}", **_pose(truth.jointPlacements[joint])
+        )
+        bodies.append(body)
+        inertia = truth.inertias[joint]
+        I = inertia.inertia
+        body.mass, body.ipos = inertia.mass, inertia.lever
+        body.fullinertia = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        body.explicitinertial = True
+        prismatic, axis = joint_axis(truth, joint)
+        kind = mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE
+        body.add_joint(
+            name=f"joint{joint}",
+            type=kind,
+            axis=axis,
+            limited=mujoco.mjtLimited.mjLIMITED_FALSE,
+            armature=truth.armature[joint - 1],
+            damping=[damping[joint - 1], 0.0, 0.0],
+            frictionloss=friction[joint - 1],
+            solref_friction=_STICTION_SOLREF,
+            solimp_friction=_STICTION_SOLIMP,
+        )
+        motor = spec.add_actuator(
+            name=f"motor{joint}", target=f"joint{joint}", trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
+        motor.set_to_motor()
+    for index, frame in enumerate(truth.frames):
+        if frame.type == pin.FrameType.BODY:
+            bodies[frame.parentJoint].add_site(name=_site_name(index), **_pose(frame.placement))
+    model = spec.compile()
+    order = [model.joint(i).name for i in range(model.njnt)]
+    if order != [f"joint{i}" for i in range(1, truth.njoints)]:
+        raise RuntimeError(f"MuJoCo reordered the joints of '{robot.name}': {order}")
+    return model
+
+
+def _pose(placement: pin.SE3) -> dict[str, np.ndarray]:
+    x, y, z, w = pin.Quaternion(placement.rotation).normalized().coeffs()
+    return {"pos": placement.translation, "quat": np.array([w, x, y, z])}

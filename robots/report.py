@@ -1,0 +1,49 @@
+"""What the import of a robot description found, as data: it can be printed, sent to a page or tested."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+Kind = Literal["repaired", "filled", "fixed", "refused", "note"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing the import did or refused.
+
+    kind: `repaired` (a value was wrong and was changed), `filled` (a value was missing), `fixed` (a joint
+    was frozen), `refused` (the description cannot be used), `note` (worth knowing, nothing was changed).
+    where: the element, e.g. ``joint 'elbow'``. text: one sentence.
+    """
+
+    kind: Kind
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.where}: {self.text}"
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """All findings of one import, in the order in which they were made."""
+
+    source: str
+    findings: tuple[Finding, ...] = ()
+    name: str = ""
+    joints: tuple[str, ...] = ()
+    tip: str = ""
+
+    @property
+    def usable(self) -> bool:
+        """Whether a robot can be built from the description."""
+        return not self.of_kind("refused")
+
+    def of_kind(self, kind: Kind) -> tuple[Finding, ...]:
+        """The findings of one kind."""
+        return tuple(finding for finding in self.findings if finding.kind == kind)
+
+    def as_dict(self) -> dict[str, object]:
+        """The report as plain JSON types."""
+        return {**asdict(self), "findings": [asdict(f) for f in self.findings], "usable": self.usable}

@@ -1,0 +1,94 @@
+"""`Robot`: everything the rest of the project may know about a robot, and nothing about its control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from robots.errors import InputError, unknown_name
+from robots.report import ImportReport
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A fixed-base robot whose joints all have one degree of freedom (nq = nv = n).
+
+    All vectors are in Pinocchio's joint order, all frames are URDF links. SI units; angles in rad,
+    prismatic joints in m. The arrays are read-only: derive a changed robot with `dataclasses.replace`.
+    Picklable, so it can be sent to a spawned child.
+    """
+
+    name: str
+    model: pin.Model
+    joint_names: tuple[str, ...]
+    tip: str  # the frame a task means when it names none
+    home: np.ndarray  # (n,) rad, inside the limits
+    q_lower: np.ndarray  # (n,) rad, −inf where unbounded
+    q_upper: np.ndarray  # (n,) rad, +inf where unbounded
+    v_limit: np.ndarray  # (n,) rad/s
+    tau_limit: np.ndarray  # (n,) N·m
+    a_max: np.ndarray  # (n,) rad/s², deceleration the viability bound may count on
+    M_bar: np.ndarray  # (n,) kg·m², suggested diagonal of M̄
+    urdf_text: str  # canonical URDF
+    report: ImportReport
+
+    def __post_init__(self) -> None:
+        for field in ("home", "q_lower", "q_upper", "v_limit", "tau_limit", "a_max", "M_bar"):
+            values = np.array(getattr(self, field), dtype=float)
+            if values.shape != (self.model.nv,):
+                raise ValueError(f"Robot.{field} has shape {values.shape}, expected ({self.model.nv},)")
+            values.flags.writeable = False
+            object.__setattr__(self, field, values)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.model.nv
+
+    @cached_property
+    def _frame_ids(self) -> dict[str, int]:
+        bodies = (i for i, frame in enumerate(self.model.frames) if frame.type == pin.FrameType.BODY)
+        return {self.model.frames[i].name: i for i in bodies}
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the frames tasks and plants may use: the links of the URDF, root first."""
+        return tuple(self._frame_ids)
+
+    def frame_id(self, name: str) -> int:
+        """Index of a frame in `model.frames`.
+
+        Raises InputError, with the nearest name and the full list, for a name that is not a link.
+        """
+        try:
+            return self._frame_ids[name]
+        except KeyError:
+            raise unknown_name(f"frame of robot '{self.name}' called", name, self.frames) from None
+
+    def moving_body(self, name: str) -> int:
+        """Pinocchio index of the joint that moves a body, named by that joint or by any frame on it.
+
+        Raises InputError for an unknown name and for a frame that is fixed to the world.
+        """
+        if name in self.joint_names:
+            return self.joint_names.index(name) + 1
+        if name not in self._frame_ids:
+            raise unknown_name(f"body of robot '{self.name}' called", name, (*self.frames, *self.joint_names))
+        joint = self.model.frames[self._frame_ids[name]].parentJoint
+        if joint == 0:
+            moving = (f for f, i in self._frame_ids.items() if self.model.frames[i].parentJoint > 0)
+            raise InputError(
+                f"'{name}' is fixed to the world: choose a moving body, such as '{next(moving)}'."
+            )
+        return joint
+
+    def with_tip(self, tip: str) -> Robot:
+        """The same robot with another default end-effector frame. Raises InputError for an unknown one."""
+        self.frame_id(tip)
+        return replace(self, tip=tip, report=replace(self.report, tip=tip))
+
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, n={self.n}, tip={self.tip!r})"

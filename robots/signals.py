@@ -1,0 +1,103 @@
+"""Between controller and mechanics: motors that saturate, wait and lag, and encoders that round."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+_MEMORY_S = 1.5  # s of commands kept, more than the largest delay
+_SAMPLES_S = 0.3  # s of positions kept, more than any control period
+
+
+@dataclass(frozen=True)
+class PlantState:
+    """What the sensors say at time t: s; q (n,) rad; v (n,) rad/s."""
+
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+
+
+class Motors:
+    """Command → torque on the joints: saturation, then pure delay, then first-order lag.
+
+    The memory is kept in time, not in steps, so the internal step may change between commands.
+    """
+
+    def __init__(self, tau: np.ndarray, t: float) -> None:
+        self._commands: deque[tuple[float, np.ndarray]] = deque([(t - _MEMORY_S, tau)])
+        self.torque = tau.copy()  # (n,) N·m acting on the joints
+
+    def command(self, tau: np.ndarray, t: float) -> None:
+        """Takes a (clipped) command given at time t, s."""
+        commands = self._commands
+        commands.append((t, tau))
+        while len(commands) > 1 and commands[1][0] < t - _MEMORY_S:
+            commands.popleft()
+
+    def limit(self, lower: np.ndarray, upper: np.ndarray) -> None:
+        """Clips what is still on its way, when the torque limits change."""
+        self._commands = deque((t, np.clip(tau, lower, upper)) for t, tau in self._commands)
+        self.torque = np.clip(self.torque, lower, upper)
+
+    def advance(self, t: float, h: float, delay: float, lag: float) -> np.ndarray:
+        """(n,) the torque over the internal step from t to t + h (all times in s).
+
+        Lag: τ ← τ + (1 − e^(−h/lag))(command − τ), the exact response at the end of the step.
+        """
+        target = self._delayed(t - delay + 0.5 * h) if delay > 0.0 else self._commands[-1][1]
+        self.torque = (
+            target if lag <= 0.0 else self.torque + (1.0 - np.exp(-h / lag)) * (target - self.torque)
+        )
+        return self.torque
+
+    def _delayed(self, stamp: float) -> np.ndarray:
+        for given, tau in reversed(self._commands):
+            if given <= stamp:
+                return tau
+        return self._commands[0][1]
+
+
+class Encoders:
+    """Positions over time, and what a sensor of finite resolution makes of them."""
+
+    def __init__(self, q: np.ndarray, v: np.ndarray, t: float) -> None:
+        self._start = (t, q.copy(), v.copy())
+        self._samples: deque[tuple[float, np.ndarray]] = deque([(t, q.copy())])
+
+    def record(self, q: np.ndarray, t: float) -> None:
+        """Remembers the true position at time t, s."""
+        samples = self._samples
+        samples.append((t, q))
+        while samples[0][0] < t - _SAMPLES_S:
+            samples.popleft()
+
+    def read(self, period: float, resolution: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(q, v) as measured: q rounded to multiples of `resolution` (n,), rad; 0 leaves it as it is.
+
+        v is the difference to the rounded position one `period` (s) ago; before the first period the
+        joints are taken to have come with the velocity they were reset to. Reading changes nothing.
+        """
+        now, q = self._samples[-1]
+        then, before = self._at(now - period)
+        rounded = quantise(q, resolution)
+        return rounded, (rounded - quantise(before, resolution)) / max(now - then, 1e-9)
+
+    def _at(self, stamp: float) -> tuple[float, np.ndarray]:
+        start, q, v = self._start
+        if stamp < start - 1e-9:
+            return stamp, q + v * (stamp - start)
+        later = self._samples[-1]
+        for sample in reversed(self._samples):
+            if sample[0] <= stamp:
+                return sample if stamp - sample[0] <= later[0] - stamp else later
+            later = sample
+        return later
+
+
+def quantise(q: np.ndarray, resolution: np.ndarray) -> np.ndarray:
+    """q rounded to the nearest multiple of `resolution`, element by element; 0 leaves it as it is."""
+    safe = np.where(resolution > 0.0, resolution, 1.0)
+    return np.where(resolution > 0.0, np.round(q / safe) * safe, q)

@@ -1,0 +1,141 @@
+"""Inertias of a URDF made physical: every moving body has positive mass and a possible inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from lxml import etree
+from lxml.etree import _Element as Element
+
+from robots.report import Finding
+from robots.urdf.read import Refusal, child, end_of, label, named, numbers
+from robots.urdf.structure import movable_joints
+
+_DENSITY = 1000.0  # kg/m³: the solid sphere that stands in for a missing inertia
+_LEAST_MASS = 1e-6  # kg
+_FILL_MASS = 0.1  # kg: a moving body that was given no mass
+_MARGIN = 1e-9  # of the trace: how far inside the physical region an inertia is kept
+_KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def repair_inertials(root: Element) -> Iterator[Finding]:
+    """Repairs the inertia of every link, then gives mass to moving bodies that have none.
+
+    Raises nothing; an inertial element that cannot be read is yielded as `refused`.
+    """
+    masses: dict[str, float] = {}
+    for name, link in named(root, "link").items():
+        try:
+            masses[name] = yield from _repair_link(link)
+        except Refusal as refusal:
+            masses[name] = 1.0
+            yield refusal.finding
+    links = named(root, "link")
+    for joint in movable_joints(root):
+        carried = end_of(joint, "child")
+        if sum(masses[name] for name in _rigid_with(root, carried)) <= 0.0:
+            _write(links[carried], _FILL_MASS, np.eye(3) * _sphere(_FILL_MASS))
+            text = f"the body moved by {label(joint)} has no mass; a sphere of {_FILL_MASS} kg was put there"
+            yield Finding("filled", label(links[carried]), text)
+
+
+def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
+    """(I', violation): the inertia about the centre of mass made that of some mass distribution, kg·m².
+
+    A body's inertia is I = tr(Σ)·1 − Σ with Σ = ∫ρ r rᵀ ⪰ 0, so Σ = ½ tr(I)·1 − I must be positive
+    semidefinite; that is A + B ≥ C for the principal moments, and it implies I ⪰ 0 (Wensing, Kim, Slotine,
+    IEEE RA-L 2018). Σ's eigenvalues are raised to a small positive value and I is rebuilt. The violation is
+    the most negative eigenvalue over the trace, ≥ 0, and 0 for a physical inertia.
+    """
+    trace = float(np.trace(inertia))
+    eigenvalues, axes = np.linalg.eigh(0.5 * trace * np.eye(3) - inertia)
+    scale = max(trace, float(np.abs(eigenvalues).max()), 1e-300)
+    floor = _MARGIN * scale
+    violation = max(0.0, -float(eigenvalues.min()) / scale)
+    if eigenvalues.min() >= floor:
+        return inertia, 0.0
+    raised = np.maximum(eigenvalues, floor)
+    second_moment = (axes * raised) @ axes.T
+    return float(raised.sum()) * np.eye(3) - second_moment, violation
+
+
+def _repair_link(link: Element) -> Iterator[Finding]:
+    """A generator that returns the link's mass, kg."""
+    inertial = child(link, "inertial")
+    if inertial is None:
+        return 0.0
+    origin = child(inertial, "origin")
+    if origin is not None:
+        numbers(origin, "xyz", 3, (0.0, 0.0, 0.0))
+        numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
+    mass_element = child(inertial, "mass")
+    mass = 0.0 if mass_element is None else float(numbers(mass_element, "value", 1)[0])
+    if mass < 0.0:
+        raise Refusal(label(link), f"its mass is {mass:.4g} kg; give a positive mass")
+    inertia = _read_inertia(inertial)
+    if 0.0 < mass < _LEAST_MASS:
+        yield Finding("repaired", label(link), f"a mass of {mass:.3g} kg is as good as none; dropped")
+        link.remove(inertial)
+        return 0.0
+    if mass == 0.0:
+        if inertia is not None and np.abs(inertia).max() > 0.0:
+            yield Finding("repaired", label(link), "an inertia without mass is impossible and was dropped")
+        link.remove(inertial)
+        return 0.0
+    if inertia is None or float(np.abs(inertia).max()) < 1e-12 * mass:
+        _write_inertia(inertial, np.eye(3) * _sphere(mass))
+        text = f"no rotational inertia; that of a solid sphere of {mass:.4g} kg was used"
+        yield Finding("filled", label(link), text)
+        return mass
+    physical, violation = nearest_physical(inertia)
+    if violation > _MARGIN:
+        moments = np.linalg.eigvalsh(inertia)
+        listed = ", ".join(f"{moment:.3g}" for moment in moments)
+        fault = "a negative moment" if moments[0] <= 0.0 else "A + B < C"
+        text = f"impossible principal moments {listed} kg·m² ({fault}); the nearest possible ones were used"
+        yield Finding("repaired", label(link), text)
+    if physical is not inertia:
+        _write_inertia(inertial, physical)
+    return mass
+
+
+def _read_inertia(inertial: Element) -> np.ndarray | None:
+    element = child(inertial, "inertia")
+    if element is None:
+        return None
+    xx, xy, xz, yy, yz, zz = (float(numbers(element, key, 1, (0.0,))[0]) for key in _KEYS)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _rigid_with(root: Element, link: str) -> list[str]:
+    """The link and everything fixed to it further out."""
+    body, frontier = [link], [link]
+    fixed: dict[str, list[str]] = {}
+    for joint in root.findall("joint"):
+        if joint.get("type") == "fixed":
+            fixed.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))
+    while frontier:
+        further = fixed.get(frontier.pop(), [])
+        body.extend(further)
+        frontier.extend(further)
+    return body
+
+
+def _sphere(mass: float) -> float:
+    radius = (3.0 * mass / (4.0 * np.pi * _DENSITY)) ** (1.0 / 3.0)
+    return 0.4 * mass * radius**2
+
+
+def _write(link: Element, mass: float, inertia: np.ndarray) -> None:
+    inertial = etree.SubElement(link, "inertial")
+    etree.SubElement(inertial, "mass", value=repr(mass))
+    _write_inertia(inertial, inertia)
+
+
+def _write_inertia(inertial: Element, inertia: np.ndarray) -> None:
+    for old in inertial.findall("inertia"):
+        inertial.remove(old)
+    element = etree.SubElement(inertial, "inertia")
+    for key, (row, column) in zip(_KEYS, ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)), strict=True):
+        element.set(key, repr(float(inertia[row, column])))

@@ -1,0 +1,180 @@
+"""Joints of a URDF made uniform: unit axes, `continuous` as bounded revolute, grippers and mimics frozen."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pinocchio as pin
+from lxml import etree
+from lxml.etree import _Element as Element
+
+from robots.report import Finding
+from robots.urdf.read import Refusal, child, end_of, label, named, numbers
+from robots.urdf.structure import ancestors, movable_joints
+
+UNBOUNDED = 1e6  # rad or m: written for a joint without limits, so that nq = nv; read back as ±inf
+_GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
+_GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" also names whole hands
+
+
+def normalise_joints(root: Element) -> Iterator[Finding]:
+    """Rewrites every joint so that Pinocchio gives it exactly one coordinate; yields what was changed."""
+    frozen = _to_freeze(root)
+    for joint in root.findall("joint"):
+        try:
+            _origin(joint)
+            _drop(joint, "dynamics", "calibration", "safety_controller")
+            if joint.get("type") == "fixed":
+                _drop(joint, "limit", "axis", "mimic")
+                continue
+            yield from _axis(joint)
+            yield from _limits(joint)
+            if joint.get("name") in frozen:
+                yield freeze(joint, *frozen[joint.get("name", "")])
+            else:
+                yield from _freeze_if_stuck(joint)
+        except Refusal as refusal:
+            yield refusal.finding
+
+
+def freeze(joint: Element, value: float, reason: str) -> Finding:
+    """Makes a joint fixed at `value` (rad or m), moved inside its limits, by folding it into the origin."""
+    limit = child(joint, "limit")
+    if limit is not None:
+        value = float(np.clip(value, float(limit.get("lower", "0")), float(limit.get("upper", "0"))))
+    axis = numbers(_require(joint, "axis"), "xyz", 3)
+    if joint.get("type") == "prismatic":
+        motion = pin.SE3(np.eye(3), axis * value)
+    else:
+        motion = pin.SE3(pin.exp3(axis * value), np.zeros(3))
+    if value != 0.0:
+        placed = _placement(joint) * motion
+        origin = child(joint, "origin")
+        if origin is None:
+            origin = etree.SubElement(joint, "origin")
+        origin.set("xyz", _text(placed.translation))
+        origin.set("rpy", _text(pin.rpy.matrixToRpy(placed.rotation)))
+    unit = "m" if joint.get("type") == "prismatic" else "rad"
+    joint.set("type", "fixed")
+    _drop(joint, "limit", "axis", "mimic")
+    return Finding("fixed", label(joint), f"held at {value:.4g} {unit}: {reason}")
+
+
+def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
+    """Name → (value, reason) of the joints an arm controller does not move."""
+    frozen: dict[str, tuple[float, str]] = {}
+    joints = named(root, "joint")
+    for joint in movable_joints(root):
+        name = joint.get("name", "")
+        mimic = child(joint, "mimic")
+        if mimic is not None:
+            offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
+            leader = mimic.get("joint", "")
+            frozen[name] = (offset, f"it mimics '{leader}'")
+            if leader in joints and not _same_chain(root, joint, joints[leader]):
+                frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
+        elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
+            frozen.setdefault(name, (0.0, "its name says it belongs to a gripper"))
+    # A description of a hand alone is still a robot: with nothing else to move, keep what the names suggest.
+    if len(frozen) == len(movable_joints(root)):
+        frozen = {name: why for name, why in frozen.items() if child(joints[name], "mimic") is not None}
+    return frozen
+
+
+def _same_chain(root: Element, one: Element, other: Element) -> bool:
+    return one in ancestors(root, end_of(other, "child")) or other in ancestors(root, end_of(one, "child"))
+
+
+def _origin(joint: Element) -> None:
+    origin = child(joint, "origin")
+    if origin is not None:
+        numbers(origin, "xyz", 3, (0.0, 0.0, 0.0))
+        numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
+
+
+def _placement(joint: Element) -> pin.SE3:
+    origin = child(joint, "origin")
+    if origin is None:
+        return pin.SE3.Identity()
+    rpy = numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
+    return pin.SE3(pin.rpy.rpyToMatrix(*rpy), numbers(origin, "xyz", 3, (0.0, 0.0, 0.0)))
+
+
+def _axis(joint: Element) -> Iterator[Finding]:
+    axis = child(joint, "axis")
+    if axis is None:
+        axis = etree.SubElement(joint, "axis", xyz="1 0 0")
+        yield Finding("filled", label(joint), "no axis; the URDF default x was used")
+    direction = numbers(axis, "xyz", 3, (1.0, 0.0, 0.0))
+    length = float(np.linalg.norm(direction))
+    if length < 1e-6:
+        raise Refusal(label(joint), "its axis has no length; give a direction such as '0 0 1'")
+    if abs(length - 1.0) > 1e-6:
+        yield Finding("repaired", label(joint), f"its axis had length {length:.4g} and was normalised")
+    axis.set("xyz", _text(direction / length) if length != 1.0 else _text(direction))
+
+
+def _limits(joint: Element) -> Iterator[Finding]:
+    limit = child(joint, "limit")
+    if limit is None:
+        limit = etree.SubElement(joint, "limit")
+    if joint.get("type") == "continuous":
+        joint.set("type", "revolute")
+        limit.set("lower", repr(-UNBOUNDED))
+        limit.set("upper", repr(UNBOUNDED))
+        yield Finding("note", label(joint), "continuous: its position is unbounded")
+        return
+    if limit.get("lower") is None and limit.get("upper") is None:
+        limit.set("lower", repr(-UNBOUNDED))
+        limit.set("upper", repr(UNBOUNDED))
+        yield Finding("filled", label(joint), "no position limits; it is treated as unbounded")
+        return
+    # The URDF default of a missing bound is 0.
+    lower = float(numbers(limit, "lower", 1, (0.0,))[0])
+    upper = float(numbers(limit, "upper", 1, (0.0,))[0])
+    if lower == upper == 0.0 and float(numbers(limit, "velocity", 1, (0.0,))[0]) <= 0.0:
+        lower, upper = -UNBOUNDED, UNBOUNDED
+        text = "all its limits are 0, as CAD exporters leave them; it is treated as unbounded"
+        yield Finding("filled", label(joint), text)
+    if lower > upper:
+        lower, upper = upper, lower
+        yield Finding(
+            "repaired", label(joint), f"lower limit above upper; swapped to [{lower:.4g}, {upper:.4g}]"
+        )
+    if max(abs(lower), abs(upper)) > UNBOUNDED:
+        lower, upper = max(lower, -UNBOUNDED), min(upper, UNBOUNDED)
+        yield Finding("repaired", label(joint), f"limits beyond ±{UNBOUNDED:.0g} were cut there")
+    limit.set("lower", repr(lower))
+    limit.set("upper", repr(upper))
+
+
+def _freeze_if_stuck(joint: Element) -> Iterator[Finding]:
+    limit = _require(joint, "limit")
+    lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+    if upper - lower < 1e-6:
+        yield freeze(joint, 0.5 * (lower + upper), "its limits leave it no room to move")
+
+
+def _require(joint: Element, tag: str) -> Element:
+    found = child(joint, tag)
+    if found is None:
+        raise Refusal(label(joint), f"it has no <{tag}>")
+    return found
+
+
+def _drop(joint: Element, *tags: str) -> None:
+    for tag in tags:
+        for element in joint.findall(tag):
+            joint.remove(element)
+
+
+def _text(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def finite_bounds(lower: float, upper: float) -> bool:
+    """Whether a pair of canonical limits means a bounded joint."""
+    return math.isfinite(lower) and math.isfinite(upper) and max(abs(lower), abs(upper)) < UNBOUNDED

@@ -1,0 +1,76 @@
+"""Speed and effort limits: what a URDF leaves out is estimated from the robot itself, and reported."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pinocchio as pin
+from lxml import etree
+from lxml.etree import _Element as Element
+
+from robots.inertia import mass_matrix, sample_configurations
+from robots.report import Finding
+from robots.urdf.joints import finite_bounds
+from robots.urdf.read import Refusal, child, label, numbers
+from robots.urdf.structure import movable_joints
+
+_SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: brisk but safe for an arm nobody described
+_LEVER = 3.0  # effort = this times what holding still against gravity can need
+_ACCELERATION = 10.0  # rad/s², m/s²: and at least enough to accelerate the joint like this
+
+
+def fill_speeds(root: Element) -> Iterator[Finding]:
+    """Fills missing, zero and negative velocity limits and marks such effort limits with 0."""
+    for joint in movable_joints(root):
+        limit = child(joint, "limit")
+        if limit is None:
+            limit = etree.SubElement(joint, "limit")
+        try:
+            if float(numbers(limit, "velocity", 1, (0.0,))[0]) <= 0.0:
+                speed = float(_SPEED[joint.get("type", "")])
+                limit.set("velocity", repr(speed))
+                unit = "m/s" if joint.get("type") == "prismatic" else "rad/s"
+                yield Finding("filled", label(joint), f"no velocity limit; {speed:.3g} {unit} was used")
+            if float(numbers(limit, "effort", 1, (0.0,))[0]) <= 0.0:
+                limit.set("effort", "0")
+        except Refusal as refusal:
+            yield refusal.finding
+
+
+def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
+    """Fills the effort limits that are 0: three times the largest gravity load, and enough to accelerate.
+
+    τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, to two digits.
+    """
+    joints = {joint.get("name", ""): joint for joint in movable_joints(root)}
+    missing = [name for name, joint in joints.items() if _effort(joint) <= 0.0]
+    if not missing:
+        return
+    needed = _needed_effort(model)
+    for name in missing:
+        effort = float(f"{needed[model.getJointId(name) - 1]:.1e}")
+        limit = child(joints[name], "limit")
+        if limit is not None:
+            limit.set("effort", repr(effort))
+        unit = "N" if joints[name].get("type") == "prismatic" else "N·m"
+        text = f"no effort limit; {effort:g} {unit} was estimated from the weight it carries"
+        yield Finding("filled", label(joints[name]), text)
+
+
+def _effort(joint: Element) -> float:
+    limit = child(joint, "limit")
+    return 0.0 if limit is None else float(limit.get("effort", "0"))
+
+
+def _needed_effort(model: pin.Model) -> np.ndarray:
+    data = model.createData()
+    pairs = zip(model.lowerPositionLimit, model.upperPositionLimit, strict=True)
+    bounded = np.array([finite_bounds(low, high) for low, high in pairs])
+    lower = np.where(bounded, model.lowerPositionLimit, -np.inf)
+    upper = np.where(bounded, model.upperPositionLimit, np.inf)
+    samples = sample_configurations(lower, upper, 64)
+    gravity = np.array([pin.computeGeneralizedGravity(model, data, q) for q in samples])
+    inertia = np.array([np.diag(mass_matrix(model, data, q)) for q in samples])
+    needed = _LEVER * np.abs(gravity).max(axis=0) + _ACCELERATION * inertia.max(axis=0)
+    return np.maximum(needed, 1e-3)

@@ -1,0 +1,124 @@
+"""Reading a URDF's XML safely, and its numbers strictly."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+from lxml.etree import _Element as Element
+
+from robots.report import Finding
+
+MAX_BYTES = 10_000_000
+_LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: beyond, sums of inertias lose all digits
+_XACRO_HINT = "; is this a xacro file? Run `xacro FILE > robot.urdf` first"
+
+
+class Refusal(Exception):
+    """An element that cannot be used; the import turns it into a `refused` finding."""
+
+    def __init__(self, where: str, text: str) -> None:
+        super().__init__(f"{where}: {text}")
+        self.finding = Finding("refused", where, text)
+
+
+def parse(data: bytes, source: str) -> Element:
+    """The root element `robot` of a URDF document, comments and foreign sections removed.
+
+    No entity is resolved, no DTD is loaded and nothing is fetched. Raises Refusal for a document that is
+    too large, is not XML, declares a DTD, is a xacro template, or has another root element.
+    """
+    if len(data) > MAX_BYTES:
+        raise Refusal(
+            source, f"the file has {len(data) / 1e6:.0f} MB; give a URDF below {MAX_BYTES / 1e6:.0f} MB"
+        )
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
+    )
+    try:
+        root = etree.fromstring(data, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise Refusal(
+            source, f"this is not well-formed XML ({_first_line(error)}); give a URDF file"
+        ) from None
+    if root.getroottree().docinfo.doctype:
+        raise Refusal(source, "the file declares a DOCTYPE, which a URDF never needs; remove it")
+    if any("xacro" in str(element.tag) for element in root.iter()):
+        raise Refusal(source, "this is a xacro template; run `xacro FILE > robot.urdf` and give the result")
+    if root.tag != "robot":
+        raise Refusal(source, f"the root element is <{_short(str(root.tag))}>, a URDF starts with <robot>")
+    for child in list(root):
+        if child.tag not in ("link", "joint", "material"):
+            root.remove(child)
+    return root
+
+
+def read_file(path: Path) -> bytes:
+    """The bytes of a file, at most one more than the parser accepts. Raises OSError."""
+    with path.open("rb") as file:
+        return file.read(MAX_BYTES + 1)
+
+
+def label(element: Element) -> str:
+    """How a finding names an element: ``joint 'elbow'``."""
+    return f"{element.tag} '{_short(element.get('name', ''))}'"
+
+
+def numbers(
+    element: Element, attribute: str, count: int, default: tuple[float, ...] | None = None
+) -> np.ndarray:
+    """`count` finite numbers of an attribute. Raises Refusal when they are not there or are not numbers."""
+    text = element.get(attribute)
+    where = _owner(element)
+    name = f"{element.tag} {attribute}"
+    if text is None or not text.strip():
+        if default is None:
+            raise Refusal(where, f"{name} is missing; it needs {count} number{'s' * (count > 1)}")
+        return np.array(default, dtype=float)
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        hint = _XACRO_HINT if "${" in text else ""
+        raise Refusal(where, f"{name} is '{_short(text)}', not {_count(count)}{hint}") from None
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise Refusal(where, f"{name} is '{_short(text)}', not {_count(count)}")
+    if max(abs(value) for value in values) > _LARGEST.get(attribute, 1e9):
+        raise Refusal(where, f"{name} is '{_short(text)}', beyond anything physical; check its unit")
+    return np.array(values)
+
+
+def child(element: Element, tag: str) -> Element | None:
+    """The first direct child with this tag."""
+    return element.find(tag)
+
+
+def named(root: Element, tag: str) -> dict[str, Element]:
+    """The direct children with this tag, by name, in the file's order."""
+    return {element.get("name", ""): element for element in root.findall(tag)}
+
+
+def end_of(joint: Element, side: str) -> str:
+    """The link a joint names as its `parent` or `child` ('' when it does not)."""
+    element = joint.find(side)
+    return "" if element is None else element.get("link", "")
+
+
+def _owner(element: Element) -> str:
+    current: Element | None = element
+    while current is not None and current.get("name") is None:
+        current = current.getparent()
+    return label(element if current is None else current)
+
+
+def _count(count: int) -> str:
+    return "a finite number" if count == 1 else f"{count} finite numbers"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

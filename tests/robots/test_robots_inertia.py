@@ -1,0 +1,59 @@
+"""The suggested M̄ converges wherever the arm may be, and the gauge tells when one does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arms import full_mass_matrix
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robots import CATALOG, convergence_gauge, load_robot, suggest_M_bar
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_suggestion_is_stable_at_unseen_configurations(name: str) -> None:
+    robot = load_robot(name)
+    M_bar = suggest_M_bar(robot.model, robot.q_lower, robot.q_upper, 200)
+    rng = np.random.default_rng(99)
+    for _ in range(100):
+        M = full_mass_matrix(robot.model, rng.uniform(robot.q_lower, robot.q_upper))
+        assert convergence_gauge(M, M_bar)[1] < 1.0
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_catalog_M_bar_is_stable_at_home(name: str) -> None:
+    """For the planar arm only together with the rotor inertia its scenes give the plant."""
+    robot = load_robot(name)
+    rotors = np.array([0.05, 0.05, 0.03]) if name == "planar3" else np.zeros(robot.n)
+    M = full_mass_matrix(robot.model, robot.home) + np.diag(rotors)
+    assert convergence_gauge(M, robot.M_bar)[1] < 1.0
+
+
+def test_iiwa_gauge_at_the_papers_configuration() -> None:
+    """The paper's M̄ is within the radius but not within the norm."""
+    robot = load_robot("iiwa14")
+    M = full_mass_matrix(robot.model, np.radians([0, 60, 0, 60, 0, 0, 0]))
+    norm, radius = convergence_gauge(M, robot.M_bar)
+    assert 1.0 < norm < 1.12
+    assert radius == pytest.approx(0.973, abs=0.005)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(1, 8), st.integers(0, 10_000))
+def test_gauge_equals_its_definition(n: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(n, n))
+    M, M_bar = A @ A.T + 0.5 * np.eye(n), rng.uniform(0.05, 3.0, n)
+    error = np.eye(n) - np.linalg.inv(M) @ np.diag(M_bar)
+    norm, radius = convergence_gauge(M, M_bar)
+    assert norm == pytest.approx(np.linalg.norm(error, 2), rel=1e-8)
+    assert radius == pytest.approx(np.abs(np.linalg.eigvals(error)).max(), rel=1e-8)
+
+
+def test_suggestion_is_deterministic_and_copes_with_unbounded_joints() -> None:
+    robot = load_robot("planar3")
+    free = np.full(3, np.inf)
+    first, second = (suggest_M_bar(robot.model, -free, free, 50) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert np.all(first > 0.0)

@@ -1,0 +1,108 @@
+"""What a robot looks like, with meshes and without."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from arms import two_joint_arm
+
+from robots import CATALOG, Robot, load_robot, load_urdf_text
+from robots.meshes import find_mesh
+from robots.shapes import MAX_FACES, Shape, link_shapes
+from robots.simplify import simplify
+
+
+def check(robot: Robot, shapes: list[Shape]) -> None:
+    assert shapes
+    assert len({shape.name for shape in shapes}) == len(shapes)
+    for shape in shapes:
+        assert 0 <= shape.joint < robot.model.njoints
+        assert shape.vertices.dtype == np.float32
+        assert np.all(np.isfinite(shape.vertices))
+        assert shape.vertices.shape[1] == shape.faces.shape[1] == 3
+        assert shape.faces.min() >= 0
+        assert shape.faces.max() < len(shape.vertices)
+        assert all(0 <= channel <= 255 for channel in shape.colour)
+        assert np.abs(shape.vertices).max() < 2.0
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_catalog_robots_can_be_drawn(name: str) -> None:
+    robot = load_robot(name)
+    check(robot, link_shapes(robot))
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_without_meshes_every_joint_is_drawn_as_capsules(name: str) -> None:
+    robot = load_robot(name)
+    bare = dataclasses.replace(
+        robot, urdf_text=re.sub(r"<visual>.*?</visual>", "", robot.urdf_text, flags=re.S)
+    )
+    shapes = link_shapes(bare)
+    check(bare, shapes)
+    assert {shape.joint for shape in shapes} >= set(range(1, robot.n + 1))
+
+
+def test_a_broken_mesh_falls_back_to_capsules(tmp_path) -> None:
+    for suffix in (".dae", ".stl", ".obj"):
+        mesh = tmp_path / f"broken{suffix}"
+        mesh.write_bytes(b"\x00not a mesh")
+        visual = f'<link name="l2"><visual><geometry><mesh filename="{mesh}"/></geometry></visual></link>'
+        robot = load_urdf_text(two_joint_arm(l2=visual))
+        check(robot, link_shapes(robot))
+
+
+def test_primitives_and_colours() -> None:
+    visual = (
+        '<link name="l2"><visual><origin xyz="0 0 1"/><geometry><box size="0.1 0.2 0.4"/></geometry>'
+        '<material name="m"><color rgba="1 0 0.5 1"/></material></visual></link>'
+    )
+    robot = load_urdf_text(two_joint_arm(l2=visual))
+    (box,) = (shape for shape in link_shapes(robot) if shape.name.startswith("l2"))
+    assert box.colour == (238, 0, 128)
+    np.testing.assert_allclose(np.ptp(box.vertices, axis=0), [0.1, 0.2, 0.4], atol=1e-6)
+    np.testing.assert_allclose(box.vertices.mean(axis=0), [0, 0, 1], atol=1e-6)
+    assert len(box.vertices) == 24
+
+
+def test_simplified_surfaces_stay_where_they_were() -> None:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    vertices, faces = simplify(np.asarray(ball.vertices), np.asarray(ball.faces), 3000)
+    assert 1000 < len(faces) <= 3000
+    radii = np.linalg.norm(vertices, axis=1)
+    assert radii.min() > 0.98
+    assert radii.max() < 1.001
+
+
+def test_meshes_are_light_enough() -> None:
+    for name in CATALOG:
+        robot = load_robot(name)
+        counts: dict[str, int] = {}
+        for shape in link_shapes(robot):
+            link = shape.name.split("/")[0]
+            counts[link] = counts.get(link, 0) + len(shape.faces)
+        assert max(counts.values()) <= 1.2 * MAX_FACES
+
+
+def test_meshes_are_found_beside_the_urdf_and_in_its_packages(tmp_path) -> None:
+    package = tmp_path / "my_robot"
+    (package / "meshes").mkdir(parents=True)
+    (package / "urdf").mkdir()
+    mesh = package / "meshes" / "a.stl"
+    mesh.write_bytes(b"")
+    folder = package / "urdf"
+    assert find_mesh("package://my_robot/meshes/a.stl", folder) == mesh
+    assert find_mesh("../meshes/a.stl", folder) == mesh
+    assert find_mesh(f"file://{mesh}", None) == mesh
+    for nothing in (
+        "",
+        "package://other/meshes/a.stl",
+        "package://my_robot/../../etc/passwd",
+        "http://x/a.stl",
+    ):
+        assert find_mesh(nothing, folder) is None

@@ -1,0 +1,253 @@
+"""The canonical import: what it repairs, fills, fixes and refuses, and that it says so."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arms import INERTIAL, LIMIT, joint, link, robot, two_joint_arm
+
+from robots import InputError, Robot, check_urdf, load_robot, load_urdf_text
+from robots.meshes import installed_shares
+from robots.report import Kind
+from robots.urdf import check_bytes
+
+
+def texts(loaded: Robot, kind: Kind) -> str:
+    return " | ".join(str(finding) for finding in loaded.report.of_kind(kind))
+
+
+def inertial(mass: str, moments: str) -> str:
+    xx, yy, zz = moments.split()
+    moments_text = f'ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"'
+    return f'<inertial><mass value="{mass}"/><inertia {moments_text}/></inertial>'
+
+
+def test_a_clean_urdf_has_nothing_to_report() -> None:
+    loaded = load_urdf_text(two_joint_arm())
+    assert loaded.report.findings == ()
+    assert loaded.report.usable
+    np.testing.assert_array_equal(loaded.q_upper, [2, 2])
+    np.testing.assert_array_equal(loaded.v_limit, [3, 3])
+    np.testing.assert_array_equal(loaded.tau_limit, [50, 50])
+    assert np.all((loaded.home > loaded.q_lower) & (loaded.home < loaded.q_upper))
+
+
+def test_continuous_becomes_unbounded_with_one_coordinate() -> None:
+    text = two_joint_arm(j2=joint("j2", "l1", "l2", "continuous", '<limit velocity="3" effort="5"/>'))
+    loaded = load_urdf_text(text)
+    assert loaded.model.nq == loaded.model.nv == 2
+    assert loaded.q_upper[1] == np.inf
+    assert loaded.q_lower[1] == -np.inf
+    assert "continuous" in texts(loaded, "note")
+
+
+def test_missing_speed_and_effort_are_filled() -> None:
+    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside='<limit lower="-1" upper="1"/>')))
+    assert loaded.v_limit[1] == pytest.approx(np.pi)
+    assert loaded.tau_limit[1] > 3 * 9.81 * 0.1
+    assert "velocity limit" in texts(loaded, "filled")
+    assert "effort limit" in texts(loaded, "filled")
+
+
+def test_missing_position_limits_mean_unbounded() -> None:
+    loaded = load_urdf_text(
+        two_joint_arm(j2=joint("j2", "l1", "l2", inside='<limit velocity="1" effort="1"/>'))
+    )
+    assert loaded.q_upper[1] == np.inf
+    assert "no position limits" in texts(loaded, "filled")
+
+
+def test_limits_an_exporter_left_at_zero_mean_unbounded() -> None:
+    inside = '<limit lower="0" upper="0" velocity="0" effort="0"/>'
+    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside)))
+    assert loaded.q_upper[1] == np.inf
+    assert "exporters" in texts(loaded, "filled")
+
+
+def test_one_sided_limits() -> None:
+    inside = '<limit lower="0.5" upper="1e9" velocity="1" effort="1"/>'
+    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside)))
+    assert (loaded.q_lower[1], loaded.q_upper[1]) == (0.5, np.inf)
+    assert loaded.home[1] > 0.5
+
+
+def test_swapped_limits_and_long_axes_are_repaired() -> None:
+    inside = '<limit lower="1" upper="-2" velocity="1" effort="1"/>'
+    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside, axis="0 2 0")))
+    assert (loaded.q_lower[1], loaded.q_upper[1]) == (-2, 1)
+    assert "swapped" in texts(loaded, "repaired")
+    assert "normalised" in texts(loaded, "repaired")
+
+
+def test_mimic_and_finger_joints_are_fixed() -> None:
+    finger = joint("left_finger_joint", "l2", "f1", "prismatic", axis="0 1 0")
+    follower = joint(
+        "follower",
+        "l2",
+        "f2",
+        "prismatic",
+        LIMIT + '<mimic joint="left_finger_joint" offset="0.02"/>',
+        "0 1 0",
+    )
+    loaded = load_urdf_text(two_joint_arm(link("f1") + link("f2") + finger + follower))
+    assert loaded.joint_names == ("j1", "j2")
+    assert "mimics" in texts(loaded, "fixed")
+    assert "left_finger_joint" in texts(loaded, "fixed")
+    offset = loaded.model.frames[loaded.frame_id("f2")].placement.translation
+    np.testing.assert_allclose(offset, [0.3, 0.02, 0.1], atol=1e-12)
+
+
+def test_the_driver_of_a_mimic_gripper_is_fixed_but_a_parallel_arm_is_not() -> None:
+    gripper = joint("drive", "l2", "f1") + joint("other", "l2", "f2", inside=LIMIT + '<mimic joint="drive"/>')
+    assert load_urdf_text(two_joint_arm(link("f1") + link("f2") + gripper)).joint_names == ("j1", "j2")
+    parallel = joint("j3", "l2", "l3", inside=LIMIT + '<mimic joint="j2" multiplier="-1"/>')
+    assert load_urdf_text(two_joint_arm(link("l3") + parallel)).joint_names == ("j1", "j2")
+
+
+def test_a_joint_without_room_is_fixed_where_it_stands() -> None:
+    inside = '<limit lower="0.5" upper="0.5" velocity="1" effort="1"/>'
+    loaded = load_urdf_text(two_joint_arm(link("l3") + joint("j3", "l2", "l3", inside=inside)))
+    assert loaded.joint_names == ("j1", "j2")
+    rotation = loaded.model.frames[loaded.frame_id("l3")].placement.rotation
+    assert np.arccos(0.5 * (np.trace(rotation) - 1)) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("inside", "kind", "words"),
+    [
+        ("", "filled", "no mass"),
+        ('<inertial><mass value="2"/></inertial>', "filled", "solid sphere"),
+        (inertial("2", "0 0 0"), "filled", "solid sphere"),
+        (inertial("2", "0.1 0.1 0.5"), "repaired", "A + B < C"),
+        (inertial("2", "-0.1 0.2 0.2"), "repaired", "negative moment"),
+        (inertial("0", "0.1 0.1 0.1"), "repaired", "without mass"),
+    ],
+)
+def test_unphysical_inertias_become_physical(inside: str, kind: Kind, words: str) -> None:
+    loaded = load_urdf_text(two_joint_arm(l2=link("l2", inside)))
+    assert words in texts(loaded, kind)
+    for body in list(loaded.model.inertias)[1:]:
+        moments = np.linalg.eigvalsh(body.inertia)
+        assert body.mass > 0
+        assert moments[0] > 0
+        assert moments[0] + moments[1] >= moments[2]
+
+
+def test_massless_links_fixed_to_heavy_ones_are_fine() -> None:
+    loaded = load_urdf_text(two_joint_arm(link("tool0", "") + joint("t", "l2", "tool0", "fixed", "")))
+    assert loaded.report.findings == ()
+    assert loaded.tip == "tool0"
+
+
+REFUSED = {
+    "not XML": ("<robot><link", "well-formed"),
+    "empty": ("", "well-formed"),
+    "wrong root": ("<mujoco/>", "<robot>"),
+    "doctype": ('<!DOCTYPE r [<!ENTITY x "y">]><robot name="a">&x;</robot>', "DOCTYPE"),
+    "xacro": (
+        '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="b"/></robot>',
+        "xacro",
+    ),
+    "xacro number": (two_joint_arm(l2=link("l2", inertial("${m}", "1 1 1"))), "xacro"),
+    "no link": ("<robot name='a'/>", "no link"),
+    "no joint": (robot(link("base")), "no joint"),
+    "only fixed": (
+        robot(link("base"), link("a"), joint("j", "base", "a", "fixed", "")),
+        "no joint of it moves",
+    ),
+    "two roots": (two_joint_arm(link("loose")), "2 root links"),
+    "loop": (robot(link("a"), link("b"), joint("x", "a", "b"), joint("y", "b", "a")), "loop"),
+    "two parents": (two_joint_arm(joint("j3", "base", "l2")), "2 joints carry it"),
+    "duplicate": (two_joint_arm(link("l2")), "2 times"),
+    "unnamed": (two_joint_arm(link("")), "no name"),
+    "unknown link": (two_joint_arm(j2=joint("j2", "l1", "l22")), "did you mean 'l2'"),
+    "floating": (two_joint_arm(j2=joint("j2", "l1", "l2", "floating", "")), "several axes"),
+    "planar": (two_joint_arm(j2=joint("j2", "l1", "l2", "planar", "")), "several axes"),
+    "unknown type": (two_joint_arm(j2=joint("j2", "l1", "l2", "revolut")), "did you mean 'revolute'"),
+    "zero axis": (two_joint_arm(j2=joint("j2", "l1", "l2", axis="0 0 0")), "no length"),
+    "nan axis": (two_joint_arm(j2=joint("j2", "l1", "l2", axis="nan 0 1")), "finite"),
+    "short origin": (two_joint_arm().replace("0.3 0 0.1", "0.3 0"), "3 finite numbers"),
+    "word as limit": (
+        two_joint_arm(j2=joint("j2", "l1", "l2", inside=LIMIT.replace('"2"', '"two"'))),
+        "finite number",
+    ),
+    "negative mass": (two_joint_arm(l2=link("l2", inertial("-1", "1 1 1"))), "positive mass"),
+    "infinite mass": (two_joint_arm(l2=link("l2", inertial("inf", "1 1 1"))), "finite"),
+    "universe": (two_joint_arm().replace("base", "universe"), "reserved"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_used_is_refused_in_one_sentence(case: str) -> None:
+    text, words = REFUSED[case]
+    with pytest.raises(InputError) as caught:
+        load_urdf_text(text)
+    message = str(caught.value)
+    assert words in message
+    assert "\n" not in message
+    report = check_bytes(text.encode(), "my.urdf")
+    assert not report.usable
+    assert words in " ".join(finding.text for finding in report.of_kind("refused"))
+    json.dumps(report.as_dict())
+
+
+def test_no_entity_is_expanded_and_no_file_is_read(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("12345")
+    text = f'<!DOCTYPE r [<!ENTITY x SYSTEM "file://{secret}">]><robot name="a">{link("l", "&x;")}</robot>'
+    report = check_bytes(text.encode(), "evil.urdf")
+    assert not report.usable
+    assert "12345" not in str(report.as_dict())
+
+
+def test_check_urdf_reads_files(tmp_path: Path) -> None:
+    good = tmp_path / "arm.urdf"
+    good.write_text(two_joint_arm())
+    report = check_urdf(good)
+    assert report.usable
+    assert report.joints == ("j1", "j2")
+    with pytest.raises(InputError, match="Cannot read"):
+        check_urdf(tmp_path / "none.urdf")
+    with pytest.raises(InputError, match="folder"):
+        check_urdf(tmp_path)
+
+
+def test_a_missing_mesh_is_a_note() -> None:
+    visual = '<visual><geometry><mesh filename="package://nowhere/a.dae"/></geometry></visual>'
+    loaded = load_urdf_text(two_joint_arm(l2=link("l2", INERTIAL + visual)))
+    assert "nowhere" in texts(loaded, "note")
+    assert "nowhere" not in loaded.urdf_text
+
+
+def test_canonical_text_is_a_fixed_point() -> None:
+    first = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", "continuous", "")))
+    second = load_urdf_text(first.urdf_text)
+    assert second.urdf_text == first.urdf_text
+    assert not second.report.of_kind("repaired")
+    np.testing.assert_array_equal(first.q_upper, second.q_upper)
+
+
+EXAMPLES = {
+    "ur_description/urdf/ur10_robot.urdf": (6, "ee_link"),
+    "xarm_description/urdf/xarm7.urdf": (7, "link_eef"),
+    "panda_description/urdf/panda.urdf": (7, "panda_hand_tcp"),
+    "kinova_description/robots/kinova.urdf": (6, "j2s6s200_end_effector"),
+}
+
+
+@pytest.mark.parametrize("file", EXAMPLES)
+def test_robots_of_example_robot_data(file: str) -> None:
+    paths = [share / file for share in installed_shares() if (share / file).is_file()]
+    if not paths:
+        pytest.skip("example-robot-data is not installed: pip install himpc-lab[meshes]")
+    loaded = load_robot(paths[0])
+    joints, tip = EXAMPLES[file]
+    assert loaded.model.nq == loaded.model.nv == loaded.n == joints
+    assert loaded.tip == tip
+    assert np.all((loaded.home >= loaded.q_lower) & (loaded.home <= loaded.q_upper))
+    assert np.all(loaded.tau_limit > 0)
+    assert "mesh file" not in texts(loaded, "note")
+    assert load_robot(paths[0]).home.tobytes() == loaded.home.tobytes()
