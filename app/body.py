@@ -26,7 +26,8 @@ from app.messages import (
 from himpc.tasks import Task
 from lessons.events import Reset
 from lessons.scenes import load_scene
-from lessons.session import Session, Settings
+from lessons.session import Session
+from lessons.settings import SceneSettings
 from robots import InputError
 
 _LISTED = 24  # binding rows sent to the page: more cannot be read in a tenth of a second
@@ -44,7 +45,7 @@ class Body:
         self.resets = 0
         self._seed = seed
         self._steps = 0
-        self._sent: Settings | None = None
+        self._sent: SceneSettings | None = None
         self._enter(choice)
 
     def _enter(self, choice: SceneChoice) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from himpc.telemetry import Layout
 from lessons.events import Event
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 from robots import Robot
 
 
@@ -104,7 +104,7 @@ class Ready:
     block: str  # name of the shared memory
     robot: Robot
     layout: Layout
-    settings: Settings
+    settings: SceneSettings
     tasks: tuple[TaskView, ...]
 
 
@@ -116,6 +116,7 @@ class BindingRow:
     joint: str
     kind: str
     side: str
+    knot: int
     multiplier: float
     slack: float
 
@@ -142,7 +143,7 @@ class Status:
     path: np.ndarray
     binding: tuple[BindingRow, ...]
     notices: tuple[str, ...] = ()
-    settings: Settings | None = field(default=None)
+    settings: SceneSettings | None = field(default=None)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import viser
 from app.learner import Learner
 from app.messages import Load, Ready, SceneChoice
 from app.stage import Stage
-from app.text import block
+from app.text import block, stopped
 from lessons.scenes import SCENES
 
 RATE = 30.0  # Hz, poses
@@ -32,6 +32,7 @@ class Page:
         self._built = -1
         self._failure: str | None = None
         self._waiting: viser.GuiHtmlHandle | None = None
+        self._again: viser.GuiButtonHandle | None = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._loop, daemon=True)
 
@@ -39,7 +40,7 @@ class Page:
         gui = self._client.gui
         gui.set_panel_label("himpc-lab")
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(380)
+        gui.main_panel.set_width(400)
         self._theme(self._dark)
         self._waiting = gui.add_html(block("<b>Starting the simulation …</b>"))
         self._thread.start()
@@ -82,6 +83,7 @@ class Page:
         self._pass_on()
         stage = self._stage
         if stage is None:
+            self._show_early_failure()
             return
         if learner.failure != self._failure:
             self._failure = learner.failure
@@ -90,6 +92,23 @@ class Page:
             plots=frame % _PLOTS == 0,
             texts=frame % _TEXTS == 0,
         )
+
+    def _show_early_failure(self) -> None:
+        """The simulation died before there was anything to show."""
+        failure = self.learner.failure
+        if failure == self._failure or self._waiting is None:
+            return
+        self._failure = failure
+        if failure is None:
+            self._waiting.content = block("<b>Starting the simulation …</b>")
+            return
+        self._waiting.content = stopped(failure)
+        if self._again is None:
+            self._again = self._client.gui.add_button("Reset")
+            self._again.on_click(self._restart)
+
+    def _restart(self, _: object) -> None:
+        self.learner.restart()
 
     def _build(self, ready: Ready) -> None:
         before, self._stage = self._stage, None

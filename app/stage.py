@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import viser
+import viser.transforms as vtf
 
 from app.judge import Judge, Question, Verdict
 from app.learner import Learner
@@ -27,7 +28,7 @@ from app.view.robot import RobotView, camera_for
 from app.view.target import Frames, TargetGizmo
 from app.view.trails import Trails
 from lessons.events import Event, MoveTarget
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -108,6 +109,7 @@ class Stage:
 
     def _build_scene(self, client: viser.ClientHandle) -> None:
         ready, scene = self._ready, client.scene
+        eye, at, reach = camera_for(ready.robot)
         scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
         self._robot = RobotView(scene, ready.robot)
         poses = self._learner.read(lambda block, _: block.poses())
@@ -118,7 +120,7 @@ class Stage:
         self._frames = Frames(scene)
         if position is not None:
             colour = self._colours[position.level]
-            size = float(np.clip(0.28 * self._robot.size, 0.12, 0.35))
+            size = float(np.clip(0.2 * reach, 0.12, 0.4))
             targets = {} if self._learner.status is None else self._learner.status.targets
             self._gizmo = TargetGizmo(
                 scene,
@@ -137,14 +139,13 @@ class Stage:
             if task.kind == "position" and task.path is not None
         ]
         self._trails = Trails(scene, curves, colour)
-        eye, at = camera_for(ready.robot)
         client.camera.up_direction = (0.0, 0.0, 1.0)
         client.camera.position = eye
         client.camera.look_at = at
 
     # ---------------------------------------------------------------- events out
 
-    def _settings(self) -> Settings:
+    def _settings(self) -> SceneSettings:
         return self._learner.settings or self._ready.settings
 
     def _post(self, event: Event) -> None:
@@ -172,7 +173,7 @@ class Stage:
         gizmo = self._gizmo
         poses = self._learner.read(lambda block, _: block.poses())
         if gizmo is not None and poses is not None:
-            rotation = viser.transforms.SO3(poses[-1, 3:]).as_matrix()
+            rotation = vtf.SO3(poses[-1, 3:]).as_matrix()
             gizmo.put(poses[-1, :3], rotation)
             self._moved(poses[-1, :3], rotation if gizmo.orientation is not None else None)
 
@@ -265,7 +266,7 @@ class Stage:
             self._tasks.update(now)
             self._controller.update(now)
             self._binding.update(now)
-            self._bindings.refresh(settings)
+            self._bindings.refresh(settings, learner.status.ticks)
 
     def close(self) -> None:
         if self._judge is not None:
@@ -302,5 +303,5 @@ def _full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.nd
 
 
 def _xyzw(rotation: np.ndarray) -> tuple[float, ...]:
-    w, x, y, z = viser.transforms.SO3.from_matrix(rotation).wxyz
+    w, x, y, z = vtf.SO3.from_matrix(rotation).wxyz
     return float(x), float(y), float(z), float(w)

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from latex2mathml.converter import convert
 
-from app.palette import RGB, css
+from app.palette import BAD, RGB, css
 
 esc = html.escape
 
@@ -19,8 +19,12 @@ def quantity(value: float, unit: str) -> str:
         return "–"
     if unit == "m":
         size = abs(value)
+        if size < 1e-6:
+            return "< 1 µm"
         return f"{value * 1e6:.0f} µm" if size < 1e-4 else f"{value * 1e3:.{_digits(size * 1e3)}f} mm"
     degrees = math.degrees(value)
+    if abs(degrees) < 5e-3:
+        return "< 0.01°"
     return f"{degrees:.{max(1, _digits(abs(degrees)))}f}°"
 
 
@@ -46,6 +50,14 @@ def badge(text: str, colour: RGB) -> str:
 def block(inner: str, style: str = "") -> str:
     """A paragraph in the panel's own size."""
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
+
+
+def stopped(sentence: str) -> str:
+    """What a page shows instead of a simulation that died."""
+    return block(
+        f"{badge('STOPPED', BAD)} {esc(sentence)}<br><b>Press Reset to start again.</b>",
+        f"border-left:3px solid {css(BAD)};margin:0.4em 0",
+    )
 
 
 def bar(share: float, colour: RGB, mark: float | None = None) -> str:

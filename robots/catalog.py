@@ -57,7 +57,7 @@ CATALOG: dict[str, CatalogEntry] = {
             tip="hand_tcp",
             home_deg=(0.0, -45.0, 0.0, -135.0, 0.0, 90.0, 45.0),  # Franka's ready pose
             a_max=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),  # Franka Control Interface documentation
-            M_bar=(0.018, 0.2, 0.009, 0.051, 0.006, 0.0116, 0.0024),  # suggest_M_bar, two or three digits
+            M_bar=(0.0275, 0.3, 0.0138, 0.0764, 0.0089, 0.0173, 0.0036),  # suggest_M_bar, two or three digits
         ),
     )
 }

@@ -10,7 +10,7 @@ from typing import Any
 import viser
 
 from lessons.events import Event
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 
 HOLD = 0.8
 """s during which a control that was just touched is not overwritten: the session's answer is on its way."""
@@ -21,8 +21,9 @@ Post = Callable[[Event], None]
 @dataclass
 class _Mirror:
     handle: viser.GuiInputHandle[Any]
-    read: Callable[[Settings], Any]
+    read: Callable[[SceneSettings], Any]
     touched: float = -float("inf")
+    ticks: int = -1  # when it was touched: a paused session answers with its next tick
 
 
 class Bindings:
@@ -32,11 +33,12 @@ class Bindings:
     def __init__(self, post: Post) -> None:
         self.post = post
         self._mirrors: list[_Mirror] = []
+        self._ticks = 0
 
     def bind(
         self,
         handle: viser.GuiInputHandle[Any],
-        read: Callable[[Settings], Any],
+        read: Callable[[SceneSettings], Any],
         event: Callable[[Any], Event],
     ) -> None:
         """`read` gives the control's value for some settings, `event` the event for a value."""
@@ -47,14 +49,14 @@ class Bindings:
         async def _(change: viser.GuiEvent[Any]) -> None:
             if change.client is None:
                 return  # written by `refresh`
-            mirror.touched = time.monotonic()
+            mirror.touched, mirror.ticks = time.monotonic(), self._ticks
             self.post(event(handle.value))
 
-    def refresh(self, settings: Settings) -> None:
-        """Shows what the session has."""
-        now = time.monotonic()
+    def refresh(self, settings: SceneSettings, ticks: int) -> None:
+        """Shows what the session has after so many ticks."""
+        now, self._ticks = time.monotonic(), ticks
         for mirror in self._mirrors:
-            if now - mirror.touched > HOLD:
+            if now - mirror.touched > HOLD and ticks != mirror.ticks:
                 value = mirror.read(settings)
                 if value != mirror.handle.value:
                     mirror.handle.value = value

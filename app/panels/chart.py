@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,12 +16,12 @@ from app.palette import RGB, css
 
 @dataclass(frozen=True)
 class Line:
-    """label: of the legend; fill: paint the area below, down to the axis; dashed: for bounds and budgets."""
+    """label: of the legend; fill: opacity of the area below, down to the axis; dashed: for bounds."""
 
     label: str
     colour: RGB
     dashed: bool = False
-    fill: bool = False
+    fill: float = 0.0
     width: float = 1.6
 
 
@@ -38,18 +39,21 @@ class Chart:
         bands: Sequence[tuple[int, int, RGB]] = (),
         legend: bool = True,
     ) -> None:
-        """bands: (upper line, lower line, colour) fills between two lines, by index."""
+        """span: what the axis shows, in the chart's unit; log: its ends are powers of ten; bands: (upper
+        line, lower line, colour) fills between two lines, by index."""
+        self._log = log
+        if log:
+            # uPlot's own logarithmic scale draws nine grid lines per decade, a wall of grey here.
+            span = (math.log10(span[0]), math.log10(span[1]))
         self._span = span
         x = np.array([-WINDOW, 0.0])
         scale: uplot.Scale = {"range": span, "auto": False}
-        if log:
-            scale["distr"], scale["log"] = 3, 10
         self._handle = gui.add_uplot(
             (x, *(np.full(2, span[0]) for _ in lines)),
             ({"label": "s"}, *(_series(line, span[0]) for line in lines)),
             title=title,
             scales={"x": {"time": False, "range": (-WINDOW, 0.0), "auto": False}, "y": scale},
-            axes=({"size": 28, "space": 60}, {"size": 52, "space": 28}),
+            axes=({"size": 36, "space": 60}, _decades(span) if log else {"size": 52, "space": 26}),
             bands=tuple(
                 {"series": (upper + 1, lower + 1), "fill": css(colour, 0.10)}
                 for upper, lower, colour in bands
@@ -68,6 +72,8 @@ class Chart:
         if np.count_nonzero(known) < 2:
             return
         start = int(np.argmax(known))
+        if self._log:
+            values = [np.log10(np.maximum(column, 10.0 ** (low - 1))) for column in values]
         clipped = (
             np.clip(np.nan_to_num(column[start:], nan=low, posinf=high, neginf=low), low, high)
             for column in values
@@ -76,6 +82,15 @@ class Chart:
 
     def remove(self) -> None:
         self._handle.remove()
+
+
+def _decades(span: tuple[float, float]) -> uplot.Axis:
+    """Ticks at powers of ten, about five of them."""
+    low, high = round(span[0]), round(span[1])
+    every = max(1, round((high - low) / 5))
+    powers = [power for power in range(low, high + 1) if power % every == 0]
+    labels = tuple(f"{10.0**p:g}" if -4 < p < 4 else f"1e{p}" for p in powers)
+    return {"size": 52, "splits": tuple(float(p) for p in powers), "values": labels}
 
 
 def _series(line: Line, floor: float) -> uplot.Series:
@@ -88,5 +103,5 @@ def _series(line: Line, floor: float) -> uplot.Series:
     if line.dashed:
         series["dash"] = (6.0, 4.0)
     if line.fill:
-        series["fill"], series["fillTo"] = css(line.colour, 0.35), floor
+        series["fill"], series["fillTo"] = css(line.colour, line.fill), floor
     return series

@@ -9,20 +9,20 @@ from app.panels.bind import Bindings
 from app.panels.snapshot import Snapshot
 from app.text import bar, block, formula
 from lessons.events import Set
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 from robots import Robot
 
 
 class ControllerPanel:
     """Everything about the controller that can be changed while it runs."""
 
-    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings, robot: Robot) -> None:
+    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings, robot: Robot) -> None:
         self._horizon(gui, bindings, settings)
         self._inertia(gui, bindings, settings, robot)
         self._limits(gui, bindings, settings)
         self._solver(gui, bindings, settings)
 
-    def _horizon(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+    def _horizon(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
         with gui.add_folder("Horizon"):
             knots = gui.add_slider(
                 "N",
@@ -46,7 +46,7 @@ class ControllerPanel:
             period, lambda s: round(1e3 * s.T_s, 6), lambda value: Set("T_s", round(1e-3 * float(value), 9))
         )
 
-    def _inertia(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings, robot: Robot) -> None:
+    def _inertia(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings, robot: Robot) -> None:
         with gui.add_folder("Inertia guess M̄"):
             self._gauge = gui.add_html("")
             with gui.add_folder(None):
@@ -79,7 +79,7 @@ class ControllerPanel:
         self._diagonal_now = (*diagonal[:joint], value, *diagonal[joint + 1 :])
         return self._diagonal_now
 
-    def _limits(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+    def _limits(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
         limits = settings.limits
         with gui.add_folder("Limits"):
             torque = gui.add_checkbox("Torque", limits.torque)
@@ -113,7 +113,7 @@ class ControllerPanel:
             lambda value: Set("limits.velocity_scale", float(value)),
         )
 
-    def _solver(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+    def _solver(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
         with gui.add_folder("Solver", expand_by_default=False):
             for label, path, options, hint in (
                 ("Route", "route", ("structured", "explicit"), "Two ways to the same torque"),

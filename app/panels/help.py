@@ -28,7 +28,7 @@ _WORDS = (
 )
 _DRAWN = (
     ("ball with arrows", "the target your hand holds; rings turn it while the orientation level is on"),
-    ("small frame with a ball", "the filtered target the controller follows now (speed and acceleration capped)"),
+    ("small frame with a ball", "the filtered target the controller follows (speed, acceleration capped)"),
     ("large thin frame", "the actual hand"),
     ("line behind the hand", "where it went in the last seconds"),
     ("pink line", "the predicted path of the hand, motion enlarged as its label says"),

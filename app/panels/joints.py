@@ -46,7 +46,7 @@ class JointPlots:
         gui.add_html(
             block(
                 "Shaded: inside the bounds in force (the data sheet's where a bound is off). "
-                'A <b style="color:rgb(225,45,45)">red mark</b> along the bottom: a shown joint is at its bound.'
+                'A <b style="color:rgb(225,45,45)">red mark</b> at the bottom: a shown joint is at its bound.'
             )
         )
 
@@ -132,11 +132,11 @@ class JointPlots:
     def _all(self, title: str, names: tuple[str, ...], last: bool) -> Chart:
         n = len(names)
         lines = [Line(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
-        bounds = [Line("bound", BOUND, dashed=True), Line("bound", BOUND, dashed=True)]
+        bounds = [Line("upper bound", BOUND, dashed=True), Line("lower bound", BOUND, dashed=True)]
         return Chart(
             self._gui,
             f"{title}, % of bound",
-            [*lines, *bounds, Line("at bound", BAD, fill=True, width=0.5)],
+            [*lines, *bounds, Line("at bound", BAD, fill=0.5, width=0.5)],
             (-_SHARE, _SHARE),
             height=170,
             bands=((n, n + 1, GOOD),),
@@ -151,7 +151,7 @@ class JointPlots:
                 Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0),
                 Line("upper bound", BOUND, dashed=True),
                 Line("lower bound", BOUND, dashed=True),
-                Line("at bound", BAD, fill=True, width=0.5),
+                Line("at bound", BAD, fill=0.5, width=0.5),
             ],
             self._span(kind, joint),
             height=170,

@@ -7,7 +7,7 @@ import viser
 from app.panels.bind import Bindings, scalar
 from app.text import block
 from lessons.events import Set
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 
 _SLIDERS = (
     # label, field, least, greatest, step, hint
@@ -16,7 +16,14 @@ _SLIDERS = (
     ("Viscous friction [N·m·s/rad]", "damping", 0.0, 10.0, 0.1, "The same at every joint"),
     ("Armature [kg·m²]", "armature", 0.0, 1.0, 0.01, "Reflected inertia of the motors"),
     ("Inertia scale", "inertia_scale", 0.2, 3.0, 0.05, "Factor on the mass and inertia of every link"),
-    ("Encoder step [0.001°]", "encoder_resolution_deg", 0.0, 20.0, 0.25, "0 is an ideal sensor"),
+    (
+        "Encoder [10⁻³ °]",
+        "encoder_resolution_deg",
+        0.0,
+        20.0,
+        0.25,
+        "Resolution of the joint sensors, 0: ideal",
+    ),
     ("Torque lag [ms]", "torque_lag_ms", 0.0, 20.0, 0.5, "First-order lag of the motors"),
     ("Delay [ms]", "delay_ms", 0.0, 10.0, 0.5, "From command to torque"),
 )
@@ -26,7 +33,7 @@ _UNIT = {"encoder_resolution_deg": 1e3}
 class PlantPanel:
     """Sliders of the plant's settings."""
 
-    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: Settings) -> None:
+    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
         gui.add_html(block("This is the truth in the simulation. The controller sees none of it."))
         for label, field, low, high, step, hint in _SLIDERS:
             unit = _UNIT.get(field, 1.0)
@@ -53,5 +60,5 @@ class PlantPanel:
             )
 
 
-def _shown(settings: Settings, field: str, unit: float) -> float:
+def _shown(settings: SceneSettings, field: str, unit: float) -> float:
     return round(scalar(getattr(settings.plant, field)) * unit, 9)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+import time
+
 import viser
 
 from app.learner import Learner
 from app.messages import Play, Post, Speed, Step
-from app.palette import BAD, GOOD, LEVELS
+from app.palette import GOOD, LEVELS
+from app.panels.bind import HOLD
 from app.panels.snapshot import Snapshot
-from app.text import badge, block, esc
+from app.text import badge, block, stopped
 from lessons.events import Reset
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
@@ -36,7 +40,7 @@ class PlaybackPanel:
                 initial_value=1.0,
                 hint="Simulated seconds per second",
             )
-        self._shown: tuple[str, str] = ("", "")
+        self._touched = -math.inf
 
         @self._buttons.on_click
         async def _(_: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
@@ -45,6 +49,7 @@ class PlaybackPanel:
         @self._speed.on_update
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
             if event.client is not None:
+                self._touched = time.monotonic()
                 learner.send(Speed(float(self._speed.value)))
 
         for label, key, choice in (
@@ -77,10 +82,7 @@ class PlaybackPanel:
         """A crash of the simulation, or None."""
         self._failure.visible = sentence is not None
         if sentence is not None:
-            self._failure.content = block(
-                f"{badge('STOPPED', BAD)} {esc(sentence)}<br><b>Press Reset to start again.</b>",
-                "border-left:3px solid " + "rgb(225,45,45);margin:0.4em 0",
-            )
+            self._failure.content = stopped(sentence)
             self._status.content = block("No simulation is running.")
 
     def update(self, now: Snapshot) -> None:
@@ -88,21 +90,16 @@ class PlaybackPanel:
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
-        if abs(self._speed.value - status.speed) > 1e-9 and status.ticks < 500:
+        if self._speed.value != status.speed and time.monotonic() - self._touched > HOLD:
             self._speed.value = status.speed
         state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
         if status.capped:
-            state += " " + badge("CAPPED", LEVELS[0])
+            why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."
+            state += f' <span title="{why}">{badge("CAPPED", LEVELS[0])}</span>'
         factor = f"{status.real_time_factor:.2f} × real time" if status.running else f"tick {status.ticks}"
         share = 100 * status.over_budget / max(status.ticks, 1)
         budget = 1e3 * now.settings.T_s
-        cap = (
-            "<br><b>CAPPED</b>: this computer cannot keep up, so simulated time runs slower; "
-            "no control tick is skipped."
-            if status.capped
-            else ""
-        )
         self._status.content = block(
             f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
-            f"<br>{status.over_budget} ticks over the {budget:g} ms budget ({share:.1f} %){cap}"
+            f"<br>{status.over_budget} ticks over the {budget:g} ms budget ({share:.1f} %)"
         )

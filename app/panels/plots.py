@@ -34,16 +34,14 @@ class LevelPlots:
         )
         self._time = Chart(
             gui,
-            "Control step, ms (shaded: budget)",
+            "Control step, ms",
             [
                 Line("whole step", LEVELS[1], width=2.0),
-                Line("budget", GOOD, dashed=True),
-                Line("axis", GOOD, width=0.0),
+                Line("budget", GOOD, dashed=True, fill=0.12),
             ],
             _TIME,
             height=150,
             log=True,
-            bands=((1, 2, GOOD),),
         )
         self._leak = Chart(
             gui,
@@ -64,8 +62,7 @@ class LevelPlots:
         ]
         self._error.show(ages, errors)
         step = 1e-3 * history.columns(fields["step_us"])[:, 0]
-        budget = np.full_like(step, 1e3 * T_s)
-        self._time.show(ages, [step, budget, np.full_like(step, _TIME[0])])
+        self._time.show(ages, [step, np.full_like(step, 1e3 * T_s)])
         known = np.isfinite(step)
         leaks = [
             np.where(known, np.nan_to_num(history.columns(fields[name])[:, 0], nan=0.0), np.nan)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.messages import Ready, Status
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +16,7 @@ class Snapshot:
     position bound since the last reset."""
 
     ready: Ready
-    settings: Settings
+    settings: SceneSettings
     status: Status
     latest: np.ndarray
     bound_seconds: np.ndarray

@@ -13,7 +13,7 @@ from app.text import badge, block, esc, formula, quantity, swatch
 from himpc.stack import Level
 from himpc.telemetry import RUNGS
 from lessons.events import MoveLevel, Set
-from lessons.session import Settings
+from lessons.settings import SceneSettings
 
 _UP, _DOWN = "▲ Up", "▼ Down"
 
@@ -25,9 +25,9 @@ class TasksPanel:
         self,
         gui: viser.GuiApi,
         bindings: Bindings,
-        settings: Settings,
+        settings: SceneSettings,
         colours: dict[str, RGB],
-        current: Callable[[], Settings],
+        current: Callable[[], SceneSettings],
     ) -> None:
         self._current = current
         self._cards = [
@@ -90,7 +90,7 @@ class _Card:
         level: Level,
         colours: dict[str, RGB],
         place: int,
-        current: Callable[[], Settings],
+        current: Callable[[], SceneSettings],
     ) -> None:
         name = self.name = level.name
         self._colour = colours[name]
@@ -147,7 +147,7 @@ class _Card:
         path: str,
         span: tuple[float, float, float],
         value: float,
-        read: Callable[[Settings], float],
+        read: Callable[[SceneSettings], float],
         hint: str,
     ) -> None:
         low, high, step = span
@@ -181,16 +181,16 @@ def _title(place: int, name: str) -> str:
     return f"{place + 1} · {name}"
 
 
-def _find(settings: Settings, name: str) -> Level:
+def _find(settings: SceneSettings, name: str) -> Level:
     return next(level for level in settings.levels if level.name == name)
 
 
-def _weight(level: str, field: str) -> Callable[[Settings], float]:
+def _weight(level: str, field: str) -> Callable[[SceneSettings], float]:
     return lambda settings: scalar(getattr(_find(settings, level), field))
 
 
-def _gain(level: str, task: str, field: str) -> Callable[[Settings], float]:
-    def read(settings: Settings) -> float:
+def _gain(level: str, task: str, field: str) -> Callable[[SceneSettings], float]:
+    def read(settings: SceneSettings) -> float:
         found = next(each for each in _find(settings, level).tasks if each.name == task)
         return scalar(getattr(found, field))
 

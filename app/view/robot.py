@@ -9,6 +9,8 @@ import viser
 from robots import Robot
 from robots.shapes import link_shapes
 
+_STILL = 1e-5  # m, and about as many rad: less than a pixel
+
 
 class RobotView:
     """One frame per joint with the shapes it carries."""
@@ -25,18 +27,21 @@ class RobotView:
                 shape.faces,
                 color=shape.colour,
             )
-        points = np.concatenate([shape.vertices for shape in shapes]) if shapes else np.zeros((1, 3))
-        self.size = float(np.ptp(points, axis=0).max())
+        self._shown = np.full((robot.n, 7), np.nan)
 
     def move(self, poses: np.ndarray) -> None:
-        """poses (n, 7): position, m, and quaternion wxyz per joint."""
+        """poses (n, 7): position, m, and quaternion wxyz per joint. A robot at rest sends nothing, so that
+        the browser need not draw."""
+        if np.allclose(poses, self._shown, rtol=0.0, atol=_STILL):
+            return
+        self._shown = poses.copy()
         for frame, pose in zip(self._frames, poses, strict=False):
             frame.position = pose[:3]
             frame.wxyz = pose[3:]
 
 
-def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """(position, look_at) from which the whole workspace of a robot is seen."""
+def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
+    """(position, look_at) from which a robot is well seen, and the length of its arm, m."""
 
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, robot.home)
@@ -47,5 +52,5 @@ def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     length = float(np.sum(np.linalg.norm(np.diff(points[1:], axis=0), axis=1)))
     reach = max(0.4, length)
     planar = float(np.ptp(points[:, 2])) < 0.05 * reach
-    direction = np.array([0.25, -0.75, 1.6]) if planar else np.array([1.35, -1.35, 0.65])
-    return middle + reach * direction, middle
+    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5])
+    return middle + reach * direction, middle, reach

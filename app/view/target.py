@@ -13,7 +13,7 @@ from app.palette import BAD, RGB
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
-_BALL = 0.028  # m
+_BALL = 0.045  # m, larger than most wrists, so that it shows
 _FRAME = 0.09  # m
 
 
@@ -54,7 +54,7 @@ class TargetGizmo:
         self._ghost = scene.add_icosphere(
             "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False
         )
-        self._label = scene.add_label("/target/label", "", position=(0.0, 0.0, 0.09), visible=False)
+        self._label = scene.add_label("/target/label", "", position=(0.0, 0.0, 0.12), visible=False)
         self._accepted = scene.add_icosphere(
             "/accepted", radius=_BALL, color=colour, visible=False, cast_shadow=False
         )
@@ -115,6 +115,10 @@ class Frames:
 
     def actual(self, pose: np.ndarray) -> None:
         """pose (7,): position and quaternion wxyz."""
+        if np.allclose(pose[:3], self._actual.position, rtol=0.0, atol=1e-5) and np.allclose(
+            pose[3:], self._actual.wxyz, rtol=0.0, atol=1e-5
+        ):
+            return
         self._actual.position, self._actual.wxyz = pose[:3], pose[3:]
 
     def desired(self, position: np.ndarray, xyzw: np.ndarray | None) -> None:

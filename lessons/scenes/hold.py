@@ -10,7 +10,7 @@ from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
 from lessons.scene import Scene
 from lessons.settings import SceneSettings
-from robots import PlantSettings, Robot, load_robot, load_urdf_text
+from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text
 
 PLANAR3_PLANT = PlantSettings(armature=(0.05, 0.05, 0.03))
 """The paper's M̄ = 0.033 supposes geared motors: without armature the loop would be unstable."""
@@ -36,10 +36,12 @@ def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> Sce
 
 def _hold(robot: Robot, plant: PlantSettings) -> Scene:
     position_axes, orientation_axes = _free_axes(robot)
-    levels = [Level((FramePosition(name="position", axes=position_axes),))]
+    K_p, K_v = gains(robot, plant)
+    task = {"K_p": K_p, "K_v": K_v}
+    levels = [Level((FramePosition(name="position", axes=position_axes, **task),))]
     if orientation_axes:
-        levels.append(Level((FrameOrientation(name="orientation", axes=orientation_axes),)))
-    levels.append(Level((Posture(name="posture"),)))
+        levels.append(Level((FrameOrientation(name="orientation", axes=orientation_axes, **task),)))
+    levels.append(Level((Posture(name="posture", **task),)))
     return Scene(
         name="hold",
         title=f"{robot.name}: drag the target; position, then orientation, then posture",
@@ -51,6 +53,19 @@ def _hold(robot: Robot, plant: PlantSettings) -> Scene:
         duration=4.0,
         sources={"urdf_text": robot.urdf_text, "tip": robot.tip},
     )
+
+
+def gains(robot: Robot, plant: PlantSettings, T_s: float = 1e-3) -> tuple[float, float]:
+    """K_p and K_v = 2√K_p (critical damping) that suit how fast the robot's M̄ lets the loop follow.
+
+    Time-delay estimation delivers a wanted acceleration with a lag of about T_s/λ_min(M⁻¹M̄); with it (4)
+    becomes a third-order loop, well damped while √K_p is at most half of that rate. Never above 10 1/s.
+    """
+    M = Plant(robot, plant).mass_matrix()
+    root = np.sqrt(robot.M_bar)
+    slowest = float(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(M) * root)[0])
+    omega = float(np.clip(round(0.5 * slowest / T_s, 1), 2.0, 10.0))
+    return round(omega**2, 1), 2 * omega
 
 
 def _free_axes(robot: Robot) -> tuple[str, str]:

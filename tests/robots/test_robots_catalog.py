@@ -55,7 +55,7 @@ def test_iiwa_data_sheet() -> None:
     np.testing.assert_allclose(np.degrees(robot.q_lower), -np.degrees(robot.q_upper))
     np.testing.assert_allclose(np.degrees(robot.v_limit), [85, 85, 100, 75, 130, 135, 135])
     np.testing.assert_allclose(robot.tau_limit, [320, 320, 176, 176, 110, 40, 40])
-    assert sum(inertia.mass for inertia in robot.model.inertias) == pytest.approx(25.61)
+    assert sum(inertia.mass for inertia in robot.model.inertias) == pytest.approx(17.5)
 
 
 def test_planar_arm_is_three_uniform_rods() -> None:

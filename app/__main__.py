@@ -1,0 +1,63 @@
+"""`himpc-lab`: the command line."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+from robots.errors import InputError, unknown_name
+
+COMMANDS: dict[str, str] = {
+    "serve": "open the page (also what himpc-lab does without a command)",
+    "run": "run a scene headless and print what came out",
+    "scenes": "list the scenes",
+    "controllers": "list the controllers",
+    "robots": "list the robots, or check a URDF",
+    "bench": "control-step times of the routes and solvers, side by side",
+}
+"""What there is, in one line each; `app/commands/NAME.py` holds `NAME(…) -> exit code`."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit code: 0 sound, 1 a claim failed, 2 wrong input."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    # One thread per matrix product: the matrices are tiny, and every session has its own process.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    name = arguments.pop(0) if arguments and not arguments[0].startswith("-") else "serve"
+    try:
+        if name not in COMMANDS:
+            raise unknown_name("command", name, COMMANDS, "see himpc-lab --help")
+        if name == "serve" and arguments[:1] in (["-h"], ["--help"]):
+            _print_commands()
+        return _call(name, arguments)
+    except InputError as error:
+        print(f"himpc-lab: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone (e.g. `| head`): nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _call(name: str, arguments: list[str]) -> int:
+    import tyro
+
+    command: Callable[..., int] = getattr(import_module(f"app.commands.{name}"), name)
+    prog = "himpc-lab" if name == "serve" else f"himpc-lab {name}"
+    return tyro.cli(command, prog=prog, args=arguments)
+
+
+def _print_commands() -> None:
+    print("Commands (himpc-lab COMMAND --help tells more):")
+    for name, line in COMMANDS.items():
+        print(f"  {name:12} {line}")
+    print()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

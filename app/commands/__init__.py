@@ -1,0 +1,1 @@
+"""The commands of `himpc-lab`, one file each."""

@@ -1,0 +1,35 @@
+"""Where a command's result goes: a table for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from robots import InputError
+
+
+def write_json(data: Any, target: str) -> None:
+    """Writes JSON to a file, or to standard output for "-". Raises InputError if the file cannot be written."""
+    text = json.dumps(data, indent=2, allow_nan=False, default=float)
+    if target == "-":
+        print(text)
+        return
+    try:
+        Path(target).write_text(text + "\n")
+    except OSError as error:
+        raise InputError(f"--json {target}: cannot be written ({error.strerror}); give another file") from None
+
+
+def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Prints a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for number, column in enumerate(columns):
+        table.add_column(column, overflow="fold", no_wrap=number == 0)
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)

@@ -1,0 +1,36 @@
+"""`himpc-lab robots`."""
+
+from __future__ import annotations
+
+from app.commands.output import print_table, write_json
+
+
+def robots(check: str | None = None, json: str | None = None) -> int:
+    """List the catalog, or check a URDF file and report what was repaired, filled in or refused.
+
+    Args:
+        check: the URDF file to check. Exit code 1 if it cannot be used.
+        json: write JSON to this file, or to standard output for "-".
+    """
+    from robots import CATALOG, check_urdf
+
+    if check is None:
+        entries = [
+            {"name": entry.name, "title": entry.title, "tip": entry.tip, "joints": len(entry.M_bar)}
+            for entry in CATALOG.values()
+        ]
+        if json is not None:
+            write_json(entries, json)
+        else:
+            rows = [[str(value) for value in entry.values()] for entry in entries]
+            print_table("Robots", ("robot", "what it is", "tip", "joints"), rows)
+        return 0
+    report = check_urdf(check)
+    if json is not None:
+        write_json({**report.as_dict(), "usable": report.usable}, json)
+    else:
+        verdict = "can be used" if report.usable else "cannot be used"
+        rows = [[finding.kind, finding.where, finding.text] for finding in report.findings]
+        title = f"{check} {verdict}: {len(report.joints)} joints, tip '{report.tip}'"
+        print_table(title, ("finding", "where", "what"), rows)
+    return 0 if report.usable else 1
