@@ -7,7 +7,7 @@ import numpy as np
 from app.block import Block
 from himpc.telemetry import Layout
 
-BUCKETS = 150
+BUCKETS = 160
 
 
 class History:
@@ -80,7 +80,7 @@ class History:
 
     def ages(self, T_s: float) -> np.ndarray:
         """(2 · BUCKETS,) seconds before now, ≤ 0."""
-        return (np.arange(2 * BUCKETS) - (2 * BUCKETS - 1)) * (0.5 * self._size * T_s)
+        return np.linspace(-1.0, 0.0, 2 * BUCKETS) * (BUCKETS * self._size * T_s)
 
     def clear_bounds(self) -> None:
         """Starts the time at bounds again (after a reset)."""

@@ -19,7 +19,9 @@ def write_json(data: Any, target: str) -> None:
     try:
         Path(target).write_text(text + "\n")
     except OSError as error:
-        raise InputError(f"--json {target}: cannot be written ({error.strerror}); give another file") from None
+        raise InputError(
+            f"--json {target}: cannot be written ({error.strerror}); give another file"
+        ) from None
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -10,8 +10,14 @@ import numpy as np
 import viser
 from viser import uplot
 
+from app.history import BUCKETS
 from app.learner import WINDOW
 from app.palette import RGB, css
+
+
+_NUDGE = 10
+"""Updates between two invisible changes of the time axis: without one, a chart that was laid out while its
+panel still had no width stays without ticks for ever."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +52,14 @@ class Chart:
             # uPlot's own logarithmic scale draws nine grid lines per decade, a wall of grey here.
             span = (math.log10(span[0]), math.log10(span[1]))
         self._span = span
-        x = np.array([-WINDOW, 0.0])
+        self._shows = 0
+        x = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
         scale: uplot.Scale = {"range": span, "auto": False}
         self._handle = gui.add_uplot(
-            (x, *(np.full(2, span[0]) for _ in lines)),
+            (x, *(np.full_like(x, span[0]) for _ in lines)),
             ({"label": "s"}, *(_series(line, span[0]) for line in lines)),
             title=title,
-            scales={"x": {"time": False, "range": (-WINDOW, 0.0), "auto": False}, "y": scale},
+            scales={"x": {"time": False}, "y": scale},
             axes=({"size": 36, "space": 60}, _decades(span) if log else {"size": 52, "space": 26}),
             bands=tuple(
                 {"series": (upper + 1, lower + 1), "fill": css(colour, 0.10)}
@@ -71,14 +78,16 @@ class Chart:
         known = np.isfinite(values[0])
         if np.count_nonzero(known) < 2:
             return
-        start = int(np.argmax(known))
         if self._log:
             values = [np.log10(np.maximum(column, 10.0 ** (low - 1))) for column in values]
         clipped = (
-            np.clip(np.nan_to_num(column[start:], nan=low, posinf=high, neginf=low), low, high)
-            for column in values
+            np.clip(np.nan_to_num(column, nan=low, posinf=high, neginf=low), low, high) for column in values
         )
-        self._handle.data = (ages[start:], *(np.ascontiguousarray(column) for column in clipped))
+        self._shows += 1
+        if self._shows % _NUDGE == 0:
+            ages = ages.copy()
+            ages[0] -= 1e-6 * (self._shows // _NUDGE % 2)
+        self._handle.data = (ages, *(np.ascontiguousarray(column) for column in clipped))
 
     def remove(self) -> None:
         self._handle.remove()

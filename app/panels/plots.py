@@ -40,7 +40,7 @@ class LevelPlots:
                 Line("budget", GOOD, dashed=True, fill=0.12),
             ],
             _TIME,
-            height=150,
+            height=170,
             log=True,
         )
         self._leak = Chart(
@@ -48,7 +48,7 @@ class LevelPlots:
             "Leak into higher levels, m/s² or rad/s²",
             [Line("priority (own model)", LEVELS[2]), Line("dynamic (true plant)", BAD)],
             _LEAK,
-            height=160,
+            height=170,
             log=True,
         )
 

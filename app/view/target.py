@@ -13,7 +13,7 @@ from app.palette import BAD, RGB
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
-_BALL = 0.045  # m, larger than most wrists, so that it shows
+_BALL = 0.065  # m: larger than most wrists, which it encloses like a bubble
 _FRAME = 0.09  # m
 
 
@@ -50,13 +50,15 @@ class TargetGizmo:
             depth_test=False,
             line_width=3.0,
         )
-        self._ball = scene.add_icosphere("/target/ball", radius=_BALL, color=colour, cast_shadow=False)
+        self._ball = scene.add_icosphere(
+            "/target/ball", radius=_BALL, color=colour, opacity=0.6, cast_shadow=False
+        )
         self._ghost = scene.add_icosphere(
             "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False
         )
         self._label = scene.add_label("/target/label", "", position=(0.0, 0.0, 0.12), visible=False)
         self._accepted = scene.add_icosphere(
-            "/accepted", radius=_BALL, color=colour, visible=False, cast_shadow=False
+            "/accepted", radius=_BALL, color=colour, opacity=0.6, visible=False, cast_shadow=False
         )
         self._gap = scene.add_line_segments(
             "/gap", np.zeros((1, 2, 3), np.float32), BAD, thickness=0.006, visible=False

@@ -24,8 +24,9 @@ class LevelProblem:
         C: (N, m, N), effect coefficients of `prediction.task.ResidualModel`.
         free: (N, m), e for U = 0.
         root_Q: (m,), √Q.
+        weighted_C: (K, m, K), √Q C over the level's own knots.
         R: (n,).
-        knots: how many knots this level looks ahead, ≤ N.
+        knots: K, how many knots this level looks ahead, ≤ N.
     """
 
     name: str
@@ -33,6 +34,7 @@ class LevelProblem:
     C: Array
     free: Array
     root_Q: Array
+    weighted_C: Array
     R: Array
     knots: int
 

@@ -13,33 +13,30 @@ RANK_TOLERANCE = 1e-10
 """Singular values below this share of ‖B‖ count as zero: such a direction is left to lower levels."""
 
 _CLEARLY_REGULAR = 1e-5
-"""Diagonals of a triangular factor above this share of their level's ‖B‖ prove full rank with room to spare."""
+"""Diagonals of a triangular factor above this share of the largest entry prove full rank, room to spare."""
 
 
 def nested_bases(levels: Sequence[Array]) -> list[Array]:
-    """Orthonormal bases Z_i of {z : B_p z = 0 for all p < i} at every knot, for i = 1 … r+1.
+    """Orthonormal bases Z_i of {z : B_p z = 0 for all p < i} at every knot, for i = 2 … r+1.
 
     Away from singularities one Householder QR of [B_1ᵀ … B_rᵀ] holds all of them: the columns of Q that
     follow those of the levels above. Near one, an SVD per level decides the rank.
 
     Args:
-        levels: B_p = Ĵ_p M̄⁻¹ of each level but the last, (N, m_p, n).
+        levels: B_p = Ĵ_p M̄⁻¹ of each level above the last, (N, m_p, n).
 
     Returns:
-        r+1 arrays (N, n, d_i), d_1 = n.
+        r arrays (N, n, d_i).
     """
     if not levels:
         return []
     N, _, n = levels[0].shape
-    sizes = np.cumsum([B.shape[1] for B in levels])
+    sizes = np.cumsum([B.shape[1] for B in levels]).tolist()
     if sizes[-1] <= n:
-        Q, R = np.linalg.qr(np.concatenate(levels, axis=1).transpose(0, 2, 1), mode="complete")
-        pivots = np.abs(R.diagonal(axis1=1, axis2=2))
-        starts = [0, *sizes[:-1]]
-        if all(
-            float(pivots[:, start:end].min()) > _CLEARLY_REGULAR * float(np.abs(B).max())
-            for start, end, B in zip(starts, sizes, levels, strict=True)
-        ):
+        stacked = np.concatenate(levels, axis=1).transpose(0, 2, 1)
+        Q, R = np.linalg.qr(stacked, mode="complete")
+        pivots = R.diagonal(axis1=1, axis2=2)
+        if float(np.abs(pivots).min()) > _CLEARLY_REGULAR * float(np.abs(stacked).max()):
             return [Q[:, :, end:] for end in sizes]
     bases = []
     Z = np.broadcast_to(np.eye(n), (N, n, n))

@@ -82,8 +82,7 @@ def _quadratic(problem: LevelProblem, U_above: Array | None, Z: Array) -> _Quadr
     Y = _metric_basis(Z[:K], problem.R)
     d = Y.shape[2]
     W = problem.B[:K] @ Y
-    weighted = problem.root_Q[:, None] * problem.C[:K, :, :K]
-    G = (weighted[:, :, :, None] * W.transpose(1, 0, 2)).reshape(K * m, K * d)
+    G = (problem.weighted_C[:, :, :, None] * W.transpose(1, 0, 2)).reshape(K * m, K * d)
     if U_above is None:
         free, pull = problem.free, np.zeros(K * d)
     else:
@@ -112,33 +111,35 @@ def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple
     G, residual, pull = quadratic.G, quadratic.residual, quadratic.pull
     tall, wide = G.shape
     A = quadratic.row_matrix(rows, active.row, active.joint) if len(active) else None
+    count = len(active)
     if tall < wide:
+        # (I + ĜᵀĜ)⁻¹Ĝᵀ = Ĝᵀ(I + ĜĜᵀ)⁻¹ keeps the large residual out of any difference of large numbers.
         S = G @ G.T
         S.flat[:: tall + 1] += 1.0
-        right = residual - G @ pull
-        if A is None:
-            y = -pull - G.T @ dposv(S, right, overwrite_a=1)[1]
-        else:
-            solved = G.T @ dposv(S, np.column_stack([right, G @ A.T]), overwrite_a=1)[1]
-            y, across = -pull - solved[:, 0], A.T - solved[:, 1:]
+        right = np.empty((tall, 1 + count))
+        right[:, 0] = residual if quadratic.U_above is None else residual - G @ pull
+        if A is not None:
+            right[:, 1:] = G @ A.T
+        solved = G.T @ dposv(S, right, overwrite_a=1, overwrite_b=1)[1]
+        y = -solved[:, 0] - pull
+        across = None if A is None else A.T - solved[:, 1:]
     else:
         H = G.T @ G
         H.flat[:: wide + 1] += 1.0
-        right = -pull - G.T @ residual
-        if A is None:
-            y = dposv(H, right, overwrite_a=1)[1]
-        else:
-            solved = dposv(H, np.column_stack([right, A.T]), overwrite_a=1)[1]
-            y, across = solved[:, 0], solved[:, 1:]
+        right = np.empty((wide, 1 + count))
+        right[:, 0] = -(pull + G.T @ residual)
+        if A is not None:
+            right[:, 1:] = A.T
+        solved = dposv(H, right, overwrite_a=1, overwrite_b=1)[1]
+        y = solved[:, 0]
+        across = solved[:, 1:]
     multipliers = None
-    if A is not None:
-        target = np.where(
-            active.multiplier > 0, rows.upper[active.row, active.joint], rows.lower[active.row, active.joint]
-        )
+    if A is not None and across is not None:
+        target = np.where(active.multiplier > 0, rows.upper[active.row, active.joint], rows.lower[active.row, active.joint])
         if quadratic.U_above is not None:
-            target = target - np.einsum("ks,sk->k", rows.L[active.row], quadratic.U_above[:, active.joint])
+            target = target - (rows.L @ quadratic.U_above)[active.row, active.joint]
         _, multipliers, info = dposv(A @ across, A @ y - target)
-        if info != 0 or not ((multipliers > 0) == (active.multiplier > 0)).all():
+        if info != 0 or not float((multipliers * active.multiplier).min()) > 0.0:
             return None, None
         y = y - across @ multipliers
         if not float(np.abs(A @ y - target).max()) < _TOLERANCE:
@@ -146,14 +147,17 @@ def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple
     U = quadratic.increments(y)
     error = residual + G @ y
     slope = G.T @ error
-    gradient = y + pull + slope
+    gradient = y + slope
+    if quadratic.U_above is not None:
+        gradient += pull
     if A is not None and multipliers is not None:
         gradient += A.T @ multipliers
-    # ‖H‖ ≤ 1 + ‖Ĝ‖²_F; ‖Ĝy‖ ≤ ‖error‖ + ‖residual‖ keeps the scale from being larger than need be.
-    scale = max(1.0, (1.0 + float(np.vdot(G, G))) * _norm(y), _norm(pull) + _norm(slope))
-    kkt = float(np.abs(gradient).max()) / scale
-    if not kkt <= KKT_TOLERANCE:
-        return None, None
+    kkt = float(np.abs(gradient).max())
+    if not kkt <= 0.1 * KKT_TOLERANCE:
+        # Only now the scale matters: ‖H‖ ≤ 1 + ‖Ĝ‖²_F.
+        kkt /= max(1.0, (1.0 + float(np.vdot(G, G))) * _norm(y), _norm(pull) + _norm(slope))
+        if not kkt <= KKT_TOLERANCE:
+            return None, None
     found = NO_ROWS
     if multipliers is not None:
         found = ActiveRows(active.row, active.joint, multipliers, np.zeros(len(multipliers)))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from himpc.cascade.cascade import ROUTES, Route, solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
-from himpc.controllers.forms import LevelForm, level_forms
+from himpc.controllers.forms import StackForm, measure, stack_form
 from himpc.controllers.memory import Memory
 from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Plan
@@ -99,13 +99,13 @@ class HIMPC:
         self._memory: Memory | None = None
         unbounded = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
         self._limits = unbounded
-        self._weight = {form.level.name: 1.0 for form in self._forms}
+        self._weight: dict[str, float] = {}
 
     def configure(self, settings: Settings) -> None:
         """Takes new settings at once. Raises InputError, and changes nothing, if they do not fit the robot."""
-        before = {form.level.name for form in self._forms}
+        before = {form.level.name for form in self._form.levels}
         self._apply(settings)
-        for form in self._forms:
+        for form in self._form.levels:
             if form.level.name not in before and form.level is not DAMPING_LEVEL:
                 self._weight[form.level.name] = 0.0
 
@@ -117,10 +117,10 @@ class HIMPC:
         freedom = freedom_left(self.robot, settings.stack)
         active = active_levels(settings.stack, settings.damping, freedom)
         levels = active or (DAMPING_LEVEL,)
-        every = level_forms(self.robot, (*settings.stack, DAMPING_LEVEL), settings)
-        self._forms = [form for form in every if form.level in levels]
-        self._others = [form for form in every if form.level not in levels and form.level is not DAMPING_LEVEL]
-        self._last_rung = every[-1]
+        # Levels that are off are prepared too: a wrong gain must be refused now, not when it is switched on.
+        stack_form(self.robot, (*settings.stack, DAMPING_LEVEL), settings)
+        self._form = stack_form(self.robot, levels, settings)
+        self._off = [task for level in settings.stack if level not in levels for task in level.tasks]
         self._M_bar = np.array(settings.M_bar)
         self._idle = not active
         self._goal = in_force(self.robot, settings.limits)
@@ -153,34 +153,33 @@ class HIMPC:
             configuration = Configuration(self.robot, self._data, q, v, memory.knots(q, v, N, T_s))
             values: dict[str, Array] = {}
             errors: dict[str, Array] = {}
-            velocities: dict[str, Array] = {}
-            problems = [
-                self._problem(form, configuration, memory, previews, values, errors, velocities)
-                for form in self._forms
-            ]
-            for form in self._others:
-                form.measure(configuration, previews, values, errors)
+            problems, x_dot = self._problems(self._form, configuration, memory, previews, values, errors)
+            if self._off:
+                measure(self._off, configuration, previews, values, errors)
             rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, self._limits, N, T_s)
-            if not all(math.isfinite(float(problem.free.sum())) for problem in problems):
+            if problems is None:
                 return self._hold(q, started)
 
             def last_rung() -> LevelProblem:
-                return self._problem(self._last_rung, configuration, memory, previews, {}, {}, {})
+                form = stack_form(self.robot, (DAMPING_LEVEL,), settings)
+                found, _ = self._problems(form, configuration, memory, previews, {}, {})
+                return (found or problems)[0]
 
-            if self._idle:
-                # No level is on and damping is off: nothing is asked for, so the torque stays.
-                problems = []
+            # With no level on and damping off nothing is asked for: the torque stays.
             solutions = (
-                solve_cascade(problems, rows, memory.solutions, last_rung, settings.route, settings.solver)
-                if problems
-                else []
+                []
+                if self._idle
+                else solve_cascade(
+                    problems, rows, memory.solutions, last_rung, settings.route, settings.solver
+                )
             )
         U = solutions[-1].U if solutions else np.zeros((N, self.robot.n))
-        tau = np.clip(self._tau_0 + U[0], self._limits.tau_lower, self._limits.tau_upper)
+        tau = np.minimum(np.maximum(self._tau_0 + U[0], self._limits.tau_lower), self._limits.tau_upper)
         if not np.isfinite(tau).all():
             return self._hold(q, started)
         predicted_q = predict_positions(state, U, self._M_bar, T_s)
-        self._memory = Memory(q, v, T_s, velocities, predicted_q, {s.name: s for s in solutions})
+        found = {solution.name: solution for solution in solutions}
+        self._memory = Memory(q, v, T_s, x_dot, self._form, predicted_q, found)
         plan = Plan(
             tau=tau,
             tau_0=self._tau_0,
@@ -196,35 +195,28 @@ class HIMPC:
         self._tau_0 = tau
         return plan
 
-    def _problem(
+    def _problems(
         self,
-        form: LevelForm,
+        form: StackForm,
         configuration: Configuration,
         memory: Memory,
         previews: Mapping[str, Preview],
         values: dict[str, Array],
         errors: dict[str, Array],
-        velocities: dict[str, Array],
-    ) -> LevelProblem:
+    ) -> tuple[list[LevelProblem] | None, Array]:
+        """The QP data of all levels of a form, None if they are not finite, and ẋ_k of all rows."""
         J = form.jacobian(configuration)
-        velocity = J[0] @ configuration.v
-        name = form.level.name
-        before = memory.task_velocities.get(name)
-        if before is None:
+        x_dot = J[0] @ configuration.v
+        before = memory.x_dot
+        if before is None or memory.form is not form:
             past = Configuration(self.robot, self._data, memory.q, memory.v)
             before = form.jacobian(past)[0] @ memory.v
-        velocities[name] = velocity
-        error = form.measure(configuration, previews, values, errors)
-        free = form.free(error, velocity, (velocity - before) / memory.period, previews)
-        return LevelProblem(
-            name=name,
-            B=J / self._M_bar,
-            C=form.model.C,
-            free=free,
-            root_Q=form.root_Q * self._faded(name),
-            R=form.R,
-            knots=form.knots,
-        )
+        error = measure(form.tasks, configuration, previews, values, errors)
+        free = form.free(error, x_dot, (x_dot - before) / memory.period, previews, configuration.horizon)
+        if not math.isfinite(float(free.sum())):
+            return None, x_dot
+        B = J / self._M_bar
+        return [level.problem(B, free, self._faded(level.level.name)) for level in form.levels], x_dot
 
     def _faded(self, name: str) -> float:
         """√ of the share of Q that a level has; a level switched on fades in over ENABLE_SECONDS."""
@@ -241,7 +233,7 @@ class HIMPC:
         limits: LimitsInForce = self._limits
         tau = np.clip(self._tau_0, limits.tau_lower, limits.tau_upper)
         still = np.zeros((N, n))
-        name = self._forms[0].level.name
+        name = self._form.levels[0].level.name
         held = LevelSolution(name, still, math.nan, NO_ROWS, 0.0, "state not finite", "hold", 0.0, 0.0)
         state = JointState(np.zeros(n), np.zeros(n), np.zeros(n))
         self._tau_0 = tau

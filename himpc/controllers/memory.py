@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelSolution
+from himpc.controllers.forms import StackForm
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,8 @@ class Memory:
     Attributes:
         q, v: measured state of the last tick, (n,).
         period: seconds between that tick and this one.
-        task_velocities: ẋ of the last tick by level name, (m,) each.
+        x_dot: ẋ of the last tick, all rows of `form`, (m,); None: not known.
+        form: the prepared levels those rows belong to.
         predicted_q: q* at knots 0 … N of the last plan, (N+1, n).
         solutions: the last plan's levels by name.
     """
@@ -27,7 +29,8 @@ class Memory:
     q: Array
     v: Array
     period: float
-    task_velocities: dict[str, Array] = field(default_factory=dict)
+    x_dot: Array | None = None
+    form: StackForm | None = None
     predicted_q: Array | None = None
     solutions: dict[str, LevelSolution] = field(default_factory=dict)
 

@@ -51,6 +51,10 @@ class Rows:
         return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
 
 
+REACTION = 5.0
+"""Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
+
+
 @lru_cache(maxsize=64)
 def _toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
     lag = np.subtract.outer(np.arange(N), np.arange(N)).astype(float)
@@ -94,9 +98,10 @@ def build_rows(
     bounds[1, :N] = force.tau_upper - tau_0
 
     if limits.position == "viability":
-        v = viability_bounds(state.q, force.q_lower, force.q_upper, force.v_limit, force.a_max, T_s)
+        reaction = T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
+        v = viability_bounds(state.q, force.q_lower, force.q_upper, force.v_limit, force.a_max, reaction)
     else:
-        v = np.stack((-force.v_limit, force.v_limit))
+        v = np.array((-force.v_limit, force.v_limit))
     if limits.velocity_approach:
         share = _remaining(N, min(1.0, limits.velocity_approach * T_s))
         v = v[:, None] + share * (state.v - v)[:, None]
@@ -105,7 +110,7 @@ def build_rows(
     scale = M_bar / T_s
     bounds[:, N : 2 * N] = (v - state.free_velocity(N, T_s)) * scale
     if paper:
-        q = np.stack((force.q_lower, force.q_upper))[:, None]
+        q = np.array((force.q_lower, force.q_upper))[:, None]
         bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)
     return Rows(_toeplitz(N, kinds), bounds[0], bounds[1], kinds)
 

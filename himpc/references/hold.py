@@ -24,12 +24,13 @@ class Hold:
     m: int | None = None
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
-        zeros = _zeros(N, self.m or self.value.shape[0])
-        return Preview(self.value, zeros, zeros, zeros)
+        rest = still(N, self.m or self.value.shape[0])
+        return Preview(self.value, rest.displacement, rest.velocity, rest.acceleration)
 
 
 @lru_cache(maxsize=64)
-def _zeros(N: int, m: int) -> Array:
+def still(N: int, m: int) -> Preview:
+    """m coordinates at rest at zero."""
     zeros = np.zeros((N + 1, m))
     zeros.setflags(write=False)
-    return zeros
+    return Preview(zeros[0], zeros, zeros, zeros)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from himpc.tasks.task import Array, Task
+from robots import InputError
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
@@ -26,16 +27,21 @@ class FrameTask(Task):
     frame: str = ""
     axes: str = AXES
 
-    @property
-    def components(self) -> list[int]:
-        return [AXES.index(axis) for axis in self.axes]
+    first_row: ClassVar[int] = 0
+    """First row of the task's part of the 6 × n frame Jacobian (linear over angular, world axes)."""
 
-    def rows(self) -> list[int]:
-        """Rows of the 6 × n frame Jacobian (linear over angular, world axes)."""
-        raise NotImplementedError
+    def __post_init__(self) -> None:
+        if not self.axes or any(axis not in AXES for axis in self.axes) or len(set(self.axes)) < len(self.axes):
+            raise InputError(f"axes of task '{self.name}' are '{self.axes}': give some of x, y and z, once each")
+
+    @property
+    def components(self) -> list[int] | slice:
+        """Which of the three components the task controls; a slice, which copies nothing, if it is all."""
+        return slice(0, 3) if self.axes == AXES else [AXES.index(axis) for axis in self.axes]
 
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
         return tuple(self.axes)
 
     def jacobian(self, configuration: Configuration) -> Array:
-        return configuration.frame_jacobians(self.frame)[:, self.rows()]
+        rows = slice(self.first_row, self.first_row + 3)
+        return configuration.frame_jacobians(self.frame)[:, rows][:, self.components]

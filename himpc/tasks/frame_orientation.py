@@ -23,10 +23,8 @@ class FrameOrientation(FrameTask):
     K_p: float | tuple[float, ...] = 50.0
     K_v: float | tuple[float, ...] = 5.0
 
+    first_row: ClassVar[int] = 3
     unit: ClassVar[Literal["m", "rad"]] = "rad"
-
-    def rows(self) -> list[int]:
-        return [3 + c for c in self.components]
 
     def value(self, configuration: Configuration) -> Array:
         return configuration.placement(self.frame).rotation

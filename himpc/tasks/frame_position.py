@@ -16,10 +16,8 @@ if TYPE_CHECKING:
 class FramePosition(FrameTask):
     """x = position of the frame's origin along the chosen world axes, in metres (level 1 of Table IV)."""
 
+    first_row: ClassVar[int] = 0
     unit: ClassVar[Literal["m", "rad"]] = "m"
-
-    def rows(self) -> list[int]:
-        return self.components
 
     def value(self, configuration: Configuration) -> Array:
         return configuration.placement(self.frame).translation[self.components]

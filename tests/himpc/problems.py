@@ -1,0 +1,190 @@
+"""Random hierarchies for the tests of the cascade, and an independent reading of (31)–(34)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.cascade import Route, solve_cascade
+from himpc.cascade.level import LevelProblem, LevelSolution
+from himpc.limits import Rows
+from himpc.prediction.task import residual_model
+from himpc.qp import Solver
+
+Array = NDArray[np.float64]
+
+
+def level_problem(
+    name: str, B: Array, C: Array, free: Array, Q: Array, R: Array, knots: int | None = None
+) -> LevelProblem:
+    """A level's data from the weights as the paper prints them."""
+    K = len(B) if knots is None else knots
+    return LevelProblem(
+        name=name,
+        B=B,
+        C=C,
+        free=free,
+        root_Q=np.sqrt(Q),
+        weighted_C=np.sqrt(Q)[:, None] * C[:K, :, :K],
+        R=R,
+        knots=K,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Hierarchy:
+    """Problems 1 … r with their bounds."""
+
+    problems: list[LevelProblem]
+    rows: Rows
+
+    def solve(
+        self,
+        route: Route = "structured",
+        solver: Solver = "daqp",
+        previous: dict[str, LevelSolution] | None = None,
+    ) -> list[LevelSolution]:
+        return solve_cascade(self.problems, self.rows, previous or {}, self.damping, route, solver)
+
+    def damping(self) -> LevelProblem:
+        N, _, n = self.problems[0].B.shape
+        C = residual_model(np.zeros(n), np.full(n, 5.0), N, 1e-3).C
+        return level_problem(
+            "damping", np.tile(np.eye(n), (N, 1, 1)), C, np.zeros((N, n)), np.full(n, 200.0), np.full(n, 10.0)
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        N, _, n = self.problems[0].B.shape
+        return N, n
+
+
+def row_blocks(N: int, kinds: Sequence[str]) -> Array:
+    """How the increments add up to torque, velocity and position: sums, sums of sums, and so on."""
+    torque = np.tril(np.ones((N, N)))
+    velocity = torque @ torque
+    position = np.vstack([np.zeros((1, N)), (torque @ velocity)[:-1]]) if N > 1 else np.zeros((1, 1))
+    # The printed Euler step: q at knot j+1 sees the velocity up to knot j.
+    return np.vstack([{"torque": torque, "velocity": velocity, "position": position}[kind] for kind in kinds])
+
+
+def random_hierarchy(
+    seed: int, n: int, N: int, levels: int, position_rows: bool = False, room: float = 1.0
+) -> Hierarchy:
+    """Regular levels with M̄ over decades, and bounds that admit a point and bind now and then.
+
+    room: how wide the bounds are, as a share of what the levels would do without them.
+    """
+    rng = np.random.default_rng(seed)
+    M_bar = 10 ** rng.uniform(-3.5, 0.5, n)
+    scalar_R = rng.random() < 0.5
+    problems = []
+    for place in range(levels):
+        m = int(rng.integers(1, min(4, n) + 1))
+        J = rng.normal(0, 1, (m, n)) + 0.03 * rng.normal(0, 1, (N, m, n))
+        C = residual_model(rng.uniform(0, 400, m), rng.uniform(0, 40, m), N, 1e-3).C
+        R = np.full(n, 10 ** rng.uniform(-1, 2)) if scalar_R else 10 ** rng.uniform(-1, 2, n)
+        knots = int(rng.integers(1, N + 1)) if rng.random() < 0.3 else N
+        free = rng.normal(0, 10, (N, m))
+        problems.append(
+            level_problem(f"level{place}", J / M_bar, C, free, 10 ** rng.uniform(0, 3, m), R, knots)
+        )
+    kinds = ("torque", "velocity", "position") if position_rows else ("torque", "velocity")
+    rows = bounds_around(rng, problems, Rows(row_blocks(N, kinds), np.empty(0), np.empty(0), kinds), room)
+    return Hierarchy(problems, rows)
+
+
+def bounds_around(
+    rng: np.random.Generator, problems: list[LevelProblem], rows: Rows, room: float
+) -> Rows:
+    """Bounds in proportion to what the unbounded levels want, with a point strictly inside."""
+    N, _, n = problems[0].B.shape
+    reach = sum(np.abs(unbounded_optimum(problem)) for problem in problems) + 1e-3
+    inside = 0.3 * rng.normal(0, 1, (N, n)) * reach
+    size = rows.L @ reach + 1e-3
+    margin = [10 ** rng.uniform(-1.5, 0.5, size.shape) * size * room for _ in range(2)]
+    lower, upper = rows.L @ inside - margin[0], rows.L @ inside + margin[1]
+    free = rng.random(size.shape) < 0.1
+    return Rows(rows.L, np.where(free, -np.inf, lower), np.where(free, np.inf, upper), rows.kinds)
+
+
+def quadratic(problem: LevelProblem) -> tuple[Array, Array]:
+    """H and f of ½UᵀHU + fᵀU = half of (32a), summed literally over knots."""
+    N, m, n = problem.B.shape
+    H, f = np.zeros((N * n, N * n)), np.zeros(N * n)
+    Q = np.diag(problem.root_Q**2)
+    for j in range(problem.knots):
+        effect = np.zeros((m, N * n))
+        for s in range(j + 1):
+            effect[:, s * n : (s + 1) * n] = np.diag(problem.C[j, :, s]) @ problem.B[s]
+        H += effect.T @ Q @ effect
+        f += effect.T @ Q @ problem.free[j]
+        H[j * n : (j + 1) * n, j * n : (j + 1) * n] += np.diag(problem.R)
+    return H, f
+
+
+def unbounded_optimum(problem: LevelProblem) -> Array:
+    """The level's increments if it were alone and without bounds."""
+    H, f = quadratic(problem)
+    N, _, n = problem.B.shape
+    used = problem.knots * n
+    U = np.zeros(N * n)
+    U[:used] = -np.linalg.solve(H[:used, :used], f[:used])
+    return U.reshape(N, n)
+
+
+def equalities(problems: Sequence[LevelProblem], level: int) -> Array:
+    """The rows of (33) for a level, and the knots beyond its horizon, (k, N·n); orthonormal per knot and level.
+
+    A row space is what counts here, so a rank-deficient level contributes its rank.
+    """
+    N, _, n = problems[0].B.shape
+    blocks = []
+    for j in range(N):
+        if j >= problems[level].knots:
+            fixed = np.eye(n)
+        else:
+            stacked = np.vstack([np.empty((0, n)), *(p.B[j] / np.linalg.norm(p.B[j]) for p in problems[:level])])
+            fixed = row_space(stacked)
+        block = np.zeros((len(fixed), N, n))
+        block[:, j] = fixed
+        blocks.append(block.reshape(len(fixed), N * n))
+    return np.vstack(blocks)
+
+
+def row_space(A: Array, tolerance: float = 1e-9) -> Array:
+    """Orthonormal rows spanning those of A."""
+    if not A.size:
+        return A
+    _, singular, Vt = np.linalg.svd(A)
+    return Vt[: int((singular > tolerance).sum())]
+
+
+def kkt_violation(
+    hierarchy: Hierarchy, level: int, solution: LevelSolution, U_above: Array, rows: Rows | None = None
+) -> float:
+    """Largest violation of the KKT conditions of Problem i in the full space of U, scaled as documented.
+
+    Built from the literal H, f, bounds and equality rows; the multipliers of the bounds are the reported
+    ones, those of the equalities the best there are.
+    """
+    problem, rows = hierarchy.problems[level], rows or hierarchy.rows
+    N, n = hierarchy.shape
+    H, f = quadratic(problem)
+    U = solution.U.ravel()
+    multipliers = np.zeros(rows.lower.shape)
+    multipliers[solution.active.row, solution.active.joint] = solution.active.multiplier
+    gradient = H @ U + f + (rows.L.T @ multipliers).ravel()
+    E = equalities(hierarchy.problems, level)
+    gradient -= E.T @ (E @ gradient)
+    scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(U)), float(np.linalg.norm(f)))
+    value = rows.L @ solution.U
+    outside = np.maximum(value - rows.upper, rows.lower - value).max()
+    gap = np.where(multipliers > 0, rows.upper - value, value - rows.lower)
+    pressing = multipliers != 0
+    complementarity = float(np.abs(multipliers[pressing] * gap[pressing]).max(initial=0.0)) / scale
+    moved = float(np.abs(E @ (U - U_above.ravel())).max(initial=0.0))
+    return max(float(np.abs(gradient).max()) / scale, float(outside), complementarity, moved)
