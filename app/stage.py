@@ -110,6 +110,8 @@ class Stage:
     def _build_scene(self, client: viser.ClientHandle) -> None:
         ready, scene = self._ready, client.scene
         eye, at, reach = camera_for(ready.robot)
+        # Shadows triple the cost of a frame, which decides on a laptop or a phone.
+        scene.configure_default_lights(cast_shadow=False)
         scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
         self._robot = RobotView(scene, ready.robot)
         poses = self._learner.read(lambda block, _: block.poses())
@@ -140,6 +142,11 @@ class Stage:
         ]
         self._trails = Trails(scene, curves, colour)
         client.camera.up_direction = (0.0, 0.0, 1.0)
+        if client.camera.image_width < client.camera.image_height:
+            # A phone: viser's sheet covers the lower half, so the robot goes, smaller, into the upper one.
+            eye = at + 1.7 * (eye - at)
+            down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])
+            eye, at = eye - down, at - down
         client.camera.position = eye
         client.camera.look_at = at
 

@@ -112,5 +112,3 @@ def with_level(stack: Stack, name: str, **changes: object) -> Stack:
 def frames_used(stack: Stack) -> set[str]:
     """Frames named by the stack's tasks ('' stands for the robot's tip)."""
     return {getattr(task, "frame", "") for level in stack for task in level.tasks}
-
-

@@ -16,7 +16,16 @@ from robots import Robot
 
 Array = NDArray[np.float64]
 
-__all__ = ["AT_POSITION", "AT_TORQUE", "AT_VELOCITY", "RUNGS", "Layout", "TaskInfo", "layout_of", "write_plan"]
+__all__ = [
+    "AT_POSITION",
+    "AT_TORQUE",
+    "AT_VELOCITY",
+    "RUNGS",
+    "Layout",
+    "TaskInfo",
+    "layout_of",
+    "write_plan",
+]
 
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 """Bits of the field `at_bound`."""
@@ -133,5 +142,3 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
                 hit = level.active.joint[np.asarray(mine)[block]]
                 at_bound[hit] = at_bound[hit].astype(int) | (1 << bit)
     row[fields["at_bound"]] = at_bound
-
-

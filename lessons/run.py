@@ -27,7 +27,9 @@ def parse_assignment(text: str) -> tuple[str, Any]:
         return path, json.loads(value, parse_constant=_refuse_constant(text))
     except json.JSONDecodeError:
         if value.lower() in ("nan", "inf", "-inf", "infinity", ""):
-            raise InputError(f"--set {text}: '{value}' is no finite number; give one, e.g. {path}=1") from None
+            raise InputError(
+                f"--set {text}: '{value}' is no finite number; give one, e.g. {path}=1"
+            ) from None
         return path, value
 
 
@@ -46,7 +48,10 @@ def with_assignments(settings: SceneSettings, assignments: Iterable[str]) -> Sce
 
 
 def run(
-    scene: Scene, duration: float | None = None, seed: int = 0, progress: Callable[[float], None] | None = None
+    scene: Scene,
+    duration: float | None = None,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Runs a scene from its start.
 

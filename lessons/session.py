@@ -152,7 +152,9 @@ class Session:
             raise unknown_name("task", name, tasks)
         target = self.target(name)
         if target is None:
-            raise InputError(f"the target of task '{name}' follows a fixed motion in this scene: take a hold scene")
+            raise InputError(
+                f"the target of task '{name}' follows a fixed motion in this scene: take a hold scene"
+            )
         array = np.array(value, float)
         if not np.isfinite(array).all():
             raise InputError(f"the target of task '{name}' is not finite: give finite numbers")
@@ -291,7 +293,9 @@ def _moved(stack: Stack, name: str, to: int) -> Stack:
     if name not in names:
         raise unknown_name("level", name, names)
     if not 0 <= to < len(stack):
-        raise InputError(f"level '{name}' cannot go to place {to}: the stack has places 0 to {len(stack) - 1}")
+        raise InputError(
+            f"level '{name}' cannot go to place {to}: the stack has places 0 to {len(stack) - 1}"
+        )
     levels = list(stack)
     levels.insert(to, levels.pop(names.index(name)))
     return tuple(levels)

@@ -66,9 +66,7 @@ def summary(recording: Recording) -> dict[str, Any]:
             }
             for task in sorted(layout.tasks, key=lambda task: place[task.level])
         ],
-        "average_cost": [
-            _average_cost(recording, level.name) for level in settings.levels if level.enabled
-        ],
+        "average_cost": [_average_cost(recording, level.name) for level in settings.levels if level.enabled],
         "limits": _limits(recording),
         "solver": {
             "backend": settings.solver,

@@ -75,6 +75,7 @@ def solve_cascade(
                 status=point.status,
                 rung=rung,
                 time_us=(perf_counter_ns() - started) / 1e3,
+                qp_us=point.qp_us,
                 leak=leak,
             )
         )

@@ -1,8 +1,8 @@
-"""The explicit route: all rows and the equality constraints (33) as printed. The oracle of the structured one."""
+"""The explicit route: all rows and the equality constraints (33) as printed; the structured one's oracle."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _BINDING = 1e-9
 """N·m: a row closer than this to its bound is binding."""
+_ON_SUBSPACE = 1e-7
+"""N·m: how far a point may lie from the subspace that (33) leaves."""
 
 
 def solve_explicit(
@@ -28,9 +30,9 @@ def solve_explicit(
 ) -> Point | None:
     """Problem i over all N·n increments with every bound and every equality (33) handed to the solver.
 
-    Near a singularity the printed equality rows are dependent and active-set solvers may refuse them;
-    the same subspace is then described by orthonormal rows. Knots beyond the level's own horizon
-    keep the increments of the level above.
+    Near a singularity the printed equality rows are dependent: active-set solvers may refuse them, and a
+    point that meets them to the tolerance may be far from their subspace. The same subspace is then described
+    by orthonormal rows. Knots beyond the level's own horizon keep the increments of the level above.
 
     Args:
         problem: the level's data.
@@ -52,16 +54,19 @@ def solve_explicit(
         at = bounds @ U_above.ravel()
         lower, upper = np.minimum(lower, at), np.maximum(upper, at)
     tail = np.eye(N * n)[problem.knots * n :]
-    solution = None
     for equalities in _equalities(above, U_above, Z):
         E = np.vstack([equalities, tail])
         target = E @ U_above.ravel()
-        solution = solve_qp(
-            H, f, np.vstack([bounds, E]), np.r_[lower, target], np.r_[upper, target], solver
-        )
-        if solution.solved:
+        solution = solve_qp(H, f, np.vstack([bounds, E]), np.r_[lower, target], np.r_[upper, target], solver)
+        if solution.solved and _off_subspace(solution.x.reshape(N, n) - U_above, Z) <= _ON_SUBSPACE:
             return _point(solution, rows, lower, upper, bounds, (N, n))
     return None
+
+
+def _off_subspace(change: Array, Z: Array) -> float:
+    """How far a change of the increments leaves span Z at any knot, N·m."""
+    column = change[:, :, None]
+    return float(np.abs(column - Z @ (Z.transpose(0, 2, 1) @ column)).max())
 
 
 def _quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
@@ -76,23 +81,23 @@ def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
     return np.kron(np.frombuffer(L).reshape(shape), np.eye(n))
 
 
-def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) -> list[Array]:
-    """(33) as printed, then the same subspace by orthonormal rows."""
+def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) -> Iterator[Array]:
+    """(33) as printed, then, if that is refused, the same subspace by orthonormal rows."""
     N, n = U_above.shape
     if not above:
-        return [np.empty((0, N * n))]
-    printed = [_block_diagonal(B) for B, _ in above]
+        yield np.empty((0, N * n))
+        return
+    yield np.vstack([_block_diagonal(B) for B, _ in above])
     fixed = []
     for j in range(N):
-        kept = np.eye(n) - Z[j] @ Z[j].T
-        left, singular, _ = np.linalg.svd(kept)
+        left, singular, _ = np.linalg.svd(np.eye(n) - Z[j] @ Z[j].T)
         fixed.append(left[:, singular > 0.5].T)
     rows = np.zeros((sum(len(block) for block in fixed), N * n))
     start = 0
     for j, block in enumerate(fixed):
         rows[start : start + len(block), j * n : (j + 1) * n] = block
         start += len(block)
-    return [np.vstack(printed), rows]
+    yield rows
 
 
 def _block_diagonal(B: Array) -> Array:
@@ -118,4 +123,5 @@ def _point(
         ActiveRows(row, joint, multipliers[active], slack[active]),
         solution.kkt_residual,
         solution.status,
+        qp_us=solution.time_us,
     )

@@ -53,8 +53,8 @@ class LevelProblem:
 class ActiveRows:
     """Rows of `Rows` that bind: indices of row and joint, multiplier and slack (N·m in the rows' scaling).
 
-    A positive multiplier pushes back from an upper bound, a negative one from a lower bound. It is the
-    cost that one N·m of further room would save.
+    A positive multiplier pushes back from an upper bound, a negative one from a lower bound. Twice it is
+    what the cost (32a) or (34a) would save per N·m of further room.
     """
 
     row: NDArray[np.intp]
@@ -89,6 +89,7 @@ class LevelSolution:
         status: "optimal", "empty" (no freedom left) or what the solver said.
         rung: which step of the fallback ladder gave U.
         time_us: wall time of this level, microseconds.
+        qp_us: the QP solver's share of it; 0 where no solver was needed.
         leak: ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, m/s² or rad/s².
     """
 
@@ -100,6 +101,7 @@ class LevelSolution:
     status: str
     rung: Rung
     time_us: float
+    qp_us: float
     leak: float
 
 
@@ -109,6 +111,7 @@ class Point:
 
     Attributes:
         error: Q^½ e over the level's knots, flattened, if the route has it at hand.
+        qp_us: time spent in the QP solver, microseconds.
     """
 
     U: Array
@@ -116,3 +119,4 @@ class Point:
     kkt_residual: float
     status: str
     error: Array | None = None
+    qp_us: float = 0.0

@@ -135,7 +135,9 @@ def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple
         across = solved[:, 1:]
     multipliers = None
     if A is not None and across is not None:
-        target = np.where(active.multiplier > 0, rows.upper[active.row, active.joint], rows.lower[active.row, active.joint])
+        target = np.where(
+            active.multiplier > 0, rows.upper[active.row, active.joint], rows.lower[active.row, active.joint]
+        )
         if quadratic.U_above is not None:
             target = target - (rows.L @ quadratic.U_above)[active.row, active.joint]
         _, multipliers, info = dposv(A @ across, A @ y - target)
@@ -175,14 +177,13 @@ def _norm(x: Array) -> float:
     return math.sqrt(float(np.vdot(x, x)))
 
 
-def _with_rows(
-    quadratic: _Quadratic, rows: Rows, mask: NDArray[np.bool_], solver: Solver
-) -> Point | None:
+def _with_rows(quadratic: _Quadratic, rows: Rows, mask: NDArray[np.bool_], solver: Solver) -> Point | None:
     """The QP with the masked rows, and with more of them until no row is violated."""
     G, U_above = quadratic.G, quadratic.U_above
     H = G.T @ G
     H.flat[:: len(H) + 1] += 1.0
     f = quadratic.pull + G.T @ quadratic.residual
+    qp_us = 0.0
     while True:
         row, joint = np.nonzero(mask)
         A = quadratic.row_matrix(rows, row, joint)
@@ -192,6 +193,7 @@ def _with_rows(
             offset = np.einsum("ks,sk->k", rows.L[row], U_above[:, joint])
             lower, upper = np.minimum(lower - offset, 0.0), np.maximum(upper - offset, 0.0)
         solution = solve_qp(H, f, A, lower, upper, solver)
+        qp_us += solution.time_us
         if not solution.solved:
             return None
         U = quadratic.increments(solution.x)
@@ -203,4 +205,5 @@ def _with_rows(
     gap = np.where(solution.multipliers > 0, upper - value, value - lower)
     active = np.abs(solution.multipliers) > _TOLERANCE
     found = ActiveRows(row[active], joint[active], solution.multipliers[active], gap[active])
-    return Point(U, found, solution.kkt_residual, solution.status, quadratic.residual + G @ solution.x)
+    error = quadratic.residual + G @ solution.x
+    return Point(U, found, solution.kkt_residual, solution.status, error, qp_us)

@@ -109,7 +109,11 @@ def measure(
     found = []
     for task in tasks:
         value = task.value(configuration)
-        error = np.zeros_like(value) if isinstance(task, Damping) else task.error(value, previews[task.name].value)
+        error = (
+            np.zeros_like(value)
+            if isinstance(task, Damping)
+            else task.error(value, previews[task.name].value)
+        )
         values[task.name], errors[task.name] = value, error
         found.append(error)
     return found[0] if len(found) == 1 else np.concatenate(found)

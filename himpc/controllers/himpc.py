@@ -234,7 +234,7 @@ class HIMPC:
         tau = np.clip(self._tau_0, limits.tau_lower, limits.tau_upper)
         still = np.zeros((N, n))
         name = self._form.levels[0].level.name
-        held = LevelSolution(name, still, math.nan, NO_ROWS, 0.0, "state not finite", "hold", 0.0, 0.0)
+        held = LevelSolution(name, still, math.nan, NO_ROWS, 0.0, "state not finite", "hold", 0.0, 0.0, 0.0)
         state = JointState(np.zeros(n), np.zeros(n), np.zeros(n))
         self._tau_0 = tau
         return Plan(
@@ -244,9 +244,7 @@ class HIMPC:
             q=np.tile(q, (N + 1, 1)),
             errors={},
             values={},
-            rows=build_rows(
-                state, tau, self._M_bar, self._settings.limits, limits, N, self._settings.T_s
-            ),
+            rows=build_rows(state, tau, self._M_bar, self._settings.limits, limits, N, self._settings.T_s),
             limits=limits,
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=1,

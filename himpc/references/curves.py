@@ -30,9 +30,7 @@ class Circle:
         cos, sin = np.cos(phi), np.sin(phi)
         outward = cos * self.u + sin * self.w
         tangent = cos * self.w - sin * self.u
-        return sampled(
-            self.centre + outward, rate * tangent, acceleration * tangent - rate * rate * outward
-        )
+        return sampled(self.centre + outward, rate * tangent, acceleration * tangent - rate * rate * outward)
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,7 +54,9 @@ class Target:
         caps: caps on speed, acceleration and jerk of the filtered motion.
     """
 
-    def __init__(self, value: Array, caps: Caps = POSITION_CAPS, axes: list[int] | slice | None = None) -> None:
+    def __init__(
+        self, value: Array, caps: Caps = POSITION_CAPS, axes: list[int] | slice | None = None
+    ) -> None:
         """Starts at rest at `value`. `axes` picks the components of a rotation's motion that a task sees."""
         value = np.array(value, float)
         self.raw = value

@@ -31,8 +31,14 @@ class FrameTask(Task):
     """First row of the task's part of the 6 × n frame Jacobian (linear over angular, world axes)."""
 
     def __post_init__(self) -> None:
-        if not self.axes or any(axis not in AXES for axis in self.axes) or len(set(self.axes)) < len(self.axes):
-            raise InputError(f"axes of task '{self.name}' are '{self.axes}': give some of x, y and z, once each")
+        if (
+            not self.axes
+            or any(axis not in AXES for axis in self.axes)
+            or len(set(self.axes)) < len(self.axes)
+        ):
+            raise InputError(
+                f"axes of task '{self.name}' are '{self.axes}': give some of x, y and z, once each"
+            )
 
     @property
     def components(self) -> list[int] | slice:

@@ -79,18 +79,18 @@ def random_hierarchy(
     room: how wide the bounds are, as a share of what the levels would do without them.
     """
     rng = np.random.default_rng(seed)
-    M_bar = 10 ** rng.uniform(-3.5, 0.5, n)
+    M_bar = 10 ** rng.uniform(-3.0, 0.0, n)
     scalar_R = rng.random() < 0.5
     problems = []
     for place in range(levels):
         m = int(rng.integers(1, min(4, n) + 1))
         J = rng.normal(0, 1, (m, n)) + 0.03 * rng.normal(0, 1, (N, m, n))
         C = residual_model(rng.uniform(0, 400, m), rng.uniform(0, 40, m), N, 1e-3).C
-        R = np.full(n, 10 ** rng.uniform(-1, 2)) if scalar_R else 10 ** rng.uniform(-1, 2, n)
+        R = np.full(n, 10 ** rng.uniform(0, 2)) if scalar_R else 10 ** rng.uniform(0, 2, n)
         knots = int(rng.integers(1, N + 1)) if rng.random() < 0.3 else N
         free = rng.normal(0, 10, (N, m))
         problems.append(
-            level_problem(f"level{place}", J / M_bar, C, free, 10 ** rng.uniform(0, 3, m), R, knots)
+            level_problem(f"level{place}", J / M_bar, C, free, 10 ** rng.uniform(0, 2.5, m), R, knots)
         )
     kinds = ("torque", "velocity", "position") if position_rows else ("torque", "velocity")
     rows = bounds_around(rng, problems, Rows(row_blocks(N, kinds), np.empty(0), np.empty(0), kinds), room)
@@ -104,6 +104,7 @@ def bounds_around(
     N, _, n = problems[0].B.shape
     reach = sum(np.abs(unbounded_optimum(problem)) for problem in problems) + 1e-3
     inside = 0.3 * rng.normal(0, 1, (N, n)) * reach
+    inside[problems[0].knots :] = 0.0  # what level 1 cannot move must not be needed
     size = rows.L @ reach + 1e-3
     margin = [10 ** rng.uniform(-1.5, 0.5, size.shape) * size * room for _ in range(2)]
     lower, upper = rows.L @ inside - margin[0], rows.L @ inside + margin[1]
@@ -137,18 +138,15 @@ def unbounded_optimum(problem: LevelProblem) -> Array:
 
 
 def equalities(problems: Sequence[LevelProblem], level: int) -> Array:
-    """The rows of (33) for a level, and the knots beyond its horizon, (k, N·n); orthonormal per knot and level.
-
-    A row space is what counts here, so a rank-deficient level contributes its rank.
-    """
+    """Orthonormal rows that span those of (33) for a level and the knots beyond its horizon, (k, N·n)."""
     N, _, n = problems[0].B.shape
     blocks = []
     for j in range(N):
         if j >= problems[level].knots:
             fixed = np.eye(n)
         else:
-            stacked = np.vstack([np.empty((0, n)), *(p.B[j] / np.linalg.norm(p.B[j]) for p in problems[:level])])
-            fixed = row_space(stacked)
+            scaled = [p.B[j] / np.linalg.norm(p.B[j]) for p in problems[:level]]
+            fixed = row_space(np.vstack([np.empty((0, n)), *scaled]))
         block = np.zeros((len(fixed), N, n))
         block[:, j] = fixed
         blocks.append(block.reshape(len(fixed), N * n))
@@ -172,7 +170,6 @@ def kkt_violation(
     ones, those of the equalities the best there are.
     """
     problem, rows = hierarchy.problems[level], rows or hierarchy.rows
-    N, n = hierarchy.shape
     H, f = quadratic(problem)
     U = solution.U.ravel()
     multipliers = np.zeros(rows.lower.shape)
@@ -188,3 +185,29 @@ def kkt_violation(
     complementarity = float(np.abs(multipliers[pressing] * gap[pressing]).max(initial=0.0)) / scale
     moved = float(np.abs(E @ (U - U_above.ravel())).max(initial=0.0))
     return max(float(np.abs(gradient).max()) / scale, float(outside), complementarity, moved)
+
+
+def singular_hierarchy(seed: int, n: int, N: int, size: float) -> Hierarchy:
+    """Three levels, the second of which repeats the first up to one direction of relative size `size`.
+
+    The third asks for all joints, so whatever the second leaves free is used. With size 0 the second
+    level has nothing of its own.
+    """
+    rng = np.random.default_rng(seed)
+    m = int(rng.integers(1, n))
+    first = rng.normal(0, 1, (m, n)) + 0.03 * rng.normal(0, 1, (N, m, n))
+    second = first.copy()
+    own = rng.normal(0, 1, n)
+    for j in range(N):
+        space = row_space(first[j])
+        away = own - space.T @ (space @ own)
+        second[j, 0] += size * np.linalg.norm(first[j]) * away / np.linalg.norm(away)
+    problems = []
+    for place, B in enumerate((first, second, np.tile(np.eye(n), (N, 1, 1)))):
+        rows = B.shape[1]
+        C = residual_model(rng.uniform(0, 400, rows), rng.uniform(0, 40, rows), N, 1e-3).C
+        free, Q, R = rng.normal(0, 10, (N, rows)), 10 ** rng.uniform(1, 2, rows), 10 ** rng.uniform(0, 1, n)
+        problems.append(level_problem(f"level{place}", 20.0 * B, C, free, Q, R))
+    kinds = ("torque", "velocity")
+    rows = bounds_around(rng, problems, Rows(row_blocks(N, kinds), np.empty(0), np.empty(0), kinds), 3.0)
+    return Hierarchy(problems, rows)

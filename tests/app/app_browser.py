@@ -1,0 +1,131 @@
+"""What browser tests need: a running server, a Chromium, and hands that find viser's controls."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from typing import Any
+
+from playwright.sync_api import Browser, Locator, Page
+
+CHROMIUM_ARGS = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader"]
+SLOW = 60_000  # ms: WebGL in software on two shared cores
+BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
+
+_PROJECT = """([name, at]) => {
+  const m = window.__viserMutable, node = m.nodeRefFromName[name];
+  node.updateWorldMatrix(true, false); m.camera.updateMatrixWorld(true);
+  const v = m.camera.position.clone().set(at[0], at[1], at[2]);
+  v.applyMatrix4(node.matrixWorld).project(m.camera);
+  const r = m.canvas.getBoundingClientRect();
+  return [r.left + (v.x * 0.5 + 0.5) * r.width, r.top + (-v.y * 0.5 + 0.5) * r.height];
+}"""
+
+
+def find_chromium() -> str | None:
+    return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+def open_page(browser: Browser, url: str, width: int = 1400, height: int = 640) -> Page:
+    """A fresh browser profile with the page loaded and the robot drawn."""
+    page = browser.new_context(viewport={"width": width, "height": height}).new_page()
+    page.set_default_timeout(SLOW)
+    load(page, url)
+    return page
+
+
+def load(page: Page, url: str) -> None:
+    page.goto(url, wait_until="commit")
+    wait_for_scene(page)
+    page.wait_for_function(
+        """() => { let o = 1; for (let p = window.__viserMutable.canvas; p && p.nodeType === 1;
+             p = p.parentElement) o *= parseFloat(getComputedStyle(p).opacity); return o > 0.99; }"""
+    )
+    # "Software WebGL" covers the canvas and swallows the mouse.
+    page.add_style_tag(content=".mantine-Notifications-root{pointer-events:none !important;opacity:0}")
+
+
+def wait_for_scene(page: Page, node: str = "/actual") -> None:
+    page.wait_for_function(
+        """(node) => { const m = window.__viserMutable, t = window.__viserTestpoints;
+             return m && t && m.nodeRefFromName[node] && t.rendererInfo.render.triangles > 0; }""",
+        arg=node,
+        timeout=SLOW,
+    )
+
+
+def row(page: Page, label: str) -> Locator:
+    """The row of a control: its label and its inputs."""
+    return page.locator(
+        f'xpath=(//label[@for and normalize-space(.)="{label}"]'
+        '/ancestor::div[contains(@class,"mantine-Flex-root")])[1]'
+    )
+
+
+def set_number(page: Page, label: str, value: object) -> None:
+    """Types into the number box of a slider or a number input."""
+    box = row(page, label).locator("input[type=text], input[inputmode]").last
+    box.fill(str(value))
+    box.press("Enter")
+    page.wait_for_timeout(BETWEEN)
+
+
+def number(page: Page, label: str) -> float:
+    return float(row(page, label).locator("input[type=text], input[inputmode]").last.input_value())
+
+
+def write(page: Page, label: str, text: str) -> None:
+    box = row(page, label).locator("input, textarea").first
+    box.fill(text)
+    box.press("Tab")
+    page.wait_for_timeout(BETWEEN)
+
+
+def press(page: Page, button: str) -> None:
+    page.get_by_role("button", name=button, exact=True).first.click()
+    page.wait_for_timeout(BETWEEN)
+
+
+def tab(page: Page, name: str) -> None:
+    page.get_by_role("tab", name=name, exact=True).click()
+    page.wait_for_timeout(BETWEEN)
+
+
+def key(page: Page, name: str) -> None:
+    page.keyboard.press(name)
+    page.wait_for_timeout(BETWEEN)
+
+
+def position(page: Page, node: str) -> tuple[float, float, float]:
+    """Where the browser draws a node, in its parent's axes."""
+    found: Any = page.evaluate(
+        "(n) => { const p = window.__viserMutable.nodeRefFromName[n].position; return [p.x, p.y, p.z]; }",
+        node,
+    )
+    return float(found[0]), float(found[1]), float(found[2])
+
+
+def drag_target(page: Page, axis: int, along: float) -> None:
+    """Pulls the gizmo's arrow of an axis by so many metres, in twelve steps like a hand would."""
+    arm = 0.18
+    direction = [0.0, 0.0, 0.0]
+    direction[axis] = 1.0
+    start = page.evaluate(_PROJECT, ["/target", [arm * c for c in direction]])
+    end = page.evaluate(_PROJECT, ["/target", [(arm + along) * c for c in direction]])
+    page.mouse.move(*start)
+    page.wait_for_timeout(250)  # the arrow must have noticed the mouse
+    page.mouse.down()
+    for k in range(1, 13):
+        page.mouse.move(*(s + (e - s) * k / 12 for s, e in zip(start, end, strict=True)))
+        page.wait_for_timeout(25)
+    page.mouse.up()
+    page.wait_for_timeout(BETWEEN)
+
+
+def eventually(page: Page, condition: Callable[[], bool], timeout: float = 40.0) -> bool:
+    """Whether the condition comes true; the browser goes on meanwhile."""
+    for _ in range(int(timeout / 0.1)):
+        if condition():
+            return True
+        page.wait_for_timeout(100)
+    return False

@@ -1,0 +1,150 @@
+"""The simulation behind a page, driven by hand: no process, no clock."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.block import Block
+from app.body import Body
+from app.history import BUCKETS, History
+from app.messages import Load, Play, Post, Ready, Refused, ResetAll, SceneChoice, Speed, Step
+from app.pacing import BACKLOG, Pacer
+from lessons.events import MoveTarget, Reset, Set
+from robots import InputError
+
+
+@pytest.fixture
+def body() -> Iterator[Body]:
+    made = Body(SceneChoice("iiwa14-hold"))
+    yield made
+    made.close()
+
+
+def test_ticks_reach_the_block_in_order(body: Body) -> None:
+    body.tick(50)
+    first, rows = body.block.since(0)
+    t = rows[:, body.session.layout.fields["t"]][:, 0]
+    assert first == 0 and len(rows) == 50
+    assert np.allclose(np.diff(t), 1e-3)
+
+
+def test_reports_survive_the_pipe(body: Body) -> None:
+    ready = pickle.loads(pickle.dumps(body.ready()))
+    assert ready.robot.joint_names == body.session.robot.joint_names
+    assert [task.kind for task in ready.tasks] == ["position", "orientation", "joints"]
+    body.tick(3)
+    status = pickle.loads(pickle.dumps(body.status()))
+    assert status.settings is not None and status.path.shape == (6, 3)
+    assert body.status().settings is None  # sent once, then only after a change
+
+
+def test_settings_and_wrong_settings(body: Body) -> None:
+    body.handle(Post(Set("horizon", 10)))
+    body.handle(Post(Set("M_bar_scale", -1.0)))
+    body.handle(Post(Set("horzion", 3)))
+    body.tick()
+    status = body.status()
+    assert status.settings is not None and status.settings.horizon == 10
+    assert len(status.notices) == 2 and "horizon" in status.notices[1]
+    assert body.status().notices == ()
+
+
+def test_pause_step_speed(body: Body) -> None:
+    body.handle(Play(False))
+    assert not body.running
+    body.handle(Play(True))
+    body.handle(Step())
+    assert not body.running and body.take_steps() == 1 and body.take_steps() == 0
+    body.handle(Speed(0.5))
+    assert body.status().speed == 0.5
+
+
+def test_reset_keeps_settings_and_reset_all_does_not(body: Body) -> None:
+    start = body.block.poses()[-1].copy()
+    target = tuple(start[:3] + np.array([0.0, 0.15, 0.0]))
+    body.handle(Post(MoveTarget("position", target)))
+    body.handle(Post(Set("horizon", 3)))
+    body.tick(400)
+    body.write_poses()
+    assert abs(body.block.poses()[-1][1] - start[1]) > 0.01
+    before = body.resets
+    body.handle(Post(Reset()))
+    body.tick()
+    body.write_poses()
+    assert np.allclose(body.block.poses()[-1], start, atol=1e-4)
+    assert body.session.settings.horizon == 3 and body.resets == before + 1
+    body.handle(ResetAll())
+    assert body.session.settings.horizon == 5
+
+
+def test_another_scene_or_a_sentence(body: Body) -> None:
+    kept = body.session
+    for choice in (
+        SceneChoice("hold", urdf="/nowhere/robot.urdf"),
+        SceneChoice("hold", urdf_text="<robot><broken"),
+        SceneChoice("hold", urdf="panda", tip="no_such_link"),
+        SceneChoice("no-such-scene"),
+    ):
+        answer = body.handle(Load(choice))
+        assert isinstance(answer, Refused) and answer.sentence and "Traceback" not in answer.sentence
+        assert body.session is kept
+    old = body.block.name
+    answer = body.handle(Load(SceneChoice("planar3-hold")))
+    assert isinstance(answer, Ready) and answer.robot.n == 3 and answer.block != old
+    Block.for_robot(kept.robot, kept.layout.size, old).close(unlink=True)
+    body.tick(10)
+
+
+def test_a_scene_that_cannot_be_loaded_at_all() -> None:
+    with pytest.raises(InputError):
+        Body(SceneChoice("hold", urdf="/nowhere/robot.urdf"))
+
+
+def test_history_keeps_spikes_and_counts_bounds(body: Body) -> None:
+    layout = body.session.layout
+    history = History(body.block, layout, 10)
+    row = np.zeros(layout.size)
+    for k in range(95):
+        row[:] = 0.0
+        if k == 42:
+            row[layout.fields["step_us"]] = 7.0
+            row[layout.fields["at_bound"]][2] = 5.0
+        body.block.write(row)
+        if k % 7 == 0:
+            history.pull()
+    history.pull()
+    assert np.nanmax(history.columns(layout.fields["step_us"])) == 7.0
+    assert history.bound_ticks[2].tolist() == [1, 0, 1] and history.bound_ticks.sum() == 2
+    assert history.at_bound(0)[:, 2].sum() == 2  # one bucket, two points
+    assert len(history.ages(1e-3)) == 2 * BUCKETS
+    history.forget()
+    assert np.isnan(history.columns(layout.fields["t"])).all()
+
+
+def test_the_ring_wraps(body: Body) -> None:
+    width = body.session.layout.size
+    rows = body.block.rows
+    for k in range(rows + 100):
+        body.block.write(np.full(width, float(k)))
+    first, kept = body.block.since(0)
+    assert first > 100 and kept[-1, 0] == rows + 99
+    assert np.array_equal(kept[:, 0], np.arange(first, rows + 100))
+
+
+def test_pacer_owes_simulated_time_but_never_piles_it_up() -> None:
+    pacer = Pacer(0.0)
+    assert pacer.due(0.010, 1e-3) == 10
+    pacer.ran(10, 1e-3)
+    assert pacer.due(0.0105, 1e-3) == 0
+    assert pacer.due(0.011, 1e-3) == 1
+    pacer.ran(1, 1e-3)
+    assert not pacer.capped(0.011)
+    assert pacer.due(5.0, 1e-3) == round(BACKLOG / 1e-3)
+    assert pacer.capped(5.0) and pacer.capped(5.5) and not pacer.capped(6.5)
+    pacer.rest(7.0)
+    pacer.speed = 0.1
+    assert pacer.due(7.1, 1e-3) == 10

@@ -1,0 +1,233 @@
+"""The page in a real browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from app_browser import (
+    drag_target,
+    eventually,
+    key,
+    number,
+    open_page,
+    position,
+    press,
+    set_number,
+    tab,
+    wait_for_scene,
+    write,
+)
+from playwright.sync_api import Browser, Page, expect
+
+from app.learner import Learner
+from app.process import wait_until
+from app.server import PageServer
+from robots import CATALOG
+
+
+@pytest.fixture
+def learner(server: PageServer, page: Page) -> Learner:
+    """The simulation behind `page`, which was opened first and never left for long."""
+    assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
+    return server.sessions.learners[0]
+
+
+def error(learner: Learner, task: str) -> float:
+    """‖x̃‖ now, m or rad."""
+    row = learner.read(lambda _, history: (history.layout, history.latest))
+    assert row is not None
+    layout, latest = row
+    return float(np.linalg.norm(latest[layout.fields[f"error/{task}"]]))
+
+
+def test_the_page_invites_and_holds(page: Page, learner: Learner) -> None:
+    expect(page.get_by_text("Drag the orange ball")).to_be_visible()
+    expect(page.get_by_text("RUNNING").first).to_be_visible()
+    assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.5)
+    assert error(learner, "position") < 1e-3
+
+
+def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: Learner) -> None:
+    before = position(page, "/actual")
+    drag_target(page, axis=1, along=0.15)
+    assert eventually(page, lambda: position(page, "/actual")[1] > before[1] + 0.08)
+    assert eventually(page, lambda: error(learner, "position") < 2e-3)
+    expect(page.get_by_text("Target within reach")).to_be_visible()
+    expect(page.get_by_text("Now switch a level off")).to_be_visible()
+
+
+def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: Learner) -> None:
+    for _ in range(3):
+        drag_target(page, axis=1, along=0.6)
+    expect(page.get_by_text("Out of reach by")).to_be_visible()
+    assert eventually(page, lambda: position(page, "/actual")[1] > 0.3)
+    assert eventually(page, lambda: error(learner, "position") < 5e-3)  # of the target it accepted
+    assert learner.failure is None
+    press(page, "Bring the target to the hand")
+    expect(page.get_by_text("Target within reach")).to_be_visible()
+
+
+def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: Learner) -> None:
+    tab(page, "Tasks")
+    key(page, "2")
+    assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[1].enabled)
+    expect(page.get_by_text("OFF").first).to_be_visible()
+    drag_target(page, axis=2, along=0.2)
+    assert eventually(page, lambda: error(learner, "orientation") > np.radians(3.0))
+    assert eventually(page, lambda: error(learner, "position") < 2e-3)
+    assert error(learner, "orientation") > np.radians(3.0)
+    key(page, "2")
+    assert eventually(page, lambda: error(learner, "orientation") < np.radians(1.0))
+
+
+def test_levels_move_and_gains_change(page: Page, learner: Learner) -> None:
+    tab(page, "Tasks")
+    page.get_by_role("button", name="▼ Down").nth(1).click()
+    assert eventually(
+        page,
+        lambda: (
+            learner.settings is not None
+            and [level.name for level in learner.settings.levels] == ["position", "posture", "orientation"]
+        ),
+    )
+    expect(page.get_by_text("2 · posture")).to_be_visible()
+    page.get_by_text("Gains and weights").first.click()
+    set_number(page, "Q", 300)
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.levels[0].Q == 300)
+    press(page, "Reset all")
+    expect(page.get_by_text("2 · orientation")).to_be_visible()
+    assert eventually(page, lambda: number(page, "Q") == 200)
+
+
+def test_N_and_M_bar_change_while_it_runs(page: Page, learner: Learner) -> None:
+    tab(page, "Control")
+    set_number(page, "N", 10)
+    set_number(page, "M̄ scale", 1.5)
+    settings = learner.settings
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 10)
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.M_bar_scale == 1.5)
+    assert settings is not None and learner.failure is None
+    expect(page.get_by_text("spectral radius")).to_be_visible()
+    tab(page, "Plant")
+    set_number(page, "Payload [kg]", 2)
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.plant.payload_kg == 2)
+    assert eventually(page, lambda: error(learner, "position") < 2e-3)
+
+
+def test_pause_step_reset(page: Page, learner: Learner) -> None:
+    drag_target(page, axis=1, along=0.15)
+    assert eventually(page, lambda: position(page, "/actual")[1] > 0.05)
+    key(page, "Space")
+    expect(page.get_by_text("PAUSED").first).to_be_visible()
+    assert learner.status is not None
+    ticks = learner.status.ticks
+    press(page, "Step")
+    assert eventually(page, lambda: learner.status is not None and learner.status.ticks == ticks + 1)
+    key(page, "s")
+    assert eventually(page, lambda: learner.status is not None and learner.status.ticks == ticks + 2)
+    key(page, "r")
+    assert eventually(page, lambda: abs(position(page, "/actual")[1]) < 0.01)
+    assert eventually(page, lambda: abs(position(page, "/target")[1]) < 0.01)
+    press(page, "Run")
+    expect(page.get_by_text("RUNNING").first).to_be_visible()
+
+
+def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> None:
+    tab(page, "Control")
+    set_number(page, "N", 7)
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 7)
+    page.reload(wait_until="commit")
+    wait_for_scene(page)
+    assert learner in server.sessions.learners and learner.attached
+    tab(page, "Control")
+    assert eventually(page, lambda: number(page, "N") == 7)
+
+
+def test_two_browsers_and_no_third(
+    browser: Browser, server: PageServer, page: Page, learner: Learner
+) -> None:
+    second = open_page(browser, server.url)
+    other = server.sessions.learners[-1]
+    assert other is not learner and other.pid != learner.pid
+    still = position(second, "/actual")
+    drag_target(page, axis=1, along=0.15)
+    assert eventually(page, lambda: position(page, "/actual")[1] > still[1] + 0.08)
+    assert np.allclose(position(second, "/actual"), still, atol=2e-3)
+    third = browser.new_context().new_page()
+    third.goto(server.url, wait_until="commit")
+    expect(third.get_by_text("All places are taken")).to_be_visible(timeout=60_000)
+    pid = other.pid
+    second.context.close()
+    assert pid is not None
+    assert wait_until(lambda: other not in server.sessions.learners, 30.0)  # closing the tab ends the child
+    third.get_by_role("button", name="Try again").click()
+    wait_for_scene(third)
+    third.context.close()
+
+
+def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Learner) -> None:
+    pid = learner.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
+    expect(page.get_by_text("ended from outside")).to_be_visible()
+    expect(page.get_by_text("Press Reset to start again")).to_be_visible()
+    press(page, "Reset")
+    expect(page.get_by_text("RUNNING").first).to_be_visible()
+    assert learner.pid != pid
+    wait_for_scene(page)
+
+
+def test_wrong_robots_are_one_sentence_and_uploads_work(page: Page, learner: Learner, tmp_path: Path) -> None:
+    tab(page, "Robot")
+    write(page, "File", "/nowhere/<b>robot</b>.urdf")
+    press(page, "Load file")
+    expect(page.get_by_text("NOT LOADED")).to_be_visible()
+    expect(page.get_by_text("/nowhere/<b>robot</b>.urdf")).to_be_visible()  # text, not markup
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot name='x'><link")
+    _upload(page, broken)
+    expect(page.get_by_text("not well-formed")).to_be_visible()
+    assert learner.ready is not None and learner.ready.robot.n == 7
+    mine = tmp_path / "mine.urdf"
+    text = CATALOG["planar3"].path.read_text()
+    hostile = "&lt;img src=x onerror=window.hacked=1&gt;"
+    mine.write_text(re.sub(r'<robot name="[^"]*"', f'<robot name="{hostile}"', text, count=1))
+    _upload(page, mine)
+    assert eventually(page, lambda: learner.ready is not None and learner.ready.robot.n == 3)
+    wait_for_scene(page)
+    tab(page, "Robot")
+    expect(page.get_by_text("3 joints").first).to_be_visible()
+    assert page.evaluate("() => window.hacked") is None
+    assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.3)
+
+
+def _upload(page: Page, path: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Upload a URDF").click()
+    chooser.value.set_files(path)
+
+
+def test_other_scenes_and_the_phone(browser: Browser, server: PageServer) -> None:
+    phone = open_page(browser, server.url, 390, 844)
+    learner = server.sessions.learners[-1]
+    expect(phone.get_by_text("Drag the orange ball")).to_be_visible()
+    tab(phone, "Robot")
+    phone.get_by_role("button", name="Load robot").scroll_into_view_if_needed()
+    learner.send(_load("iiwa14-circle"))
+    assert eventually(
+        phone, lambda: learner.ready is not None and learner.ready.choice.name == "iiwa14-circle"
+    )
+    wait_for_scene(phone, "/reference/0")
+    expect(phone.get_by_text("Watch the hand follow the curve")).to_be_visible()
+    phone.context.close()
+
+
+def _load(name: str):
+    from app.messages import Load, SceneChoice
+
+    return Load(SceneChoice(name))

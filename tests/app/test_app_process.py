@@ -1,0 +1,148 @@
+"""The simulation in its own process: pause, speed, crash, recovery, neighbours, the end."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import psutil
+import pytest
+
+from app.learner import Learner
+from app.messages import Play, Post, SceneChoice, Speed, Step
+from app.process import Process, Spares, wait_until
+from app.sessions import Sessions
+from lessons.events import MoveTarget, Set
+
+LONG = 30.0  # s
+
+
+@pytest.fixture
+def spares() -> Iterator[Spares]:
+    made = Spares()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def start(spares: Spares) -> Iterator[Callable[[str], Learner]]:
+    started: list[Learner] = []
+
+    def run(scene: str) -> Learner:
+        learner = Learner(f"token{len(started)}", SceneChoice(scene), spares)
+        started.append(learner)
+        assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
+        return learner
+
+    yield run
+    for learner in started:
+        learner.close()
+
+
+def ticks(learner: Learner) -> int:
+    return 0 if learner.status is None else learner.status.ticks
+
+
+def tip(learner: Learner) -> np.ndarray:
+    poses = learner.read(lambda block, _: block.poses())
+    assert poses is not None
+    return poses[-1, :3]
+
+
+def test_play_pause_step_speed_reset(start: Callable[[str], Learner]) -> None:
+    learner = start("planar3-hold")
+    learner.send(Play(False))
+    assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
+    held = ticks(learner)
+    assert not wait_until(lambda: ticks(learner) != held, 0.4)
+    learner.send(Step())
+    assert wait_until(lambda: ticks(learner) == held + 1, LONG)
+    learner.send(Speed(0.1))
+    learner.send(Post(Set("horizon", 8)))
+    learner.send(Play(True))
+    assert wait_until(lambda: learner.settings is not None and learner.settings.horizon == 8, LONG)
+    assert wait_until(lambda: 0.0 < _factor(learner) < 0.5, LONG)
+    learner.reset_all()
+    assert wait_until(lambda: learner.settings is not None and learner.settings.horizon == 5, LONG)
+    assert learner.status is not None and learner.status.t < 5.0
+
+
+def _factor(learner: Learner) -> float:
+    return 0.0 if learner.status is None else learner.status.real_time_factor
+
+
+def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], Learner]) -> None:
+    one, two = start("iiwa14-hold"), start("iiwa14-hold")
+    assert one.pid != two.pid
+    before = tip(two).copy()
+    goal = tip(one) + np.array([0.0, 0.1, 0.0])
+    one.send(Post(MoveTarget("position", tuple(goal))))
+    assert wait_until(lambda: float(np.abs(tip(one) - goal).max()) < 5e-3, LONG)
+    assert np.allclose(tip(two), before, atol=1e-3)
+    one.send(Play(False))
+    assert wait_until(lambda: one.status is not None and not one.status.running, LONG)
+    held = ticks(two)
+    assert wait_until(lambda: ticks(two) > held + 50, LONG)
+
+
+def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], Learner]) -> None:
+    learner = start("planar3-hold")
+    pid = learner.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
+    assert wait_until(lambda: learner.failure is not None, LONG)
+    assert "signal 9" in str(learner.failure)
+    changed = learner.changed
+    learner.reset_all()
+    assert wait_until(lambda: learner.changed > changed and ticks(learner) > 20, LONG)
+    assert learner.failure is None and learner.pid != pid
+
+
+def test_a_bad_scene_is_a_sentence_and_the_process_waits(spares: Spares) -> None:
+    learner = Learner("token", SceneChoice("hold", urdf="/nowhere/robot.urdf"), spares)
+    refusals: list[str] = []
+    try:
+        assert wait_until(lambda: bool(refusals.extend(learner.take_messages()[0]) or refusals), LONG)
+        assert "/nowhere/robot.urdf" in refusals[0] and learner.failure is None
+    finally:
+        learner.close()
+
+
+def test_no_child_and_no_memory_is_left(start: Callable[[str], Learner]) -> None:
+    learner = start("planar3-hold")
+    pid, name = learner.pid, learner.ready.block if learner.ready else ""
+    assert pid is not None and os.path.exists(f"/dev/shm/{name}")
+    learner.close()
+    assert wait_until(lambda: not psutil.pid_exists(pid), LONG)
+    assert not os.path.exists(f"/dev/shm/{name}")
+
+
+def test_a_child_ends_when_the_page_is_gone() -> None:
+    process = Process()
+    pid = process.pid
+    assert pid is not None
+    process._pipe.close()  # what the operating system does when the parent dies
+    assert wait_until(lambda: process._child.exitcode is not None, LONG)
+    assert process._child.exitcode == 0
+
+
+def test_sessions_resume_end_and_are_limited() -> None:
+    sessions = Sessions(SceneChoice("planar3-hold"), max_sessions=2, grace=1.0)
+    try:
+        one, two = sessions.enter([]), sessions.enter([])
+        assert one is not None and two is not None and one is not two
+        assert sessions.enter([]) is None  # full
+        assert sessions.enter([one.token]) is None  # attached elsewhere: two tabs never share a robot
+        sessions.leave(one)
+        assert sessions.enter(["stranger", one.token]) is one  # a reload
+        sessions.leave(two)
+        assert wait_until(lambda: two not in sessions.learners, LONG)
+        assert one in sessions.learners
+        sessions.leave(one)
+        three = sessions.enter([])
+        assert three is not None and three is not one
+    finally:
+        sessions.close()
+    assert not sessions.learners

@@ -1,0 +1,97 @@
+"""The server without a browser: address, hardening, signals."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+import websockets.exceptions
+from viser import __version__, _messages
+from websockets.sync.client import connect
+
+from app.messages import SceneChoice
+from app.process import wait_until
+from app.server import PageServer, serve
+from robots import InputError
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def plain() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    yield running
+    running.close()
+
+
+def test_it_answers_on_this_machine_only(plain: PageServer) -> None:
+    with urllib.request.urlopen(plain.url) as answer:
+        assert answer.status == 200
+    assert plain.url.startswith("http://127.0.0.1:")
+
+
+def test_nobody_can_open_a_tunnel(plain: PageServer) -> None:
+    assert not plain._viser._websock_server._incoming_handlers.get(_messages.ShareUrlRequest)
+
+
+def test_pages_of_other_sites_are_refused(plain: PageServer) -> None:
+    address = plain.url.replace("http", "ws")
+    protocol = [f"viser-v{__version__}"]
+    with connect(address, origin="https://evil.example", subprotocols=protocol) as stranger:  # pyright: ignore
+        with pytest.raises(websockets.exceptions.ConnectionClosed):
+            while True:
+                stranger.recv(timeout=10)
+        assert stranger.close_code == 1008
+    with connect(address, origin=plain.url, subprotocols=protocol) as own:  # pyright: ignore
+        assert own.recv(timeout=10)
+
+
+def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=r"in use.*--port"):
+            serve(port=port, open_browser=False)
+    with pytest.raises(InputError, match="--host"):
+        serve(host="203.0.113.7", port=0, open_browser=False)
+    with pytest.raises(InputError, match="Port 70000"):
+        serve(port=70_000, open_browser=False)
+    with pytest.raises(InputError, match="iiwa14-hold"):
+        serve(scene="iiwa14-hodl", open_browser=False)
+    with pytest.raises(InputError):
+        serve(scene="hold", urdf="/nowhere.urdf", open_browser=False)
+    with pytest.raises(InputError, match="1 or more"):
+        serve(max_sessions=0, open_browser=False)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
+    code = "from app.server import serve; import sys; sys.exit(serve(port=0, open_browser=False))"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert line.startswith("himpc-lab ready at http://127.0.0.1:")
+    found = psutil.Process(process.pid)
+    assert wait_until(lambda: bool(found.children(recursive=True)), 20.0)
+    children = found.children(recursive=True)
+    process.send_signal(number)
+    out, errors = process.communicate(timeout=30)
+    assert process.returncode == 0, errors
+    assert out == "" and "Traceback" not in errors
+    assert wait_until(lambda: not any(child.is_running() for child in children), 10.0)

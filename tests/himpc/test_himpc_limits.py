@@ -1,0 +1,233 @@
+"""Limits: a joint that can always still stop, bounds that never cross, and tightening without a jolt."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
+from himpc.limits.rows import least_slack
+from himpc.limits.viability import RETURN_RATE, viability_bounds
+from himpc.prediction.joint import JointState
+from robots import InputError, load_robot
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+
+
+def bounds_at(q: float, low: float, high: float, v_max: float, a: float, reaction: float) -> tuple[float, float]:
+    lower, upper = viability_bounds(*(np.array([x]) for x in (q, low, high, v_max, a)), reaction)
+    return float(lower[0]), float(upper[0])
+
+
+@given(
+    seeds, st.floats(0.5, 6), st.floats(0.3, 10), st.floats(1, 40), st.floats(1e-3, 1e-2), st.floats(1, 50)
+)
+@settings(max_examples=100)
+def test_a_joint_inside_the_viable_set_never_passes_its_limit(
+    seed: int, span: float, v_max: float, a: float, T_s: float, later: float
+) -> None:
+    """Whatever velocity is wanted, braking with a_max keeps the double integrator inside."""
+    rng = np.random.default_rng(seed)
+    low, high, reaction = -0.4 * span, 0.6 * span, T_s * later
+    q = rng.uniform(low, high)
+    v = rng.uniform(*bounds_at(q, low, high, v_max, a, reaction))
+    outward = rng.random() < 0.5
+    for k in range(400):
+        if k % 40 == 0:
+            wanted = rng.uniform(-2, 2) * v_max if not outward else rng.choice([-1, 1]) * v_max
+        # It stops with the velocity of now for one period, then with a_max: the printed bound's promise.
+        q += T_s * v
+        lower, upper = bounds_at(q, low, high, v_max, a, reaction)
+        assert lower <= upper
+        # Braking beyond a_max is what the bound must never ask for.
+        assert upper >= v - a * T_s - 1e-9 or v < 0
+        assert lower <= v + a * T_s + 1e-9 or v > 0
+        v = min(max(wanted, lower, v - a * T_s), upper, v + a * T_s)
+        assert low - 1e-9 <= q <= high + 1e-9
+        assert abs(v) <= v_max + 1e-9
+
+
+@given(seeds, st.booleans())
+@settings(max_examples=100)
+def test_bounds_never_cross(seed: int, unbounded: bool) -> None:
+    """lower ≤ upper for every joint, far beyond the limits and without any as well."""
+    rng = np.random.default_rng(seed)
+    n = 6
+    low, high = np.sort(rng.normal(0, 10 ** rng.uniform(-6, 2), (2, n)), axis=0)
+    if unbounded:
+        low[:2], high[1:3] = -np.inf, np.inf
+    v_max = np.where(rng.random(n) < 0.2, np.inf, 10 ** rng.uniform(-2, 2, n))
+    q = rng.normal(0, 10 ** rng.uniform(-3, 6), n)
+    lower, upper = viability_bounds(q, low, high, v_max, 10 ** rng.uniform(-1, 2, n), 1e-3)
+    assert (lower <= upper).all()
+    assert not np.isnan([lower, upper]).any()
+
+
+def test_beyond_a_limit_the_joint_must_return() -> None:
+    """Past the limit the bound asks for a velocity back, in proportion to the excess and within the limit."""
+    assert bounds_at(1.1, -1.0, 1.0, 2.0, 10.0, 1e-3)[1] == pytest.approx(-RETURN_RATE * 0.1)
+    assert bounds_at(-1.1, -1.0, 1.0, 2.0, 10.0, 1e-3)[0] == pytest.approx(RETURN_RATE * 0.1)
+    assert bounds_at(9.0, -1.0, 1.0, 2.0, 10.0, 1e-3) == (-2.0, -2.0)
+
+
+# ------------------------------------------------------------------ rows
+
+
+@given(seeds, st.integers(1, 6), st.integers(1, 10), st.sampled_from(["viability", "paper", "off"]))
+@settings(max_examples=100)
+def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: Any) -> None:
+    """A row is met exactly when the predicted torque, velocity or position is inside its bound."""
+    rng = np.random.default_rng(seed)
+    T_s, M_bar = 1e-3, 10 ** rng.uniform(-3, 0, n)
+    state = JointState(*rng.normal(0, [[1], [2], [30]], (3, n)))
+    force = random_force(rng, n)
+    limits = Limits(position=position, velocity_approach=0.0)
+    tau_0, U = rng.normal(0, 5, n), rng.normal(0, 1, (N, n))
+    rows = build_rows(state, tau_0, M_bar, limits, force, N, T_s)
+    value = rows.L @ U
+    assert rows.kinds == (("torque", "velocity", "position") if position == "paper" else ("torque", "velocity"))
+    np.testing.assert_allclose(rows.lower[:N], np.tile(force.tau_lower - tau_0, (N, 1)))
+    v, q, a, tau = state.v.copy(), state.q.copy(), state.a.copy(), tau_0.copy()
+    v_bounds = np.stack([-force.v_limit, force.v_limit])
+    if position == "viability":
+        v_bounds = viability_bounds(state.q, force.q_lower, force.q_upper, force.v_limit, force.a_max, T_s)
+    for j in range(N):
+        tau, a, q = tau + U[j], a + U[j] / M_bar, q + T_s * v
+        v = v + T_s * a
+        np.testing.assert_allclose(rows.upper[j] - value[j], force.tau_upper - tau, atol=1e-9)
+        room = (rows.upper[N + j] - value[N + j]) * T_s / M_bar
+        np.testing.assert_allclose(room, v_bounds[1] - v, atol=1e-8)
+        if position == "paper":
+            room = (value[2 * N + j] - rows.lower[2 * N + j]) * T_s**2 / M_bar
+            np.testing.assert_allclose(room, q - force.q_lower, atol=1e-8)
+
+
+def random_force(rng: np.random.Generator, n: int) -> LimitsInForce:
+    tau = 10 ** rng.uniform(0, 2, n)
+    low, high = np.sort(rng.normal(0, 2, (2, n)), axis=0)
+    return LimitsInForce(-tau, tau, 10 ** rng.uniform(-1, 1, n), low, high, 10 ** rng.uniform(0, 1.5, n))
+
+
+@given(seeds, st.integers(1, 8), st.sampled_from(["viability", "off"]), st.floats(0, 200))
+@settings(max_examples=100)
+def test_rows_that_can_be_met_need_no_slack(seed: int, N: int, position: Any, approach: float) -> None:
+    """For a robot inside its bounds and strong enough to follow them the least slack is zero."""
+    rng = np.random.default_rng(seed)
+    n, T_s = 5, 1e-3
+    M_bar = 10 ** rng.uniform(-3, 0, n)
+    force = random_force(rng, n)
+    q = rng.uniform(force.q_lower, force.q_upper)
+    low, high = viability_bounds(q, force.q_lower, force.q_upper, force.v_limit, force.a_max, 0.06)
+    state = JointState(q, 0.9 * rng.uniform(low, high), rng.normal(0, 5, n))
+    tau_0 = 0.5 * rng.uniform(force.tau_lower, force.tau_upper)
+    # Strong enough to cancel q̈ and to brake at 200 1/s times the velocity left.
+    strong = np.maximum(force.tau_upper, 2 * np.abs(tau_0) + 1e3 * (1 + np.abs(state.v) + np.abs(state.a)))
+    force = LimitsInForce(-strong, strong, force.v_limit, force.q_lower, force.q_upper, force.a_max)
+    limits = Limits(position=position, velocity_approach=approach)
+    rows = build_rows(state, tau_0, M_bar, limits, force, N, T_s)
+    assert least_slack(rows).max() <= 1e-9 * strong.max()
+
+
+# ------------------------------------------------------------------ ramp
+
+
+def force_of(**changes: float) -> LimitsInForce:
+    values = {"tau": 10.0, "v": 2.0, "q_low": -1.0, "q_high": 1.0} | changes
+    one = np.ones(1)
+    return LimitsInForce(
+        -values["tau"] * one, values["tau"] * one, values["v"] * one, values["q_low"] * one,
+        values["q_high"] * one, 10 * one,
+    )  # fmt: skip
+
+
+FIELDS = ("tau_lower", "tau_upper", "v_limit", "q_lower", "q_upper")
+
+
+def settled(now: LimitsInForce, goal: LimitsInForce, tau: float, q: float, v: float) -> list[LimitsInForce]:
+    """What is in force tick by tick while the robot stays where it is, until the goal is reached."""
+    path = [now]
+    for _ in range(20_000):
+        if path[-1] is goal:
+            return path
+        path.append(ramp(path[-1], goal, *(np.array([x]) for x in (tau, q, v)), 1e-3))
+    raise AssertionError("the limits never arrived")
+
+
+def test_loosened_limits_hold_at_once() -> None:
+    """Nothing is ever violated by more room, so there is no wait."""
+    wide = force_of(tau=20.0, v=4.0, q_low=-2.0, q_high=2.0)
+    assert len(settled(force_of(), wide, 9.0, 0.5, 1.0)) == 2
+
+
+@given(st.floats(-10, 10), st.floats(-1, 1), st.floats(-2, 2))
+@settings(max_examples=40)
+def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) -> None:
+    """Never past the present value in one tick, never wider again, and there in the end."""
+    goal = force_of(tau=3.0, v=0.5, q_low=-0.2, q_high=0.3)
+    path = settled(force_of(), goal, tau, q, v)
+    seconds = 1e-3 * len(path)
+    assert seconds <= 6.0
+    first = path[1]
+    # The first bounds contain the present state but for one tick's share of closing in.
+    share = 10.0 * 1e-3 / 0.5
+    assert first.tau_upper[0] >= max(tau, 3.0) - 10 * share
+    assert first.tau_lower[0] <= min(tau, -3.0) + 10 * share
+    assert first.v_limit[0] >= max(abs(v), 0.5) - 2 * share
+    assert first.q_upper[0] >= max(q, 0.3) - share
+    assert first.q_lower[0] <= min(q, -0.2) + share
+    for before, after in zip(path[1:], path[2:], strict=False):
+        assert after.tau_upper[0] <= before.tau_upper[0]
+        assert after.tau_lower[0] >= before.tau_lower[0]
+        assert after.v_limit[0] <= before.v_limit[0]
+        assert before.tau_upper[0] - after.tau_upper[0] <= 10 * share
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(path[-1], field), getattr(goal, field))
+
+
+def test_limits_switched_on_start_from_the_present() -> None:
+    """From no limits at all the first bound is the present value, not the limit itself."""
+    nothing = force_of(tau=np.inf, v=np.inf, q_low=-np.inf, q_high=np.inf)
+    first = ramp(nothing, force_of(), np.array([15.0]), np.array([1.4]), np.array([-3.0]), 1e-3)
+    assert first.tau_upper[0] == pytest.approx(15.0, abs=0.05)
+    assert first.tau_lower[0] == -10.0
+    assert first.v_limit[0] == pytest.approx(3.0, abs=0.01)
+    assert first.q_upper[0] == pytest.approx(1.4, abs=0.01)
+    assert first.q_lower[0] == -1.0
+
+
+# ------------------------------------------------------------------ settings
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("torque_scale", 0.0),
+        ("torque_scale", np.nan),
+        ("velocity_scale", -1.0),
+        ("velocity_scale", np.inf),
+        ("velocity_approach", -1.0),
+        ("velocity_approach", np.nan),
+        ("position", "sometimes"),
+    ],
+)
+def test_impossible_limits_are_refused(field: str, value: Any) -> None:
+    """One sentence that names the field."""
+    with pytest.raises(InputError, match=field):
+        Limits(**{field: value})
+
+
+def test_scales_and_switches_reach_the_bounds_in_force() -> None:
+    robot = load_robot("iiwa14")
+    force = in_force(robot, Limits(torque_scale=0.5, velocity_scale=2.0))
+    np.testing.assert_allclose(force.tau_upper, 0.5 * robot.tau_limit)
+    np.testing.assert_allclose(force.tau_lower, -0.5 * robot.tau_limit)
+    np.testing.assert_allclose(force.v_limit, 2 * robot.v_limit)
+    np.testing.assert_allclose(force.q_upper, robot.q_upper)
+    off = in_force(robot, Limits(torque=False, velocity=False, position="off"))
+    assert all(np.isinf(getattr(off, field)).all() for field in FIELDS)
