@@ -9,6 +9,7 @@ import json
 import signal
 import socket
 import threading
+import warnings
 import webbrowser
 from collections.abc import Iterator
 from urllib.parse import urlsplit
@@ -86,6 +87,8 @@ class PageServer:
         # Loaded here once, so that a wrong name or file is one sentence on the terminal, not in a page.
         robot = load_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text).robot
         _check_address(host, port)
+        # A tab may close between two lines of ours; that is no news for the terminal.
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self.sessions = Sessions(choice, max_sessions, grace)
         self._pages: dict[int, Page] = {}
         self._lock = threading.Lock()

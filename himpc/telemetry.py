@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.cascade import RUNGS
+from himpc.cascade.level import ActiveRows
 from himpc.configuration import Configuration
+from himpc.limits import Rows
 from himpc.plan import Plan
 from himpc.rotation import quaternion
 from himpc.stack import DAMPING_LEVEL, Stack
@@ -111,20 +113,22 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
     row[fields["step_us"]] = plan.step_us
     row[fields["priority_leak"]] = np.nan if plan.leak is None else plan.leak
     row[fields["unsolved"]] = plan.unsolved
-    row[fields["tau_demand"]] = plan.tau
-    row[fields["tau_lower"]] = plan.limits.tau_lower
-    row[fields["tau_upper"]] = plan.limits.tau_upper
-    row[fields["v_limit"]] = plan.limits.v_limit
-    row[fields["q_lower"]] = plan.limits.q_lower
-    row[fields["q_upper"]] = plan.limits.q_upper
     row[fields["delta_tau"]] = plan.tau - plan.tau_0
+    # Six fields of n numbers each that stand side by side in the order of _PER_JOINT.
+    limits = plan.limits
+    block = row[fields["tau_demand"].start : fields["q_upper"].stop].reshape(6, -1)
+    block[0], block[1], block[2] = plan.tau, limits.tau_lower, limits.tau_upper
+    block[3], block[4], block[5] = limits.v_limit, limits.q_lower, limits.q_upper
     for name, value in plan.values.items():
-        if f"x/{name}" in fields:
-            row[fields[f"x/{name}"]] = quaternion(value) if value.ndim == 2 else value
+        where = fields.get(f"x/{name}")
+        if where is not None:
+            row[where] = quaternion(value) if value.ndim == 2 else value
             row[fields[f"error/{name}"]] = plan.errors[name]
-    at_bound = np.zeros(len(layout.joints))
+    row[fields["at_bound"]] = 0.0
     for level in plan.levels:
-        values = (
+        # The per-level fields stand side by side in the order of _PER_LEVEL.
+        start = fields[f"cost/{level.name}"].start
+        row[start : start + len(_PER_LEVEL)] = (
             level.cost,
             level.kkt_residual,
             RUNGS.index(level.rung),
@@ -132,13 +136,14 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
             level.leak,
             len(level.active),
         )
-        # The per-level fields stand side by side in the order of _PER_LEVEL.
-        start = fields[f"cost/{level.name}"].start
-        row[start : start + len(values)] = values
         if len(level.active):
-            block = level.active.row // plan.rows.L.shape[1]
-            for bit, kind in enumerate(("torque", "velocity", "position")):
-                mine = [k == kind for k in plan.rows.kinds]
-                hit = level.active.joint[np.asarray(mine)[block]]
-                at_bound[hit] = at_bound[hit].astype(int) | (1 << bit)
-    row[fields["at_bound"]] = at_bound
+            _mark_bounds(row[fields["at_bound"]], level.active, plan.rows)
+
+
+_BITS = {"torque": AT_TORQUE, "velocity": AT_VELOCITY, "position": AT_POSITION}
+
+
+def _mark_bounds(at_bound: Array, active: ActiveRows, rows: Rows) -> None:
+    N = rows.L.shape[1]
+    for row, joint in zip(active.row.tolist(), active.joint.tolist(), strict=True):
+        at_bound[joint] = int(at_bound[joint]) | _BITS[rows.kinds[row // N]]

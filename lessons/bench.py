@@ -70,8 +70,8 @@ def bench(
                         steps[key].append(session.plan.step_us / 1e3)
                         solves[key].append(sum(level.qp_us for level in session.plan.levels) / 1e3)
         timings += [
-            Timing(N, *key, len(steps[key]), _spread(steps[key]), float(np.median(solves[key])))
-            for key in sessions
+            Timing(N, route, solver, len(times), _spread(times), float(np.median(solves[route, solver])))
+            for (route, solver), times in steps.items()
         ]
         if progress is not None:
             progress((place + 1) / len(horizons))

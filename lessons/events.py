@@ -62,9 +62,10 @@ def from_data(data: dict[str, Any]) -> Event:
     """The inverse of `as_data`. Raises InputError for data that is no event."""
     fields = dict(data)
     kind = _KINDS.get(str(fields.pop("event", "")))
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
     try:
         if kind is None:
             raise TypeError
-        return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+        return kind(**values)
     except TypeError:
         raise InputError(f"{data} is no event: its kind must be one of {', '.join(_KINDS)}") from None

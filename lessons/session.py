@@ -26,8 +26,8 @@ from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
 
-GAUGE_TICKS = 20
-"""The gauge of M̄ changes with the configuration only: it is refreshed this often."""
+TRUTH_TICKS = 5
+"""What needs the plant's M (the gauge of M̄ and the honest leak) is refreshed every so many ticks."""
 
 LOST_POSITION = 0.5
 """m: a level-1 position error above this counts as divergence."""
@@ -84,7 +84,7 @@ class Session:
         self._script = deque(scene.events)
         self._push_until = math.inf
         self._ticks = 0
-        self._gauge = (math.nan, math.nan)
+        self._truth = (math.nan, math.nan, math.nan)
 
     def _fresh_references(self) -> dict[str, Reference]:
         given = dict(self.scene.references(self.robot, self.settings.levels))
@@ -131,7 +131,7 @@ class Session:
                 if not (math.isfinite(seconds) and seconds > 0):
                     raise InputError(f"a push of {seconds} s cannot be: give a time above 0")
                 try:
-                    self.plant.push(body, force, torque)
+                    self.plant.push(body, np.array(force), np.array(torque))
                 except InputError:
                     raise
                 except ValueError as error:
@@ -212,20 +212,18 @@ class Session:
             row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
 
     def _write_truth(self, row: Array, plan: Plan, q: Array) -> None:
-        """What only the plant's M can tell: the gauge of M̄ and the honest leak."""
-        fields = self.layout.fields
-        solved = [level for level in plan.levels if level.rung != "hold"]
-        if np.isfinite(q).all():
+        """What only the plant's M can tell: the gauge of M̄ and the honest leak, held between refreshes."""
+        if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
-            if self._ticks % GAUGE_TICKS == 0:
-                M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
-                self._gauge = convergence_gauge(M, M_bar)
-            if len(solved) > 1:
-                row[fields["dynamic_leak"]] = self._dynamic_leak(M, plan, q)
-        row[fields["gauge_norm"]], row[fields["gauge_radius"]] = self._gauge
+            M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
+            leak = self._dynamic_leak(M, plan, q) if len(plan.levels) > 1 else math.nan
+            self._truth = (leak, *convergence_gauge(M, M_bar))
+        # The layout puts these three side by side.
+        start = self.layout.fields["dynamic_leak"].start
+        row[start : start + 3] = self._truth
 
     def _dynamic_leak(self, M: Array, plan: Plan, q: Array) -> float:
-        """max over p of ‖J_p M⁻¹(τ − τ_{≤p})‖∞ with the plant's M: what lower levels really do to upper ones."""
+        """max over p of ‖J_p M⁻¹(τ − τ_{≤p})‖∞ with the plant's M: what lower levels really do."""
         first = np.array([level.U[0] for level in plan.levels])
         acceleration = np.linalg.solve(M, (first[-1] - first[:-1]).T)
         tasks = {level.name: level.tasks for level in self.settings.levels}
@@ -238,16 +236,16 @@ class Session:
 
     def _is_lost(self, q: Array, v: Array, plan: Plan) -> bool:
         # A comparison with NaN is false, so "all within" also catches what is not finite.
-        if not (np.abs(v) <= LOST_SPEED * self.robot.v_limit).all() or not np.isfinite(q).all():
+        if not float((np.abs(v) / self.robot.v_limit).max()) <= LOST_SPEED or not math.isfinite(
+            float(q.sum())
+        ):
             return True
-        for level in self.settings.levels:
-            if level.enabled:
-                return any(
-                    isinstance(task, FramePosition) and np.linalg.norm(plan.errors[task.name]) > LOST_POSITION
-                    for task in level.tasks
-                    if task.name in plan.errors
-                )
-        return False
+        first = next((level for level in self.settings.levels if level.enabled), None)
+        return first is not None and any(
+            isinstance(task, FramePosition) and float(np.linalg.norm(plan.errors[task.name])) > LOST_POSITION
+            for task in first.tasks
+            if task.name in plan.errors
+        )
 
     # ------------------------------------------------------------- views
 

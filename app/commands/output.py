@@ -11,7 +11,7 @@ from robots import InputError
 
 
 def write_json(data: Any, target: str) -> None:
-    """Writes JSON to a file, or to standard output for "-". Raises InputError if the file cannot be written."""
+    """Writes JSON to a file, or to standard output for "-". Raises InputError if it cannot."""
     text = json.dumps(data, indent=2, allow_nan=False, default=float)
     if target == "-":
         print(text)

@@ -78,7 +78,7 @@ def _quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=8)
 def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
-    return np.kron(np.frombuffer(L).reshape(shape), np.eye(n))
+    return np.asarray(np.kron(np.frombuffer(L).reshape(shape), np.eye(n)), np.float64)
 
 
 def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) -> Iterator[Array]:

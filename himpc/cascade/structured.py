@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dposv
+from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]
 
 from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, Point
 from himpc.limits.rows import Rows
 from himpc.qp import KKT_TOLERANCE, Solver, solve_qp
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 _TOLERANCE = 1e-9
 """N·m: a row violated by less counts as met."""
@@ -102,7 +103,7 @@ def _metric_basis(Z: Array, R: Array) -> Array:
     return Z @ np.linalg.inv(np.linalg.cholesky(gram)).transpose(0, 2, 1)
 
 
-def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple[Point | None, Array | None]:
+def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple[Point | None, Mask | None]:
     """The optimum with some rows as equalities, and the mask of rows it violates (None: none).
 
     The point is None where the rows are dependent, a multiplier has the wrong sign or the KKT
@@ -166,7 +167,7 @@ def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple
     return Point(U, found, kkt, "optimal", error), _violated(rows, U)
 
 
-def _violated(rows: Rows, U: Array) -> NDArray[np.bool_] | None:
+def _violated(rows: Rows, U: Array) -> Mask | None:
     """Mask (r, n) of the rows that U violates, None if there are none."""
     value = rows.L @ U
     mask = (value > rows.upper + _TOLERANCE) | (value < rows.lower - _TOLERANCE)
@@ -177,7 +178,7 @@ def _norm(x: Array) -> float:
     return math.sqrt(float(np.vdot(x, x)))
 
 
-def _with_rows(quadratic: _Quadratic, rows: Rows, mask: NDArray[np.bool_], solver: Solver) -> Point | None:
+def _with_rows(quadratic: _Quadratic, rows: Rows, mask: Mask, solver: Solver) -> Point | None:
     """The QP with the masked rows, and with more of them until no row is violated."""
     G, U_above = quadratic.G, quadratic.U_above
     H = G.T @ G

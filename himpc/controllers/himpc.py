@@ -73,7 +73,7 @@ class Settings:
 
 
 class HIMPC:
-    """The controller. It reads geometry and limits of the robot, never a mass: the model is time-delay estimation.
+    """Reads geometry and limits of the robot, never a mass: time-delay estimation is the model.
 
     One `step` per period T_s. What it remembers between steps is the torque that was applied (τ₀), the
     previous velocities (for q̈ and ẍ by backward difference) and the previous plan (for the Jacobians
@@ -102,7 +102,7 @@ class HIMPC:
         self._weight: dict[str, float] = {}
 
     def configure(self, settings: Settings) -> None:
-        """Takes new settings at once. Raises InputError, and changes nothing, if they do not fit the robot."""
+        """Takes new settings at once. If they do not fit the robot: InputError, and nothing changes."""
         before = {form.level.name for form in self._form.levels}
         self._apply(settings)
         for form in self._form.levels:
@@ -112,7 +112,7 @@ class HIMPC:
     def _apply(self, settings: Settings) -> None:
         if len(settings.M_bar) != self.robot.n:
             raise InputError(
-                f"M_bar has {len(settings.M_bar)} entries: robot '{self.robot.name}' has {self.robot.n} joints"
+                f"M_bar has {len(settings.M_bar)} entries: '{self.robot.name}' has {self.robot.n} joints"
             )
         freedom = freedom_left(self.robot, settings.stack)
         active = active_levels(settings.stack, settings.damping, freedom)

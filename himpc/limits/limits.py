@@ -42,9 +42,10 @@ class Limits:
             value = getattr(self, field)
             if not (np.isfinite(value) and value > 0):
                 raise InputError(f"limits.{field} is {value}: give a finite number above 0, e.g. 1")
-        if not (np.isfinite(self.velocity_approach) and self.velocity_approach >= 0):
+        rate = self.velocity_approach
+        if not (rate == 0 or 1 <= rate <= 1e4):
             raise InputError(
-                f"limits.velocity_approach is {self.velocity_approach}: give a rate ≥ 0 in 1/s (0: as printed)"
+                f"limits.velocity_approach is {rate}: give a rate from 1 to 10000 1/s, or 0 for (32e) as printed"
             )
         if self.position not in ("viability", "paper", "off"):
             raise InputError(f"limits.position is '{self.position}': choose viability, paper or off")

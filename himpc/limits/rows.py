@@ -68,7 +68,7 @@ def _toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
 
 @lru_cache(maxsize=64)
 def _remaining(N: int, rate: float) -> Array:
-    return (1.0 - rate) ** np.arange(1.0, N + 1)[:, None]
+    return np.asarray((1.0 - rate) ** np.arange(1.0, N + 1)[:, None], np.float64)
 
 
 def build_rows(

@@ -31,7 +31,7 @@ class JointState:
 
 @lru_cache(maxsize=64)
 def _steps(N: int, T_s: float) -> Array:
-    return T_s * np.arange(1.0, N + 1)[:, None]
+    return np.asarray(T_s * np.arange(1.0, N + 1)[:, None], np.float64)
 
 
 @lru_cache(maxsize=64)

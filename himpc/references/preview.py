@@ -43,4 +43,4 @@ def sampled(position: Array, velocity: Array, acceleration: Array) -> Preview:
 
 def times(t: float, T_s: float, N: int) -> Array:
     """t + T_s·(0 … N), seconds."""
-    return t + T_s * np.arange(N + 1)
+    return np.asarray(t + T_s * np.arange(N + 1), np.float64)

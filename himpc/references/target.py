@@ -123,7 +123,8 @@ class Target:
 
     def _next(self, now: _Sample, T_s: float) -> _Sample:
         if now.value is self.raw:
-            return now
+            zero = np.zeros_like(now.velocity)
+            return _Sample(self.raw, zero, zero, zero)
         caps = self.caps
         away = self._distance(now.value)
         distance = math.sqrt(float(away @ away))
@@ -135,12 +136,33 @@ class Target:
         wanted_speed = min(caps.speed, _APPROACH * distance, math.sqrt(caps.acceleration * distance))
         wanted = away * (wanted_speed / distance) if distance > 0 else 0 * away
         acceleration = _limited(_RATE * (wanted - now.velocity), caps.acceleration)
-        acceleration = now.acceleration + _limited(acceleration - now.acceleration, caps.jerk * T_s)
+        acceleration = now.acceleration + _change(now, acceleration, speed, caps, T_s)
         velocity = _limited(now.velocity + T_s * acceleration, caps.speed)
         acceleration = (velocity - now.velocity) / T_s
         step = 0.5 * T_s * (now.velocity + velocity)
         value = exp3(step) @ now.value if self._rotation else now.value + step
         return _Sample(value, velocity, acceleration, step)
+
+
+def _change(now: _Sample, wanted: Array, speed: float, caps: Caps, T_s: float) -> Array:
+    """How the acceleration changes in one period towards the one wanted, within the jerk cap.
+
+    Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
+    half of what a straight line would allow, since in a curve speed also grows by itself. If it is above
+    already, coming down has the first claim on the jerk.
+    """
+    budget = caps.jerk * T_s
+    if speed == 0.0:
+        return _limited(wanted - now.acceleration, budget)
+    forward = now.velocity / speed
+    most = math.sqrt(caps.jerk * max(caps.speed - speed, 0.0))
+    wanted = wanted - max(float(wanted @ forward) - most, 0.0) * forward
+    change = wanted - now.acceleration
+    if float(now.acceleration @ forward) <= most:
+        return _limited(change, budget)
+    along = max(float(change @ forward), -budget)
+    across = change - float(change @ forward) * forward
+    return along * forward + _limited(across, math.sqrt(max(budget**2 - along**2, 0.0)))
 
 
 def _limited(vector: Array, cap: float) -> Array:

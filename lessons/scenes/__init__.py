@@ -15,7 +15,7 @@ SCENES: dict[str, str] = {
     "panda-hold": "Franka Panda: the same three levels",
     "planar3-hold": "planar 3-joint arm: the same, in its plane",
     "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
-    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, level 2 upright, level 3 swings joint 1",
+    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, upright, while joint 1 swings",
 }
 """One line per scene."""
 

@@ -37,11 +37,10 @@ def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> Sce
 def _hold(robot: Robot, plant: PlantSettings) -> Scene:
     position_axes, orientation_axes = _free_axes(robot)
     K_p, K_v = gains(robot, plant)
-    task = {"K_p": K_p, "K_v": K_v}
-    levels = [Level((FramePosition(name="position", axes=position_axes, **task),))]
+    levels = [Level((FramePosition(name="position", axes=position_axes, K_p=K_p, K_v=K_v),))]
     if orientation_axes:
-        levels.append(Level((FrameOrientation(name="orientation", axes=orientation_axes, **task),)))
-    levels.append(Level((Posture(name="posture", **task),)))
+        levels.append(Level((FrameOrientation(name="orientation", axes=orientation_axes, K_p=K_p, K_v=K_v),)))
+    levels.append(Level((Posture(name="posture", K_p=K_p, K_v=K_v),)))
     return Scene(
         name="hold",
         title=f"{robot.name}: drag the target; position, then orientation, then posture",

@@ -76,7 +76,7 @@ def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: 
     tab(page, "Tasks")
     key(page, "2")
     assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[1].enabled)
-    expect(page.get_by_text("OFF").first).to_be_visible()
+    expect(page.get_by_text("OFF", exact=True).first).to_be_visible()
     drag_target(page, axis=2, along=0.2)
     assert eventually(page, lambda: error(learner, "orientation") > np.radians(3.0))
     assert eventually(page, lambda: error(learner, "position") < 2e-3)

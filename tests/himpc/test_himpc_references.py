@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from himpc.references import (
+    JOINT_CAPS,
+    POSITION_CAPS,
+    ROTATION_CAPS,
     Caps,
     Circle,
     FigureEight,
@@ -125,14 +128,11 @@ def step_between(one: Array, other: Array) -> Array:
     return log3(other @ one.T) if one.ndim == 2 else other - one
 
 
-@given(seed=seeds, speed=st.floats(0.1, 2), acceleration=st.floats(0.5, 20), jerk=st.floats(20, 500))
-@settings(max_examples=25)
-def test_a_dragged_position_keeps_its_caps_and_its_promises(
-    seed: int, speed: float, acceleration: float, jerk: float
-) -> None:
+@given(seed=seeds, caps=st.sampled_from([POSITION_CAPS, ROTATION_CAPS, JOINT_CAPS]))
+@settings(max_examples=20)
+def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Caps) -> None:
     """Speed, acceleration and jerk stay within their caps however the hand moves, and derivatives fit."""
     rng = np.random.default_rng(seed)
-    caps = Caps(speed, acceleration, jerk)
     target = Target(rng.normal(0, 1, 3), caps)
     moves = {int(k): rng.normal(0, 10 ** rng.uniform(-3, 0.3), 3) for k in rng.integers(0, 400, 5)}
     previews = drive(target, 500, lambda k: moves.get(k))
@@ -194,7 +194,8 @@ def test_a_hand_moved_in_mid_motion_leaves_no_jump() -> None:
     assert np.linalg.norm(velocity, axis=1).max() > 0.3
     assert np.linalg.norm(np.diff(velocity, axis=0), axis=1).max() <= 2.0 * T_S + 1e-12
     assert np.linalg.norm(np.diff(value, axis=0), axis=1).max() <= 0.5 * T_S + 1e-12
-    np.testing.assert_array_equal(previews[350].value, value[349] + previews[349].displacement[1])
+    acceleration = np.array([p.acceleration[0] for p in previews])
+    assert np.linalg.norm(np.diff(acceleration, axis=0), axis=1).max() <= 40.0 * T_S * (1 + 1e-9)
 
 
 def test_changed_horizon_and_period_go_on_smoothly() -> None:
