@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 
 # Before NumPy is imported anywhere: the matrices are tiny, and threads only fight over the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("same-every-time", derandomize=True, deadline=None, database=None)
 settings.load_profile("same-every-time")
+
+
+@pytest.fixture(scope="session")
+def example_urdf() -> Callable[[str], str]:
+    """Path of a URDF of example-robot-data; skips where the extra `meshes` is not installed."""
+    import pinocchio
+
+    def find(path: str) -> str:
+        for parent in Path(pinocchio.__file__).parents:
+            found = parent / "share" / "example-robot-data" / "robots" / path
+            if found.exists():
+                return str(found)
+        pytest.skip(f"{path} of example-robot-data is not installed: pip install -e '.[meshes]'")
+
+    return find

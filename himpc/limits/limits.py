@@ -45,7 +45,7 @@ class Limits:
         rate = self.velocity_approach
         if not (rate == 0 or 1 <= rate <= 1e4):
             raise InputError(
-                f"limits.velocity_approach is {rate}: give a rate from 1 to 10000 1/s, or 0 for (32e) as printed"
+                f"limits.velocity_approach is {rate}: give 1 to 10000 (1/s), or 0 for (32e) as printed"
             )
         if self.position not in ("viability", "paper", "off"):
             raise InputError(f"limits.position is '{self.position}': choose viability, paper or off")

@@ -129,7 +129,7 @@ def step_between(one: Array, other: Array) -> Array:
 
 
 @given(seed=seeds, caps=st.sampled_from([POSITION_CAPS, ROTATION_CAPS, JOINT_CAPS]))
-@settings(max_examples=20)
+@settings(max_examples=12)
 def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Caps) -> None:
     """Speed, acceleration and jerk stay within their caps however the hand moves, and derivatives fit."""
     rng = np.random.default_rng(seed)
@@ -143,7 +143,7 @@ def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Cap
 
 
 @given(seed=seeds, angle=st.floats(0.01, np.pi))
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: float) -> None:
     """The same on SO(3), for any turn up to half a revolution, and the preview's vectors are world axes."""
     rng = np.random.default_rng(seed)
