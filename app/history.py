@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from app.block import Block
-from himpc.telemetry import Layout
+from himpc.telemetry import AT_POSITION, AT_VELOCITY, Layout
 
 BUCKETS = 160
+_SLOW = 0.85  # of the velocity limit: the controller keeps a few per cent free of its own
 
 
 class History:
@@ -43,6 +44,7 @@ class History:
         self.latest = rows[-1]
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
+        bits = self._viable(bits, rows)
         for k in range(3):
             self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
         numbers = (start + np.arange(len(rows))) // self._size
@@ -51,6 +53,14 @@ class History:
             self._merge(int(bucket), rows[of_bucket])
             self._bits[-1] |= np.bitwise_or.reduce(bits[of_bucket], axis=0)
         return len(rows)
+
+    def _viable(self, bits: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """A joint held by its velocity row far below its velocity limit is really held by its position
+        limit: viability writes that one as a bound on the speed."""
+        fields = self.layout.fields
+        slow = np.abs(rows[:, fields["v"]]) < _SLOW * rows[:, fields["v_limit"]]
+        by_position = (bits & AT_VELOCITY != 0) & slow
+        return np.where(by_position, (bits & ~AT_VELOCITY) | AT_POSITION, bits)
 
     def _merge(self, bucket: int, rows: np.ndarray) -> None:
         if bucket != self._bucket:

@@ -10,7 +10,7 @@ import viser.transforms as vtf
 
 from app.judge import Judge, Question, Verdict
 from app.learner import Learner
-from app.messages import Post, Ready, SceneChoice, TaskView
+from app.messages import Post, Ready, SceneChoice
 from app.palette import LEVELS, level_colours
 from app.panels.bind import Bindings
 from app.panels.binding import BindingPanel
@@ -24,6 +24,7 @@ from app.panels.robot import RobotPanel
 from app.panels.snapshot import Snapshot
 from app.panels.start import StartPanel
 from app.panels.tasks import TasksPanel
+from app.view.coordinates import draggable, full, in_order, raw, xyzw
 from app.view.robot import RobotView, camera_for
 from app.view.target import Frames, TargetGizmo
 from app.view.trails import Trails
@@ -48,12 +49,13 @@ class Stage:
         by_path: bool,
     ) -> None:
         self._client, self._learner, self._ready = client, learner, ready
-        self._colours = level_colours([task.level for task in _in_order(ready)])
+        self._theme, self._dark = theme, dark
+        self._colours = level_colours([task.level for task in in_order(ready)])
         self._verdict: Verdict | None = None
         self._resets: int | None = None
         self._T_s = ready.settings.T_s
         self._judge: Judge | None = None
-        self._build_panels(client.gui, scenes, dark, choose, theme, by_path)
+        self._build_panels(client.gui, scenes, choose, by_path)
         self._build_scene(client)
 
     # ---------------------------------------------------------------- building
@@ -62,18 +64,16 @@ class Stage:
         self,
         gui: viser.GuiApi,
         scenes: Mapping[str, str],
-        dark: bool,
         choose: Callable[[SceneChoice], None],
-        theme: Callable[[bool], None],
         by_path: bool,
     ) -> None:
         ready, settings = self._ready, self._learner.settings or self._ready.settings
-        draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
+        by_hand = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         self._bindings = Bindings(self._post)
         self._playback = PlaybackPanel(gui, self._learner)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Start"):
-            self._start = StartPanel(gui, self._post, ready.robot.joint_names, draggable, dark)
+            self._start = StartPanel(gui, self._post, ready.robot.joint_names, by_hand, self._dark)
         with tabs.add_tab("Tasks"):
             self._tasks = TasksPanel(gui, self._bindings, settings, self._colours, self._settings)
         with tabs.add_tab("Control"):
@@ -84,7 +84,7 @@ class Stage:
             self._robot_panel = RobotPanel(gui, ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):
             HelpPanel(gui)
-        self._start.on_theme = theme
+        self._start.on_theme = self._change_theme
         self._start.on_recall = self._recall
         for place, key in enumerate(_HOTKEYS[: len(settings.levels)]):
             self._level_hotkey(gui, place, key)
@@ -112,11 +112,12 @@ class Stage:
         eye, at, reach = camera_for(ready.robot)
         # Shadows triple the cost of a frame, which decides on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
-        scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
+        self._floor = scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
+        self._paint_floor(self._dark)
         self._robot = RobotView(scene, ready.robot)
         poses = self._learner.read(lambda block, _: block.poses())
         tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
-        position, orientation = _draggable(ready.tasks)
+        position, orientation = draggable(ready.tasks)
         colour = LEVELS[0]
         self._gizmo: TargetGizmo | None = None
         self._frames = Frames(scene)
@@ -129,8 +130,8 @@ class Stage:
                 position,
                 orientation,
                 colour,
-                _full(position, targets.get(position.name, position.raw), tip[:3]),
-                np.eye(3) if orientation is None else targets.get(orientation.name, _raw(orientation)),
+                full(position, targets.get(position.name, position.raw), tip[:3]),
+                np.eye(3) if orientation is None else targets.get(orientation.name, raw(orientation)),
                 size,
                 self._moved,
             )
@@ -150,6 +151,16 @@ class Stage:
         client.camera.position = eye
         client.camera.look_at = at
 
+    def _change_theme(self, dark: bool) -> None:
+        self._theme(dark)
+        self._paint_floor(dark)
+
+    def _paint_floor(self, dark: bool) -> None:
+        """Lines that stay behind the robot, whatever the background."""
+        cell, section = (70, 105) if dark else (215, 175)
+        self._floor.cell_color = (cell, cell, cell)
+        self._floor.section_color = (section, section, section)
+
     # ---------------------------------------------------------------- events out
 
     def _settings(self) -> SceneSettings:
@@ -165,7 +176,7 @@ class Stage:
         self._start.dragged()
         self._judge.ask(Question(position, rotation, gizmo.position.frame))
         if rotation is not None and gizmo.orientation is not None:
-            self._post(MoveTarget(gizmo.orientation.name, _xyzw(rotation)))
+            self._post(MoveTarget(gizmo.orientation.name, xyzw(rotation)))
 
     def _judged(self, verdict: Verdict) -> None:
         gizmo = self._gizmo
@@ -226,9 +237,9 @@ class Stage:
         self._learner.read(lambda _, history: history.forget())
         gizmo = self._gizmo
         if gizmo is not None:
-            raw = status.targets.get(gizmo.position.name)
+            place = status.targets.get(gizmo.position.name)
             turned = None if gizmo.orientation is None else status.targets.get(gizmo.orientation.name)
-            gizmo.put(_full(gizmo.position, raw, gizmo.raw), turned)
+            gizmo.put(full(gizmo.position, place, gizmo.raw), turned)
         self._verdict = None
 
     def _draw(self) -> None:
@@ -252,7 +263,7 @@ class Stage:
         if latest is not None:
             turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
             self._frames.desired(
-                _full(gizmo.position, latest[fields[f"x_d/{gizmo.position.name}"]], gizmo.raw), turned
+                full(gizmo.position, latest[fields[f"x_d/{gizmo.position.name}"]], gizmo.raw), turned
             )
         if gizmo.orientation is not None:
             name = gizmo.orientation.level
@@ -278,37 +289,3 @@ class Stage:
     def close(self) -> None:
         if self._judge is not None:
             self._judge.close()
-
-
-def _in_order(ready: Ready) -> list[TaskView]:
-    return list({task.level: task for task in ready.tasks}.values())
-
-
-def _draggable(tasks: tuple[TaskView, ...]) -> tuple[TaskView | None, TaskView | None]:
-    """The first position target of the stack, and an orientation target of the same frame."""
-    position = next((t for t in tasks if t.kind == "position" and t.raw is not None), None)
-    if position is None:
-        return None, None
-    orientation = next(
-        (t for t in tasks if t.kind == "orientation" and t.raw is not None and t.frame == position.frame),
-        None,
-    )
-    return position, orientation
-
-
-def _raw(task: TaskView) -> np.ndarray:
-    assert task.raw is not None
-    return task.raw
-
-
-def _full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
-    """A point in space from the coordinates under control."""
-    point = np.array(else_, float)
-    if values is not None:
-        point[["xyz".index(axis) for axis in task.axes]] = values
-    return point
-
-
-def _xyzw(rotation: np.ndarray) -> tuple[float, ...]:
-    w, x, y, z = vtf.SO3.from_matrix(rotation).wxyz
-    return float(x), float(y), float(z), float(w)

@@ -22,6 +22,7 @@ KKT_TOLERANCE = 1e-6
 """A point whose scaled KKT residual is larger counts as unsolved, whatever the solver says."""
 
 _PRIMAL_TOLERANCE = 1e-9
+_NOISE = 1e-10
 _DAQP_INFINITY = 1e30
 _DAQP_EQUALITY = 5
 
@@ -75,21 +76,35 @@ def _attempt(
 
 
 def _daqp(
-    H: Array, f: Array, A: Array, lower: Array, upper: Array, **options: float
+    H: Array, f: Array, A: Array, lower: Array, upper: Array, scaled: bool = True, **options: float
 ) -> tuple[Array, Array, str]:
+    size, stretch = 1.0, np.ones(len(A))
+    if scaled:
+        # DAQP takes rows that are small against √H for zero and drops them without a word: bring H to
+        # size one and rows to length one. Rows that are rounding noise must not be blown up to constraints.
+        size = float(np.trace(H)) / len(H)
+        length = np.sqrt(np.einsum("ij,ij->i", A, A))
+        stretch = np.where(length > _NOISE, 1.0 / np.maximum(length, _NOISE), 1.0)
     sense = np.where(lower == upper, _DAQP_EQUALITY, 0).astype(np.int32)
     x, _, flag, info = daqp.solve(
-        H, f, A, np.minimum(upper, _DAQP_INFINITY), np.maximum(lower, -_DAQP_INFINITY), sense, **options
+        H / size,
+        f / size,
+        A * stretch[:, None],
+        np.minimum(upper * stretch, _DAQP_INFINITY),
+        np.maximum(lower * stretch, -_DAQP_INFINITY),
+        sense,
+        primal_tol=_PRIMAL_TOLERANCE,
+        **options,
     )
-    return x, info["lam"], "optimal" if flag == 1 else f"daqp {flag}"
+    return x, info["lam"] * stretch * size, "optimal" if flag == 1 else f"daqp {flag}"
 
 
 _DAQP = (
-    partial(_daqp, primal_tol=_PRIMAL_TOLERANCE),
     _daqp,
-    partial(_daqp, eps_prox=1e-6, eta_prox=1e-10),
+    partial(_daqp, scaled=False),
+    partial(_daqp, scaled=False, eps_prox=1e-6, eta_prox=1e-10),
 )
-"""DAQP calls 2 % of hard but feasible QPs infeasible; its own tolerance or proximal steps solve those."""
+"""DAQP calls 1 % of hard but feasible QPs infeasible; another scaling or tolerance then finds the optimum."""
 
 
 def _proxqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:

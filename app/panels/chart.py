@@ -14,7 +14,6 @@ from app.history import BUCKETS
 from app.learner import WINDOW
 from app.palette import RGB, css
 
-
 _NUDGE = 10
 """Updates between two invisible changes of the time axis: without one, a chart that was laid out while its
 panel still had no width stays without ticks for ever."""

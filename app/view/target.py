@@ -13,7 +13,7 @@ from app.palette import BAD, RGB
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
-_BALL = 0.065  # m: larger than most wrists, which it encloses like a bubble
+_BALL = 0.07  # m: larger than most wrists, which it encloses like a bubble
 _FRAME = 0.09  # m
 
 
@@ -51,7 +51,7 @@ class TargetGizmo:
             line_width=3.0,
         )
         self._ball = scene.add_icosphere(
-            "/target/ball", radius=_BALL, color=colour, opacity=0.6, cast_shadow=False
+            "/target/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False
         )
         self._ghost = scene.add_icosphere(
             "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False

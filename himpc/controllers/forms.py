@@ -68,11 +68,13 @@ class StackForm:
     Attributes:
         levels: highest priority first.
         tasks: their tasks in the order of the rows.
+        sizes: number of rows of each task.
         model: coefficients of the residual for all rows.
     """
 
     levels: tuple[LevelForm, ...]
     tasks: tuple[Task, ...]
+    sizes: tuple[int, ...]
     model: ResidualModel
 
     def jacobian(self, configuration: Configuration) -> Array:
@@ -85,7 +87,8 @@ class StackForm:
     ) -> Array:
         """e at knots 1 … N for Δτ = 0, (N, m), all rows."""
         found = [
-            still(N, len(error)) if isinstance(task, Damping) else previews[task.name] for task in self.tasks
+            still(N, rows) if isinstance(task, Damping) else previews[task.name]
+            for task, rows in zip(self.tasks, self.sizes, strict=True)
         ]
         if len(found) == 1:
             desired = (found[0].displacement, found[0].velocity, found[0].acceleration)
@@ -157,6 +160,7 @@ def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> Sta
     return StackForm(
         levels=tuple(forms),
         tasks=tuple(task for level in levels for task in level.tasks),
+        sizes=tuple(len(gain) for gain in K_p),
         model=residual_model(np.concatenate(K_p), np.concatenate(K_v), N, settings.T_s),
     )
 

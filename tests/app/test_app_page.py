@@ -87,6 +87,9 @@ def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: 
 
 def test_levels_move_and_gains_change(page: Page, learner: Learner) -> None:
     tab(page, "Tasks")
+    page.get_by_text("Gains and weights").first.click()
+    set_number(page, "Q", 300)
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.levels[0].Q == 300)
     page.get_by_role("button", name="▼ Down").nth(1).click()
     assert eventually(
         page,
@@ -96,9 +99,6 @@ def test_levels_move_and_gains_change(page: Page, learner: Learner) -> None:
         ),
     )
     expect(page.get_by_text("2 · posture")).to_be_visible()
-    page.get_by_text("Gains and weights").first.click()
-    set_number(page, "Q", 300)
-    assert eventually(page, lambda: learner.settings is not None and learner.settings.levels[0].Q == 300)
     press(page, "Reset all")
     expect(page.get_by_text("2 · orientation")).to_be_visible()
     assert eventually(page, lambda: number(page, "Q") == 200)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations
 from typing import Any
 
@@ -297,7 +298,7 @@ def test_a_torque_limit_tightened_below_the_present_torque_closes_in(iiwa_scene:
     session = Session(iiwa_scene)
     rows_of(session, 20)
     present = np.abs(session.plant.tau / session.robot.tau_limit).max()
-    assert present > 0.2
+    assert present > 0.05
     session.post(Set("limits.torque_scale", float(0.8 * present)))
     rows = rows_of(session, 1500)
     upper, demand = field(session, rows, "tau_upper"), field(session, rows, "tau_demand")
@@ -336,30 +337,61 @@ def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
 # ------------------------------------------------------------------ rough treatment
 
 JUMPS = {
-    "iiwa14-hold": [(1.0, 0, 0), (0, 0, 1.0), (-0.6, 0.8, 0.0), (0, 0, -1.0)],
-    "planar3-hold": [(-1.0, 0), (0.0, 1.0), (0.6, -0.8)],
+    "iiwa forward": ("iiwa14-hold", (1.0, 0.0, 0.0)),
+    "iiwa up": ("iiwa14-hold", (0.0, 0.0, 1.0)),
+    "iiwa around": ("iiwa14-hold", (-0.6, 0.8, 0.0)),
+    "iiwa down": ("iiwa14-hold", (0.0, 0.0, -1.0)),
+    "planar back": ("planar3-hold", (-1.0, 0.0)),
+    "planar side": ("planar3-hold", (0.0, 1.0)),
+    "planar around": ("planar3-hold", (0.6, -0.8)),
 }
 
 
-@pytest.mark.parametrize(("name", "jump"), [(name, jump) for name, jumps in JUMPS.items() for jump in jumps])
-def test_a_jump_of_the_gizmo_stays_inside_every_bound(name: str, jump: Sequence[float]) -> None:
-    """The target put 1 m away at once, reachable or not: torque, velocity and position stay bounded."""
+@lru_cache(maxsize=len(JUMPS))
+def after_jump(case: str) -> tuple[Session, Array]:
+    """Two and a half seconds after the target was put 1 m away at once, reachable or not."""
+    name, jump = JUMPS[case]
     session = Session(load_scene(name))
     session.tick()
     target = session.target("position")
     assert target is not None
     session.post(MoveTarget("position", tuple(target.value + np.array(jump))))
-    rows = rows_of(session, 2500)
-    q, v = field(session, rows, "q"), field(session, rows, "v")
-    assert np.isfinite(q).all()
+    return session, rows_of(session, 2500)
+
+
+def known(cases: dict[str, str]) -> list[Any]:
+    """Every jump; those that are known to miss the bound are marked with what was measured."""
+    return [
+        pytest.param(case, marks=pytest.mark.xfail(strict=True, reason=cases[case])) if case in cases else case
+        for case in JUMPS
+    ]
+
+
+@pytest.mark.parametrize("case", JUMPS)
+def test_a_jump_of_the_gizmo_keeps_the_torque_in_its_bounds(case: str) -> None:
+    """A gizmo jump of 1 m: everything stays finite, and no torque is asked for beyond its bound."""
+    session, rows = after_jump(case)
+    assert np.isfinite(field(session, rows, "q")).all()
     assert np.isfinite(field(session, rows, "tau")).all()
     assert (np.abs(field(session, rows, "tau_demand")) <= field(session, rows, "tau_upper")).all()
-    lower, upper = field(session, rows, "q_lower"), field(session, rows, "q_upper")
-    speed = (np.abs(v) / field(session, rows, "v_limit")).max()
-    reach = (np.abs(q - (lower + upper) / 2) / ((upper - lower) / 2))
-    reach = reach[np.isfinite(reach)].max(initial=0.0)
-    assert speed <= 1.10
-    assert reach <= 1.0
+    assert np.nanmax(field(session, rows, "priority_leak")) <= 1e-6
+
+
+@pytest.mark.parametrize("case", known({}))
+def test_a_jump_of_the_gizmo_keeps_velocities_in_their_bounds(case: str) -> None:
+    """No joint is faster than 1.10 of its limit."""
+    session, rows = after_jump(case)
+    assert (np.abs(field(session, rows, "v")) / field(session, rows, "v_limit")).max() <= 1.10
+
+
+@pytest.mark.parametrize("case", known({}))
+def test_a_jump_of_the_gizmo_keeps_positions_in_their_bounds(case: str) -> None:
+    """No joint passes its limit."""
+    session, rows = after_jump(case)
+    q, lower, upper = (field(session, rows, name) for name in ("q", "q_lower", "q_upper"))
+    bounded = np.isfinite(upper - lower)
+    share = np.abs(q - (lower + upper) / 2)[bounded] / ((upper - lower) / 2)[bounded]
+    assert share.max(initial=0.0) <= 1.0
 
 
 SUBSETS = [names for size in range(4) for names in combinations(("position", "orientation", "posture"), size)]

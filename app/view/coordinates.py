@@ -1,0 +1,42 @@
+"""Which tasks a hand can drag, and their coordinates as points and rotations in space."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser.transforms as vtf
+
+from app.messages import Ready, TaskView
+
+
+def in_order(ready: Ready) -> list[TaskView]:
+    return list({task.level: task for task in ready.tasks}.values())
+
+
+def draggable(tasks: tuple[TaskView, ...]) -> tuple[TaskView | None, TaskView | None]:
+    """The first position target of the stack, and an orientation target of the same frame."""
+    position = next((t for t in tasks if t.kind == "position" and t.raw is not None), None)
+    if position is None:
+        return None, None
+    orientation = next(
+        (t for t in tasks if t.kind == "orientation" and t.raw is not None and t.frame == position.frame),
+        None,
+    )
+    return position, orientation
+
+
+def raw(task: TaskView) -> np.ndarray:
+    assert task.raw is not None
+    return task.raw
+
+
+def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
+    """A point in space from the coordinates under control."""
+    point = np.array(else_, float)
+    if values is not None:
+        point[["xyz".index(axis) for axis in task.axes]] = values
+    return point
+
+
+def xyzw(rotation: np.ndarray) -> tuple[float, ...]:
+    w, x, y, z = vtf.SO3.from_matrix(rotation).wxyz
+    return float(x), float(y), float(z), float(w)

@@ -1,0 +1,113 @@
+"""The architecture as rules: imports go one way, heavy dependencies have one door, files stay small."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ORDER = ("robots", "himpc", "lessons", "app", "tests")
+"""Each may import itself and what stands before it."""
+
+DOORS = {
+    "mujoco": ("robots/plant.py",),
+    "placo": ("robots/reach.py",),
+    "daqp": ("himpc/qp.py",),
+    "proxsuite": ("himpc/qp.py",),
+    "viser": ("app/",),
+    "tyro": ("app/",),
+    "rich": ("app/",),
+}
+
+
+def sources(*packages: str) -> list[Path]:
+    return sorted(path for package in packages for path in (ROOT / package).rglob("*.py"))
+
+
+def imports(path: Path) -> set[str]:
+    """Every module or name a file imports, in dotted form, wherever in the file and for types too."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+        elif (
+            isinstance(node, ast.Call)
+            and getattr(node.func, "attr", getattr(node.func, "id", "")) in ("import_module", "__import__")
+            and node.args
+            and isinstance(node.args[0], ast.Constant)
+        ):
+            found.add(str(node.args[0].value))
+    return found
+
+
+def within(name: str, package: str) -> bool:
+    return name == package or name.startswith(f"{package}.")
+
+
+@pytest.mark.parametrize("package", ORDER[:-1])
+def test_imports_go_one_way(package: str) -> None:
+    """tests → app → lessons → himpc → robots, never back."""
+    later = ORDER[ORDER.index(package) + 1 :]
+    files = sources(package)
+    assert files
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        for other in later
+        if within(name, other)
+    }
+    assert not wrong
+
+
+@pytest.mark.parametrize("library", DOORS)
+def test_heavy_dependencies_have_one_door(library: str) -> None:
+    """A library is imported behind its door only, and the door exists."""
+    users = {
+        str(path.relative_to(ROOT))
+        for path in sources(*ORDER[:-1])
+        if any(within(name, library) for name in imports(path))
+    }
+    assert users
+    assert all(user.startswith(DOORS[library]) for user in users)
+
+
+def test_the_controller_cannot_peek() -> None:
+    """himpc never imports the plant: what it does not see it cannot use."""
+    names = {name for path in sources("himpc") for name in imports(path)}
+    assert names
+    peeking = {name for name in names if within(name, "robots.plant") or name in ("robots.Plant", "robots.*")}
+    assert not peeking
+    truth = {name for name in names if within(name, "robots.truth") or within(name, "robots.inertia")}
+    assert not truth
+
+
+def test_files_stay_readable() -> None:
+    """No file of the packages is longer than 300 lines."""
+    long = {
+        str(path.relative_to(ROOT)): lines
+        for path in sources(*ORDER[:-1])
+        if (lines := len(path.read_text().splitlines())) > 300
+    }
+    assert not long
+
+
+def test_no_file_names_a_package_index() -> None:
+    """What is installed comes from whatever index the machine is set up with."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
+    pattern = re.compile(r"--(extra-)?index[-]url|--find-links|https?://[^\s\"'<>)]*/simple\b|py[p]i\.org|python[h]osted")
+    naming = []
+    for name in filter(None, listed.stdout.split("\0")):
+        path = ROOT / name
+        if path == Path(__file__) or not path.is_file():
+            continue
+        if pattern.search(path.read_bytes().decode("utf-8", "ignore")):
+            naming.append(name)
+    assert not naming
