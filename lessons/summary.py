@@ -130,8 +130,9 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
         acceleration = np.diff(v, axis=0) / T_s
         return {
             "torque": {
-                "max_ratio": _peak(np.abs(recording["tau_demand"]) / recording["tau_upper"]),
-                "applied_max_ratio": _peak(np.abs(recording["tau"]) / recording["tau_upper"]),
+                # While a limit is being tightened the two sides may differ.
+                "max_ratio": _peak(_share(recording["tau_demand"], recording)),
+                "applied_max_ratio": _peak(_share(recording["tau"], recording)),
             },
             "velocity": {"max_ratio": _peak(np.abs(v) / recording["v_limit"])},
             "position": {"max_ratio": _peak(np.abs(q - middle) / half)},
@@ -139,6 +140,11 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
             # The catalog's torque-controlled arms have no jerk limit.
             "jerk": {"max_ratio": None},
         }
+
+
+def _share(tau: Array, recording: Recording) -> Array:
+    """Torque over the bound on its side."""
+    return np.maximum(tau / recording["tau_upper"], tau / recording["tau_lower"])
 
 
 def _fallbacks(recording: Recording) -> dict[str, int]:

@@ -88,7 +88,7 @@ class StartPanel:
             text = "Target within reach."
         else:
             text = f"Out of reach by {quantity(verdict.missing, 'm')}. " + (
-                "The controller gets the nearest point instead (solid ball)."
+                "The controller gets the nearest point instead (the ball without arrows)."
                 if clamped
                 else "The controller gets it all the same."
             )

@@ -34,8 +34,8 @@ def ramp(
         return goal
     closer = replace(
         goal,
-        tau_upper=_close_in(now.tau_upper, goal.tau_upper, tau, np.abs(goal.tau_upper), T_s),
-        tau_lower=-_close_in(-now.tau_lower, -goal.tau_lower, -tau, np.abs(goal.tau_lower), T_s),
+        tau_upper=_close_in(now.tau_upper, goal.tau_upper, np.abs(tau), goal.tau_upper, T_s),
+        tau_lower=-_close_in(-now.tau_lower, -goal.tau_lower, np.abs(tau), -goal.tau_lower, T_s),
         v_limit=_close_in(now.v_limit, goal.v_limit, np.abs(v), goal.v_limit, T_s),
         q_upper=_close_in(now.q_upper, goal.q_upper, q, np.ones_like(q), T_s),
         q_lower=-_close_in(-now.q_lower, -goal.q_lower, -q, np.ones_like(q), T_s),

@@ -1,0 +1,213 @@
+"""The command line as its users meet it: exit codes, one clear sentence, and JSON that keeps its contract."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.__main__ import main
+from robots import CATALOG
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def broken_urdf(tmp_path: Path) -> str:
+    path = tmp_path / "broken.urdf"
+    path.write_text('<robot name="arm"><link name="base"></robot>')
+    return str(path)
+
+
+WRONG: dict[str, tuple[list[str], str]] = {
+    "no such command": (["rnu"], "run"),
+    "no such scene": (["run", "iiwa14-hodl"], "iiwa14-hold"),
+    "hold without a robot": (["run", "hold"], "--urdf"),
+    "missing file": (["run", "hold", "--urdf", "/nowhere/arm.urdf"], "/nowhere/arm.urdf"),
+    "a folder": (["run", "hold", "--urdf", "/tmp"], "/tmp"),
+    "no such catalog robot": (["run", "hold", "--urdf", "iiwa15"], "iiwa14"),
+    "unknown frame": (["run", "hold", "--urdf", "planar3", "--tip", "nose"], "nose"),
+    "a robot for a fixed scene": (["run", "iiwa14-hold", "--urdf", "planar3"], "hold"),
+    "unknown controller": (["run", "iiwa14-hold", "--controller", "himcp"], "himpc"),
+    "N = 0": (["run", "iiwa14-hold", "--set", "horizon=0"], "horizon"),
+    "N = 2.5": (["run", "iiwa14-hold", "--set", "horizon=2.5"], "whole number"),
+    "M̄ = 0": (["run", "iiwa14-hold", "--set", "M_bar_scale=0"], "M_bar_scale"),
+    "M̄ < 0": (["run", "iiwa14-hold", "--set", "M_bar=[1,1,1,1,1,1,-1]"], "M_bar"),
+    "M̄ too short": (["run", "iiwa14-hold", "--set", "M_bar=[1,1]"], "M_bar"),
+    "NaN": (["run", "iiwa14-hold", "--set", "Q=NaN"], "finite"),
+    "infinite": (["run", "iiwa14-hold", "--set", "plant.payload_kg=Infinity"], "finite"),
+    "a typo": (["run", "iiwa14-hold", "--set", "plant.paylod_kg=2"], "plant.payload_kg"),
+    "no value": (["run", "iiwa14-hold", "--set", "horizon"], "PATH=VALUE"),
+    "wrong word": (["run", "iiwa14-hold", "--set", "limits.position=never"], "viability"),
+    "wrong length": (["run", "iiwa14-hold", "--set", "levels.1.Q=[1,2]"], "3"),
+    "wrong plant length": (["run", "iiwa14-hold", "--set", "plant.friction=[1,2]"], "friction"),
+    "duration 0": (["run", "iiwa14-hold", "--duration", "0"], "duration"),
+    "duration nan": (["run", "iiwa14-hold", "--duration", "nan"], "duration"),
+    "json nowhere": (["run", "planar3-hold", "--duration", "0.01", "--json", "/nowhere/x.json"], "--json"),
+    "npz nowhere": (["run", "planar3-hold", "--duration", "0.01", "--npz", "/nowhere/x.npz"], "--npz"),
+    "check a missing file": (["robots", "--check", "/nowhere/arm.urdf"], "/nowhere/arm.urdf"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_gets_one_sentence_and_exit_2(case: str, capfd: pytest.CaptureFixture[str]) -> None:
+    """One line on stderr that names the trouble or the remedy, no traceback, nothing on stdout."""
+    arguments, says = WRONG[case]
+    assert main(arguments) == 2
+    out, err = capfd.readouterr()
+    assert len(err.strip().splitlines()) == 1
+    assert err.startswith("himpc-lab: ")
+    assert says in err
+    assert "Traceback" not in err
+    assert out.strip() == ""
+
+
+def test_a_broken_urdf_gets_one_sentence(broken_urdf: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "hold", "--urdf", broken_urdf]) == 2
+    err = capfd.readouterr().err
+    assert len(err.strip().splitlines()) == 1
+    assert "broken.urdf" in err
+
+
+def test_as_a_program_it_says_the_same() -> None:
+    """`python -m app` exits with the same code and writes no traceback."""
+    command = [sys.executable, "-m", "app", "run", "iiwa14-hodl"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_unknown_options_are_usage_errors(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["run", "iiwa14-hold", "--frobnicate"])
+    assert stop.value.code == 2
+    assert "Traceback" not in capfd.readouterr().err
+
+
+KEYS = {
+    "scene": str,
+    "controller": str,
+    "seed": int,
+    "duration_s": float,
+    "diverged": bool,
+    "diverged_at_s": type(None),
+    "finite": bool,
+    "tasks": list,
+    "average_cost": list,
+    "limits": dict,
+    "solver": dict,
+    "priority_leak_max": float,
+    "dynamic_leak_max": float,
+    "bound_active_share": float,
+    "step_ms": dict,
+    "real_time_factor": float,
+}
+
+
+def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
+    """`run --json -` prints one JSON object with the promised keys and nothing else."""
+    assert main(["run", "iiwa14-hold", "--duration", "0.05", "--seed", "7", "--set", "horizon=3", "--json", "-"]) == 0
+    result: dict[str, Any] = json.loads(capfd.readouterr().out)
+    for key, kind in KEYS.items():
+        assert isinstance(result[key], kind), key
+    assert (result["scene"], result["controller"], result["seed"]) == ("iiwa14-hold", "himpc", 7)
+    assert result["duration_s"] == pytest.approx(0.05)
+    for task in result["tasks"]:
+        assert set(task) == {"name", "level", "coordinates", "unit", "rmse", "rmse_after_1s", "max_abs"}
+        assert len(task["rmse"]) == len(task["max_abs"]) == len(task["coordinates"])
+        assert task["unit"] in ("m", "deg")
+    assert len(result["average_cost"]) == 3
+    assert set(result["limits"]) == {"torque", "velocity", "position", "acceleration", "jerk"}
+    assert set(result["limits"]["torque"]) == {"max_ratio", "applied_max_ratio"}
+    solver = result["solver"]
+    assert set(solver) == {"backend", "route", "solves", "unsolved", "fallbacks", "max_kkt_residual"}
+    assert (solver["backend"], solver["route"], solver["solves"]) == ("daqp", "structured", 150)
+    assert set(result["step_ms"]) == {"median", "p99", "max"}
+
+
+def test_run_writes_files(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """--json FILE and --npz FILE hold the run; the table goes to people only without --json."""
+    target, rows = tmp_path / "out.json", tmp_path / "out.npz"
+    arguments = ["run", "planar3-hold", "--duration", "0.05", "--json", str(target), "--npz", str(rows)]
+    assert main(arguments) == 0
+    assert json.loads(target.read_text())["robot"] == "planar3"
+    with np.load(rows) as data:
+        assert data["q"].shape == (50, 3)
+        how = json.loads(str(data["settings"]))
+    assert (how["scene"], how["seed"], how["set"]) == ("planar3-hold", 0, [])
+    assert capfd.readouterr().out == ""
+
+
+def test_run_shows_a_table(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "planar3-hold", "--duration", "0.05"]) == 0
+    out = capfd.readouterr().out
+    for word in ("position", "posture", "RMSE", "unsolved 0", "real time", "completed"):
+        assert word in out
+
+
+def test_disabled_levels_and_many_sets_go_together(capfd: pytest.CaptureFixture[str]) -> None:
+    """Several --set in one line; a level that is off has no cost."""
+    sets = ["--set", "levels.2.enabled=false", "--set", "levels.3.enabled=false", "--set", "limits.position=off"]
+    assert main(["run", "iiwa14-hold", "--duration", "0.05", *sets, "--json", "-"]) == 0
+    result = json.loads(capfd.readouterr().out)
+    assert len(result["average_cost"]) == 1
+    assert result["limits"]["position"]["max_ratio"] is None
+
+
+@pytest.mark.parametrize("command", ["scenes", "controllers", "robots"])
+def test_lists_as_table_and_json(command: str, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Every entry has a name and a line that says what it is, in both forms."""
+    assert main([command, "--json", "-"]) == 0
+    entries = json.loads(capfd.readouterr().out)
+    assert entries
+    assert main([command]) == 0
+    table = capfd.readouterr().out
+    for entry in entries:
+        assert entry["name"] in table
+        assert len(entry.get("description", entry.get("title", ""))) > 15
+    assert main([command, "--json", str(tmp_path / "list.json")]) == 0
+    assert json.loads((tmp_path / "list.json").read_text()) == entries
+
+
+def test_the_catalog_can_be_checked(capfd: pytest.CaptureFixture[str]) -> None:
+    """Our own URDFs are usable; the report is the same in both forms."""
+    for entry in CATALOG.values():
+        assert main(["robots", "--check", str(entry.path), "--json", "-"]) == 0
+        report = json.loads(capfd.readouterr().out)
+        assert report["usable"] is True
+        assert len(report["joints"]) == len(entry.M_bar)
+
+
+def test_a_urdf_that_cannot_be_used_is_reported_with_exit_1(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It ran, and the check failed: exit 1, the reason in the report."""
+    path = tmp_path / "still.urdf"
+    path.write_text('<robot name="still"><link name="base"/></robot>')
+    assert main(["robots", "--check", str(path), "--json", "-"]) == 1
+    assert json.loads(capfd.readouterr().out)["usable"] is False
+
+
+def test_the_example_of_the_readme_runs() -> None:
+    """The twenty lines for one's own program do what they print."""
+    readme = ROOT / "README.md"
+    blocks = re.findall(r"```python\n(.*?)```", readme.read_text(), re.DOTALL) if readme.exists() else []
+    if not blocks:
+        pytest.skip("README.md has no python block")
+    code = blocks[0]
+    for name in ("load_robot", "HIMPC", "Plant"):
+        assert name in code
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    printed = re.findall(r"[-+\d.e]+", done.stdout)
+    assert printed
+    assert float(printed[-1]) < 5.0

@@ -1,0 +1,151 @@
+"""The scenes keep what the project promises of them: the numbers of 'Done when' 2, 3, 4 and 6."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lessons.run import run, with_assignments
+from lessons.scenes import load_scene
+from lessons.summary import Recording, summary
+
+
+def record(name: str, *assignments: str, duration: float, urdf: str | None = None, seed: int = 0) -> Recording:
+    scene = load_scene(name, urdf)
+    return run(replace(scene, settings=with_assignments(scene.settings, assignments)), duration, seed)
+
+
+def assert_sound(result: dict[str, Any]) -> None:
+    """What 'sound' means in the contract of the command line: finite, every QP solved, no fallback."""
+    assert result["diverged"] is False
+    assert result["finite"] is True
+    assert result["solver"]["unsolved"] == 0
+    assert result["solver"]["fallbacks"] == {}
+    assert result["solver"]["max_kkt_residual"] <= 1e-6
+    assert result["priority_leak_max"] is None or result["priority_leak_max"] <= 1e-6
+    assert result["limits"]["torque"]["max_ratio"] <= 1.000
+    assert (result["limits"]["position"]["max_ratio"] or 0.0) <= 1.000
+
+
+@pytest.fixture(scope="module")
+def circle() -> dict[str, Any]:
+    return summary(record("iiwa14-circle", duration=4.0))
+
+
+def test_the_circle_is_sound(circle: dict[str, Any]) -> None:
+    """RT4 for 4 s from rest: bounds, residuals and leak as promised, no fallback."""
+    assert_sound(circle)
+    assert circle["limits"]["velocity"]["max_ratio"] <= 1.10
+    assert circle["duration_s"] == pytest.approx(4.0)
+    assert circle["solver"]["solves"] == 3 * 4000
+
+
+def test_the_circle_is_accurate(circle: dict[str, Any]) -> None:
+    """Level 1 within 1.5 mm RMSE per axis after the first second, level 2 within 1°."""
+    position, orientation, q1 = circle["tasks"]
+    assert (position["name"], position["level"], position["unit"]) == ("position", 1, "m")
+    assert (orientation["name"], orientation["level"], orientation["unit"]) == ("orientation", 2, "deg")
+    assert q1["level"] == 3
+    assert max(position["rmse_after_1s"]) <= 1.5e-3
+    assert max(orientation["rmse_after_1s"]) <= 1.0
+
+
+def test_the_circle_presses_on_its_bounds(circle: dict[str, Any]) -> None:
+    """Level 3 asks for more than joint 1 can do: the scene is about active bounds, and they are counted."""
+    assert circle["bound_active_share"] > 0.1
+    assert circle["limits"]["velocity"]["max_ratio"] > 0.95
+    assert circle["dynamic_leak_max"] > circle["priority_leak_max"]
+
+
+def test_same_seed_same_output() -> None:
+    """Everything but the timing keys is the same to the last digit."""
+    results = []
+    for _ in range(2):
+        result = summary(record("iiwa14-circle", duration=0.4, seed=3))
+        for key in ("step_ms", "real_time_factor"):
+            del result[key]
+        results.append(result)
+    assert results[0] == results[1]
+
+
+VARIANTS = ("horizon=10", "plant.payload_kg=2", "plant.inertia_scale=0.8")
+
+
+@lru_cache(maxsize=len(VARIANTS))
+def circle_with(assignment: str) -> dict[str, Any]:
+    return summary(record("iiwa14-circle", assignment, duration=4.0))
+
+
+@pytest.mark.parametrize("assignment", VARIANTS)
+def test_the_circle_stays_sound_when(assignment: str) -> None:
+    """A longer horizon, a payload nobody told the controller of, and lighter links."""
+    assert_sound(circle_with(assignment))
+
+
+PAYLOAD = pytest.mark.xfail(
+    strict=True,
+    reason="2 kg at the flange make joint 6 some 35 times heavier than the paper's M̄ says: time-delay estimation "
+    "lags by 35 ms, joint 6 reaches 2.80 times its speed limit and level 1 is off by 31, 82, 12 mm RMSE",
+)
+
+
+@pytest.mark.parametrize("assignment", [VARIANTS[0], pytest.param(VARIANTS[1], marks=PAYLOAD), VARIANTS[2]])
+def test_the_circle_stays_fast_and_accurate_when(assignment: str) -> None:
+    """The speeds and the level-1 accuracy of the nominal run survive the same changes."""
+    result = circle_with(assignment)
+    assert result["limits"]["velocity"]["max_ratio"] <= 1.10
+    assert max(result["tasks"][0]["rmse_after_1s"]) <= 1.5e-3
+
+
+@pytest.mark.parametrize("name", ["panda-hold", "planar3-hold", "iiwa14-hold"])
+def test_hold_scenes_are_sound(name: str) -> None:
+    """At rest on their targets they stay there."""
+    result = summary(record(name, duration=4.0))
+    assert_sound(result)
+    assert result["limits"]["velocity"]["max_ratio"] <= 0.05
+    assert max(result["tasks"][0]["max_abs"]) <= 1e-3
+
+
+@pytest.mark.parametrize("file", ["ur_description/urdf/ur10_robot.urdf", "xarm_description/urdf/xarm7.urdf"])
+def test_hold_is_sound_on_robots_of_others(example_urdf: Callable[[str], str], file: str) -> None:
+    """`run hold --urdf` with a UR10 and an xArm 7 of example-robot-data."""
+    result = summary(record("hold", duration=4.0, urdf=example_urdf(file)))
+    assert_sound(result)
+    assert result["limits"]["velocity"]["max_ratio"] <= 0.05
+    assert max(result["tasks"][0]["max_abs"]) <= 1e-3
+
+
+def test_printed_position_rows_fail_honestly() -> None:
+    """With (32d) as printed and twice the speed QPs fail: the run ends, finite, and every rung is counted."""
+    recording = record(
+        "iiwa14-circle", "limits.position=paper", "limits.velocity_scale=2", duration=4.0
+    )
+    result = summary(recording)
+    solver = result["solver"]
+    assert solver["unsolved"] > 0
+    assert sum(solver["fallbacks"].values()) == solver["unsolved"]
+    assert set(solver["fallbacks"]) <= {"soften", "previous", "inherit", "damping", "hold"}
+    assert solver["max_kkt_residual"] <= 1e-6
+    assert result["finite"] is True
+    assert result["limits"]["torque"]["max_ratio"] <= 1.000
+
+
+@pytest.mark.parametrize(
+    "assignments",
+    [
+        ("plant.encoder_resolution_deg=0.00125",),
+        ("plant.encoder_resolution_deg=0.00125", "plant.friction=0.5"),
+    ],
+    ids=["encoder", "encoder and friction"],
+)
+def test_sensor_resolution_and_friction_cause_no_limit_cycle(assignments: tuple[str, ...]) -> None:
+    """8 s of iiwa14-hold: after settling the tip moves less than 0.2 mm peak to peak."""
+    recording = record("iiwa14-hold", *assignments, duration=8.0)
+    x = recording["x/position"][4000:]
+    assert np.ptp(x, axis=0).max() <= 0.2e-3
+    assert summary(recording)["diverged"] is False
