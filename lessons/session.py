@@ -197,9 +197,12 @@ class Session:
         self.plan = plan
         row[fields["tau"]] = plant.step(plan.tau, T_s)
         self._ticks += 1
-        if self.diverged_at is None and self._is_lost(q, v, plan):
-            self.diverged_at = t
-            self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+        if self.diverged_at is None:
+            wild = self._is_wild(q, v)
+            if wild:
+                self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+            if wild or self._is_far(plan):
+                self.diverged_at = t
         return row
 
     def _write_references(self, row: Array, previews: Mapping[str, Preview]) -> None:
@@ -234,12 +237,13 @@ class Session:
                 leak = max(leak, float(np.abs(task.jacobian(configuration)[0] @ column).max()))
         return leak
 
-    def _is_lost(self, q: Array, v: Array, plan: Plan) -> bool:
-        # A comparison with NaN is false, so "all within" also catches what is not finite.
-        if not float((np.abs(v) / self.robot.v_limit).max()) <= LOST_SPEED or not math.isfinite(
-            float(q.sum())
-        ):
-            return True
+    def _is_wild(self, q: Array, v: Array) -> bool:
+        # A comparison with NaN is false, so "not within" also catches what is not finite.
+        fastest = float((np.abs(v) / self.robot.v_limit).max())
+        return not fastest <= LOST_SPEED or not math.isfinite(float(q.sum()))
+
+    def _is_far(self, plan: Plan) -> bool:
+        """Level 1 is lost. A hand that drags a target out of reach does that too, so it is no notice."""
         first = next((level for level in self.settings.levels if level.enabled), None)
         return first is not None and any(
             isinstance(task, FramePosition) and float(np.linalg.norm(plan.errors[task.name])) > LOST_POSITION

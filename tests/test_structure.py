@@ -102,7 +102,9 @@ def test_files_stay_readable() -> None:
 def test_no_file_names_a_package_index() -> None:
     """What is installed comes from whatever index the machine is set up with."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
-    pattern = re.compile(r"--(extra-)?index[-]url|--find-links|https?://[^\s\"'<>)]*/simple\b|py[p]i\.org|python[h]osted")
+    pattern = re.compile(
+        r"--(extra-)?index[-]url|--find-links|https?://[^\s\"'<>)]*/simple\b|py[p]i\.org|python[h]osted"
+    )
     naming = []
     for name in filter(None, listed.stdout.split("\0")):
         path = ROOT / name

@@ -51,6 +51,8 @@ class Rows:
         return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
 
 
+POSITION_MARGIN = 0.002
+"""rad: how far before its limit a joint is stopped; the estimation error carries it up to 0.0005 further."""
 REACTION = 5.0
 """Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
 
@@ -99,7 +101,8 @@ def build_rows(
 
     if limits.position == "viability":
         reaction = T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
-        v = viability_bounds(state.q, force.q_lower, force.q_upper, force.v_limit, force.a_max, reaction)
+        q_lower, q_upper = force.q_lower + POSITION_MARGIN, force.q_upper - POSITION_MARGIN
+        v = viability_bounds(state.q, q_lower, q_upper, force.v_limit, force.a_max, reaction)
     else:
         v = np.array((-force.v_limit, force.v_limit))
     if limits.velocity_approach:

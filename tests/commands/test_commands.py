@@ -113,7 +113,8 @@ KEYS = {
 
 def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
     """`run --json -` prints one JSON object with the promised keys and nothing else."""
-    assert main(["run", "iiwa14-hold", "--duration", "0.05", "--seed", "7", "--set", "horizon=3", "--json", "-"]) == 0
+    given = ["--duration", "0.05", "--seed", "7", "--set", "horizon=3", "--json", "-"]
+    assert main(["run", "iiwa14-hold", *given]) == 0
     result: dict[str, Any] = json.loads(capfd.readouterr().out)
     for key, kind in KEYS.items():
         assert isinstance(result[key], kind), key
@@ -154,7 +155,8 @@ def test_run_shows_a_table(capfd: pytest.CaptureFixture[str]) -> None:
 
 def test_disabled_levels_and_many_sets_go_together(capfd: pytest.CaptureFixture[str]) -> None:
     """Several --set in one line; a level that is off has no cost."""
-    sets = ["--set", "levels.2.enabled=false", "--set", "levels.3.enabled=false", "--set", "limits.position=off"]
+    changes = ("levels.2.enabled=false", "levels.3.enabled=false", "limits.position=off")
+    sets = [word for change in changes for word in ("--set", change)]
     assert main(["run", "iiwa14-hold", "--duration", "0.05", *sets, "--json", "-"]) == 0
     result = json.loads(capfd.readouterr().out)
     assert len(result["average_cost"]) == 1

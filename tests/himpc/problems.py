@@ -97,9 +97,7 @@ def random_hierarchy(
     return Hierarchy(problems, rows)
 
 
-def bounds_around(
-    rng: np.random.Generator, problems: list[LevelProblem], rows: Rows, room: float
-) -> Rows:
+def bounds_around(rng: np.random.Generator, problems: list[LevelProblem], rows: Rows, room: float) -> Rows:
     """Bounds in proportion to what the unbounded levels want, with a point strictly inside."""
     N, _, n = problems[0].B.shape
     reach = sum(np.abs(unbounded_optimum(problem)) for problem in problems) + 1e-3

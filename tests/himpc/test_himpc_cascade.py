@@ -1,4 +1,4 @@
-"""The cascade: two routes to one optimum, strict priorities, verified points, and the ladder when all fails."""
+"""The cascade: two routes to one optimum, strict priorities, verified points, and the fallback ladder."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from problems import Hierarchy, kkt_violation, quadratic, random_hierarchy, singular_hierarchy
+from problems import Hierarchy, kkt_violation, level_problem, quadratic, random_hierarchy, singular_hierarchy
 
 from himpc import qp
 from himpc.cascade.cascade import Route
-from himpc.cascade.level import LevelSolution
+from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.cascade.null_space import RANK_TOLERANCE
 from himpc.limits import Rows
 from himpc.limits.rows import least_slack
@@ -104,7 +104,10 @@ def test_lower_levels_change_nothing_above(seed: int, n: int, N: int, levels: in
         assert mine.cost == pytest.approx(problem.cost(mine.U), rel=1e-9)
 
 
-@given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-15, -12.001) | st.floats(-7.999, -2) | st.none())
+decades = st.floats(-15, -12.001) | st.floats(-7.999, -2) | st.none()
+
+
+@given(seeds, st.integers(2, 8), st.integers(1, 6), decades)
 @settings(max_examples=120)
 def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade: float | None) -> None:
     """A level that repeats another, exactly or nearly, keeps both routes equal away from the tolerance."""
@@ -120,7 +123,7 @@ def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-12, -8))
 @settings(max_examples=80)
 def test_near_the_rank_tolerance_points_are_still_sound(seed: int, n: int, N: int, decade: float) -> None:
-    """Where a singular value is near the tolerance either reading is right; residual, leak and bounds hold."""
+    """Near the tolerance either reading of the rank is right; residual, leak and bounds hold."""
     hierarchy = singular_hierarchy(seed, n, N, 10**decade)
     for solution in hierarchy.solve():
         assert solution.rung == "solve"
@@ -141,9 +144,7 @@ def test_no_freedom_left_keeps_the_upper_levels() -> None:
         assert (last.rung, last.status) == ("solve", "empty")
 
 
-def replace_rows(problem: Any, B: Array) -> Any:
-    from problems import level_problem
-
+def replace_rows(problem: LevelProblem, B: Array) -> LevelProblem:
     N, m, n = B.shape
     C = np.repeat(problem.C[:, :1], m, axis=1)
     return level_problem("full", B, C, np.ones((N, m)), np.full(m, 100.0), np.full(n, 1.0))

@@ -160,9 +160,10 @@ kinds = st.sampled_from(["fine", "fine", "huge", "nan", "inf", "tiny"])
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
     iiwa: Robot, seed: int, states: list[tuple[str, ...]], N: int, route: Any, solver: Any, position: Any
 ) -> None:
-    """Random, huge or not finite states, references and torques, under random settings: never an exception."""
+    """Random, huge or not finite states, references and torques: never an exception."""
     rng = np.random.default_rng(seed)
-    limits = Limits(position=position, velocity_scale=10 ** rng.uniform(-3, 2), torque_scale=10 ** rng.uniform(-2, 1))
+    torque_scale, velocity_scale = 10 ** rng.uniform([-2, -3], [1, 2])
+    limits = Limits(position=position, velocity_scale=velocity_scale, torque_scale=torque_scale)
     T_s = 10 ** rng.uniform(-4, -1.7)
     controller = HIMPC(
         iiwa,
@@ -267,7 +268,8 @@ def test_changes_at_rest_are_bumpless(name: str, change: str) -> None:
         session.post(event)
         for _ in range(500 // len(events)):
             row = session.tick()
-            torque = max(torque, float((np.abs(row[session.layout.fields["tau_demand"]] - tau) / session.robot.tau_limit).max()))
+            step = np.abs(row[session.layout.fields["tau_demand"]] - tau) / session.robot.tau_limit
+            torque = max(torque, float(step.max()))
             tip = session.plant.frame_pose(session.robot.tip)[1]
             moved = max(moved, float(np.linalg.norm(tip - start)))
     assert not session.notices
@@ -294,7 +296,7 @@ def test_a_level_enabled_with_a_large_error_fades_in(iiwa_scene: Scene) -> None:
 
 
 def test_a_torque_limit_tightened_below_the_present_torque_closes_in(iiwa_scene: Scene) -> None:
-    """The bound starts at the torque of now and falls without a step; the demand stays inside it throughout."""
+    """The bound starts at the torque of now and falls without a step; the demand stays inside it."""
     session = Session(iiwa_scene)
     rows_of(session, 20)
     present = np.abs(session.plant.tau / session.robot.tau_limit).max()
@@ -361,10 +363,8 @@ def after_jump(case: str) -> tuple[Session, Array]:
 
 def known(cases: dict[str, str]) -> list[Any]:
     """Every jump; those that are known to miss the bound are marked with what was measured."""
-    return [
-        pytest.param(case, marks=pytest.mark.xfail(strict=True, reason=cases[case])) if case in cases else case
-        for case in JUMPS
-    ]
+    marks = {case: pytest.mark.xfail(strict=True, reason=reason) for case, reason in cases.items()}
+    return [pytest.param(case, marks=marks[case]) if case in marks else case for case in JUMPS]
 
 
 @pytest.mark.parametrize("case", JUMPS)
@@ -501,7 +501,7 @@ def test_binding_constraints_are_named(iiwa_scene: Scene) -> None:
 
 
 def test_a_plan_carries_its_evidence(iiwa: Robot) -> None:
-    """Per level: increments, cost, status, residual, time, leak; the applied torque is τ₀ plus the first input."""
+    """Per level: increments, cost, residual, time, leak; the torque is τ₀ plus the first input."""
     controller = HIMPC(iiwa, iiwa_settings(iiwa, horizon=7))
     tau_0 = np.linspace(-3, 3, 7)
     controller.reset(tau_0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,11 @@ Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 
 
-def bounds_at(q: float, low: float, high: float, v_max: float, a: float, reaction: float) -> tuple[float, float]:
-    lower, upper = viability_bounds(*(np.array([x]) for x in (q, low, high, v_max, a)), reaction)
+def bounds_at(
+    q: float, low: float, high: float, v_max: float, a: float, reaction: float
+) -> tuple[float, float]:
+    one = np.ones(1)
+    lower, upper = viability_bounds(q * one, low * one, high * one, v_max * one, a * one, reaction)
     return float(lower[0]), float(upper[0])
 
 
@@ -37,7 +41,7 @@ def test_a_joint_inside_the_viable_set_never_passes_its_limit(
     low, high, reaction = -0.4 * span, 0.6 * span, T_s * later
     q = rng.uniform(low, high)
     v = rng.uniform(*bounds_at(q, low, high, v_max, a, reaction))
-    outward = rng.random() < 0.5
+    outward, wanted = rng.random() < 0.5, 0.0
     for k in range(400):
         if k % 40 == 0:
             wanted = rng.uniform(-2, 2) * v_max if not outward else rng.choice([-1, 1]) * v_max
@@ -91,7 +95,7 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
     tau_0, U = rng.normal(0, 5, n), rng.normal(0, 1, (N, n))
     rows = build_rows(state, tau_0, M_bar, limits, force, N, T_s)
     value = rows.L @ U
-    assert rows.kinds == (("torque", "velocity", "position") if position == "paper" else ("torque", "velocity"))
+    assert rows.kinds == ("torque", "velocity", "position")[: 3 if position == "paper" else 2]
     np.testing.assert_allclose(rows.lower[:N], np.tile(force.tau_lower - tau_0, (N, 1)))
     v, q, a, tau = state.v.copy(), state.q.copy(), state.a.copy(), tau_0.copy()
     v_bounds = np.stack([-force.v_limit, force.v_limit])
@@ -155,7 +159,7 @@ def settled(now: LimitsInForce, goal: LimitsInForce, tau: float, q: float, v: fl
     for _ in range(20_000):
         if path[-1] is goal:
             return path
-        path.append(ramp(path[-1], goal, *(np.array([x]) for x in (tau, q, v)), 1e-3))
+        path.append(ramp(path[-1], goal, np.array([tau]), np.array([q]), np.array([v]), 1e-3))
     raise AssertionError("the limits never arrived")
 
 
@@ -181,7 +185,7 @@ def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) ->
     assert first.v_limit[0] >= max(abs(v), 0.5) - 2 * share
     assert first.q_upper[0] >= max(q, 0.3) - share
     assert first.q_lower[0] <= min(q, -0.2) + share
-    for before, after in zip(path[1:], path[2:], strict=False):
+    for before, after in pairwise(path[1:]):
         assert after.tau_upper[0] <= before.tau_upper[0]
         assert after.tau_lower[0] >= before.tau_lower[0]
         assert after.v_limit[0] <= before.v_limit[0]

@@ -1,8 +1,9 @@
-"""References: derivatives that fit, previews that come true, and a dragged target that stays within its caps."""
+"""References: derivatives that fit, previews that come true, a dragged target within its caps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -76,9 +77,9 @@ def test_waypoints_are_met_at_rest() -> None:
     """Every point is reached at its time with zero velocity and acceleration; then the reference stays."""
     points = np.random.default_rng(1).normal(0, 1, (3, 2))
     reference = Waypoints(points, np.array([1.0, 2.0, 4.0]))
-    for time, point in [(0.0, points[0]), (1.0, points[0]), (2.0, points[1]), (4.0, points[2]), (9.0, points[2])]:
+    for time, point in ((0.0, 0), (1.0, 0), (2.0, 1), (4.0, 2), (9.0, 2)):
         preview = reference.preview(time, T_S, 0)
-        np.testing.assert_allclose(preview.value, point, atol=1e-12)
+        np.testing.assert_allclose(preview.value, points[point], atol=1e-12)
         np.testing.assert_allclose(preview.velocity, 0.0, atol=1e-12)
         np.testing.assert_allclose(preview.acceleration, 0.0, atol=1e-9)
     with pytest.raises(ValueError, match="increasing"):
@@ -106,7 +107,7 @@ def drive(target: Target, ticks: int, hand: Callable[[int], Array | None], N: in
 
 
 def assert_consistent(previews: list[Preview], caps: Caps, hand_moved: set[int]) -> None:
-    """Caps hold, and from tick to tick x_d moves by T_s(ẋ + ẋ')/2 and ẋ_d by T_s ẍ'; the preview comes true."""
+    """Caps hold, x_d moves by T_s(ẋ + ẋ')/2 and ẋ_d by T_s ẍ' per tick, and the preview comes true."""
     for k, preview in enumerate(previews):
         v, a, d = preview.velocity, preview.acceleration, preview.displacement
         assert np.linalg.norm(v, axis=1).max() <= caps.speed * (1 + 1e-9)
@@ -137,7 +138,7 @@ def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Cap
     moves = {int(k): rng.normal(0, 10 ** rng.uniform(-3, 0.3), 3) for k in rng.integers(0, 400, 5)}
     previews = drive(target, 500, lambda k: moves.get(k))
     assert_consistent(previews, caps, set(moves))
-    for before, after in zip(previews, previews[1:], strict=False):
+    for before, after in pairwise(previews):
         step = 0.5 * T_S * (before.velocity[0] + after.velocity[0])
         np.testing.assert_allclose(after.value - before.value, step, atol=2e-9)
 
@@ -154,7 +155,7 @@ def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: fl
     goal = exp3(angle * axis / np.linalg.norm(axis)) @ start
     previews = drive(target, 600, lambda k: goal if k == 0 else None)
     assert_consistent(previews, caps, {0})
-    for before, after in zip(previews, previews[1:], strict=False):
+    for before, after in pairwise(previews):
         step = log3(after.value @ before.value.T)
         np.testing.assert_allclose(step, before.displacement[1], atol=1e-9)
         np.testing.assert_allclose(after.value @ after.value.T, np.eye(3), atol=1e-10)
@@ -180,7 +181,7 @@ def test_a_rotation_arrives_and_rests_exactly(angle: float) -> None:
     previews = drive(target, 9000, lambda k: goal if k == 0 else None)
     np.testing.assert_array_equal(previews[-1].value, goal)
     assert not previews[-1].velocity.any()
-    turned = sum(np.linalg.norm(log3(b.value @ a.value.T)) for a, b in zip(previews, previews[1:], strict=False))
+    turned = sum(np.linalg.norm(log3(b.value @ a.value.T)) for a, b in pairwise(previews))
     assert turned == pytest.approx(angle, rel=2e-2)
 
 

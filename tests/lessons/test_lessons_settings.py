@@ -15,10 +15,12 @@ from lessons.scenes import load_scene
 from lessons.settings import SceneSettings, changed, paths
 from robots import InputError
 
+START = load_scene("iiwa14-circle").settings
 
-@pytest.fixture(scope="module")
+
+@pytest.fixture
 def start() -> SceneSettings:
-    return load_scene("iiwa14-circle").settings
+    return START
 
 
 def test_a_path_reaches_its_field_and_nothing_else(start: SceneSettings) -> None:
@@ -142,13 +144,15 @@ def test_a_value_that_cannot_be_is_refused(start: SceneSettings, path: str, valu
 
 
 @given(
-    path=st.sampled_from(paths(load_scene("iiwa14-circle").settings)) | st.text(max_size=20),
-    value=st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.lists(st.floats()),
+    path=st.sampled_from(paths(START)) | st.text(max_size=20),
+    value=st.one_of(
+        st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.lists(st.floats())
+    ),
 )
 def test_any_value_is_taken_or_refused_in_words(path: str, value: Any) -> None:
     """Whatever is written into a field: settings a controller can use, or an InputError."""
     try:
-        new = changed(load_scene("iiwa14-circle").settings, path, value)
+        new = changed(START, path, value)
     except InputError as error:
         assert str(error)
     else:
@@ -162,7 +166,9 @@ def test_assignments_are_json_or_words() -> None:
     assert parse_assignment("limits.position=paper") == ("limits.position", "paper")
 
 
-@pytest.mark.parametrize("text", ["horizon", "=3", "Q=NaN", "Q=nan", "Q=Infinity", "Q=-inf", "Q=", "R=[1, NaN]"])
+@pytest.mark.parametrize(
+    "text", ["horizon", "=3", "Q=NaN", "Q=nan", "Q=Infinity", "Q=-inf", "Q=", "R=[1, NaN]"]
+)
 def test_assignments_that_are_none(text: str) -> None:
     """No "=", no number: the sentence repeats what was written."""
     with pytest.raises(InputError, match="--set"):
