@@ -66,8 +66,6 @@ class Session:
         self._row = np.full(self.layout.size, np.nan)
         self.reset()
 
-    # ------------------------------------------------------------- state
-
     @property
     def t(self) -> float:
         """Simulated time since the last reset, s."""
@@ -98,8 +96,6 @@ class Session:
         """The draggable target of a task, None if its reference is a fixed motion."""
         reference = self.references.get(task)
         return reference if isinstance(reference, Target) else None
-
-    # ------------------------------------------------------------- events
 
     def post(self, event: Event) -> None:
         """Puts an event in the mailbox; it takes effect at the next tick, or leaves a notice."""
@@ -169,8 +165,6 @@ class Session:
         if array.shape != target.raw.shape:
             raise InputError(f"the target of task '{name}' needs {target.raw.size} numbers, not {array.size}")
         target.move(array)
-
-    # ------------------------------------------------------------- the loop
 
     def tick(self) -> Array:
         """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it).
@@ -250,8 +244,6 @@ class Session:
             for task in first.tasks
             if task.name in plan.errors
         )
-
-    # ------------------------------------------------------------- views
 
     def predicted_path(self, frame: str = "") -> Array:
         """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ def nested_bases(levels: Sequence[Array]) -> list[Array]:
     if not levels:
         return []
     N, _, n = levels[0].shape
-    sizes = np.cumsum([B.shape[1] for B in levels]).tolist()
+    sizes = list(accumulate(B.shape[1] for B in levels))
     if sizes[-1] <= n:
         stacked = np.concatenate(levels, axis=1).transpose(0, 2, 1)
         Q, R = np.linalg.qr(stacked, mode="complete")

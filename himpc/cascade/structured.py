@@ -94,7 +94,7 @@ def _quadratic(problem: LevelProblem, U_above: Array | None, Z: Array) -> _Quadr
 
 def _metric_basis(Z: Array, R: Array) -> Array:
     """Z scaled so that YᵀRY = I; zero columns stay zero."""
-    if R.min() == R.max():
+    if (R[0] == R).all():
         return Z * (1.0 / math.sqrt(R[0]))
     gram = Z.transpose(0, 2, 1) @ (R[:, None] * Z)
     index = np.arange(Z.shape[2])
@@ -170,8 +170,10 @@ def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple
 def _violated(rows: Rows, U: Array) -> Mask | None:
     """Mask (r, n) of the rows that U violates, None if there are none."""
     value = rows.L @ U
-    mask = (value > rows.upper + _TOLERANCE) | (value < rows.lower - _TOLERANCE)
-    return mask if mask.any() else None
+    above, below = value - rows.upper, rows.lower - value
+    if float(above.max()) <= _TOLERANCE and float(below.max()) <= _TOLERANCE:
+        return None
+    return (above > _TOLERANCE) | (below > _TOLERANCE)
 
 
 def _norm(x: Array) -> float:
@@ -194,6 +196,11 @@ def _with_rows(quadratic: _Quadratic, rows: Rows, mask: Mask, solver: Solver) ->
             offset = np.einsum("ks,sk->k", rows.L[row], U_above[:, joint])
             lower, upper = np.minimum(lower - offset, 0.0), np.maximum(upper - offset, 0.0)
         solution = solve_qp(H, f, A, lower, upper, solver)
+        if not solution.solved and U_above is not None:
+            # Many rows without any room at y = 0 look contradictory to DAQP; a little room tells them apart.
+            qp_us += solution.time_us
+            lower, upper = np.minimum(lower, -_TOLERANCE), np.maximum(upper, _TOLERANCE)
+            solution = solve_qp(H, f, A, lower, upper, solver)
         qp_us += solution.time_us
         if not solution.solved:
             return None

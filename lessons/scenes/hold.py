@@ -24,7 +24,8 @@ def hold_of(name: str) -> Scene:
     """
     robot = load_robot(name)
     if name == "iiwa14":
-        robot = replace(robot, M_bar=suggest_M_bar(robot.model, robot.q_lower, robot.q_upper))
+        safe = suggest_M_bar(robot.model, robot.q_lower, robot.q_upper)
+        robot = replace(robot, M_bar=np.minimum(robot.M_bar, safe))
     plant = PLANAR3_PLANT if name == "planar3" else PlantSettings()
     return replace(_hold(robot, plant), name=f"{name}-hold", sources={})
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
-from himpc.limits.rows import least_slack
+from himpc.limits.rows import POSITION_MARGIN, least_slack
 from himpc.limits.viability import RETURN_RATE, viability_bounds
 from himpc.prediction.joint import JointState
 from robots import InputError, load_robot
@@ -100,7 +100,8 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
     v, q, a, tau = state.v.copy(), state.q.copy(), state.a.copy(), tau_0.copy()
     v_bounds = np.stack([-force.v_limit, force.v_limit])
     if position == "viability":
-        v_bounds = viability_bounds(state.q, force.q_lower, force.q_upper, force.v_limit, force.a_max, T_s)
+        low, high = force.q_lower + POSITION_MARGIN, force.q_upper - POSITION_MARGIN
+        v_bounds = viability_bounds(state.q, low, high, force.v_limit, force.a_max, T_s)
     for j in range(N):
         tau, a, q = tau + U[j], a + U[j] / M_bar, q + T_s * v
         v = v + T_s * a
@@ -180,8 +181,8 @@ def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) ->
     first = path[1]
     # The first bounds contain the present state but for one tick's share of closing in.
     share = 10.0 * 1e-3 / 0.5
-    assert first.tau_upper[0] >= max(tau, 3.0) - 10 * share
-    assert first.tau_lower[0] <= min(tau, -3.0) + 10 * share
+    assert first.tau_upper[0] >= max(abs(tau), 3.0) - 10 * share
+    assert first.tau_lower[0] <= -max(abs(tau), 3.0) + 10 * share
     assert first.v_limit[0] >= max(abs(v), 0.5) - 2 * share
     assert first.q_upper[0] >= max(q, 0.3) - share
     assert first.q_lower[0] <= min(q, -0.2) + share
@@ -199,7 +200,8 @@ def test_limits_switched_on_start_from_the_present() -> None:
     nothing = force_of(tau=np.inf, v=np.inf, q_low=-np.inf, q_high=np.inf)
     first = ramp(nothing, force_of(), np.array([15.0]), np.array([1.4]), np.array([-3.0]), 1e-3)
     assert first.tau_upper[0] == pytest.approx(15.0, abs=0.05)
-    assert first.tau_lower[0] == -10.0
+    # Both sides of a torque bound are tightened together.
+    assert first.tau_lower[0] == -first.tau_upper[0]
     assert first.v_limit[0] == pytest.approx(3.0, abs=0.01)
     assert first.q_upper[0] == pytest.approx(1.4, abs=0.01)
     assert first.q_lower[0] == -1.0
