@@ -27,7 +27,7 @@ class Limits:
         velocity_approach: 1/s; how fast a velocity bound may be approached, as a share of the distance left
             (a barrier: q̈ ≤ rate·(q̇_max − q̇)). Time-delay estimation needs tens of ticks to stop an
             acceleration (M̄ < M), so a bound met at full acceleration is overrun: by 17 % on the iiwa's
-            circle with rate 0, which is (32e) as printed, by 0.2 % with 20.
+            circle with rate 0, which is (32e) as printed, by 0.2 % with 15.
     """
 
     torque: bool = True
@@ -35,7 +35,7 @@ class Limits:
     position: PositionMode = "viability"
     torque_scale: float = 1.0
     velocity_scale: float = 1.0
-    velocity_approach: float = 20.0
+    velocity_approach: float = 15.0
 
     def __post_init__(self) -> None:
         for field in ("torque_scale", "velocity_scale"):

@@ -51,8 +51,8 @@ class Rows:
         return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
 
 
-POSITION_MARGIN = 0.005
-"""rad: how far before its limit a joint is stopped; the estimation error carries it up to half of that further."""
+POSITION_MARGIN = 0.007
+"""rad: how far before its limit a joint is stopped; the estimation error carries it up to half of that on."""
 REACTION = 5.0
 """Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
 

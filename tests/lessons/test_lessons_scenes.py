@@ -148,11 +148,6 @@ def test_printed_position_rows_fail_honestly() -> None:
     assert result["limits"]["torque"]["max_ratio"] <= 1.000
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="with the suggested M̄ (joint 2: 0.70) the tip cycles by 0.88 mm (encoder), 0.65 mm (and friction) over "
-    "60 s, joint 2 by 34 N·m; with the paper's M̄ (0.21) it was 0.02 mm and, past a slow transient, 0.03 mm",
-)
 @pytest.mark.parametrize(
     "assignments",
     [
