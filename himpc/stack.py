@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,13 +102,3 @@ def freedom_left(robot: Robot, stack: Stack) -> int:
         rows = np.vstack([task.jacobian(configuration)[0] for task in tasks])
         rank = max(rank, int(np.linalg.matrix_rank(rows, tol=1e-6)))
     return robot.n - rank
-
-
-def with_level(stack: Stack, name: str, **changes: object) -> Stack:
-    """The stack with fields of one level replaced."""
-    return tuple(replace(level, **changes) if level.name == name else level for level in stack)
-
-
-def frames_used(stack: Stack) -> set[str]:
-    """Frames named by the stack's tasks ('' stands for the robot's tip)."""
-    return {getattr(task, "frame", "") for level in stack for task in level.tasks}

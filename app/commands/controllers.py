@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.commands.output import print_table, write_json
+from app.commands.output import print_list
 
 
 def controllers(json: str | None = None) -> int:
@@ -13,8 +13,4 @@ def controllers(json: str | None = None) -> int:
     """
     from himpc import CONTROLLERS
 
-    if json is not None:
-        write_json([{"name": name, "description": line} for name, line in CONTROLLERS.items()], json)
-    else:
-        print_table("Controllers", ("controller", "what it is"), list(CONTROLLERS.items()))
-    return 0
+    return print_list("Controllers", "controller", CONTROLLERS, json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,3 +35,12 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     for row in rows:
         table.add_row(*row)
     Console().print(table)
+
+
+def print_list(title: str, column: str, lines: Mapping[str, str], json_target: str | None) -> int:
+    """A named list with one line of description each, as a table or as JSON; the exit code."""
+    if json_target is not None:
+        write_json([{"name": name, "description": line} for name, line in lines.items()], json_target)
+    else:
+        print_table(title, (column, "what it is"), list(lines.items()))
+    return 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.commands.output import print_table, write_json
+from app.commands.output import print_list
 
 
 def scenes(json: str | None = None) -> int:
@@ -13,8 +13,4 @@ def scenes(json: str | None = None) -> int:
     """
     from lessons.scenes import SCENES
 
-    if json is not None:
-        write_json([{"name": name, "description": line} for name, line in SCENES.items()], json)
-    else:
-        print_table("Scenes", ("scene", "what it is"), list(SCENES.items()))
-    return 0
+    return print_list("Scenes", "scene", SCENES, json)
