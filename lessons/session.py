@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
-from himpc.controllers import HIMPC
+from himpc.controllers import make_controller
 from himpc.plan import Binding, Plan
 from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Preview, Reference, Target
 from himpc.rotation import from_quaternion, quaternion
@@ -21,6 +21,7 @@ from himpc.telemetry import Layout, layout_of, write_plan
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.scene import Scene
 from lessons.settings import SceneSettings, changed
+from lessons.truth import dynamic_leak
 from robots import InputError, Plant, convergence_gauge
 from robots.errors import unknown_name
 
@@ -57,7 +58,9 @@ class Session:
         self.robot = scene.robot
         self.settings: SceneSettings = scene.settings
         self.plant = Plant(scene.robot, scene.settings.plant)
-        self.controller = HIMPC(scene.robot, scene.settings.for_controller())
+        self.controller = make_controller(
+            scene.settings.controller, scene.robot, scene.settings.for_controller()
+        )
         self.layout: Layout = layout_of(scene.robot, scene.settings.levels)
         self.notices: list[str] = []
         self.log: list[tuple[float, Event]] = []
@@ -139,7 +142,12 @@ class Session:
     def _adopt(self, settings: SceneSettings) -> None:
         if settings.plant != self.settings.plant:
             self.plant.configure(settings.plant)
-        self.controller.configure(settings.for_controller())
+        if settings.controller == self.settings.controller:
+            self.controller.configure(settings.for_controller())
+        else:
+            # A controller takes over at the torque that acts now.
+            self.controller = make_controller(settings.controller, self.robot, settings.for_controller())
+            self.controller.reset(self.plant.tau)
         self.settings = settings
 
     def _move_target(self, name: str, value: tuple[float, ...]) -> None:
@@ -213,23 +221,14 @@ class Session:
         if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
             M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
-            leak = self._dynamic_leak(M, plan, q) if len(plan.levels) > 1 else math.nan
+            leak = math.nan
+            if len(plan.levels) > 1:
+                at = Configuration(self.robot, self._data, q, q)
+                leak = dynamic_leak(M, plan, self.settings.levels, at)
             self._truth = (leak, *convergence_gauge(M, M_bar))
         # The layout puts these three side by side.
         start = self.layout.fields["dynamic_leak"].start
         row[start : start + 3] = self._truth
-
-    def _dynamic_leak(self, M: Array, plan: Plan, q: Array) -> float:
-        """max over p of ‖J_p M⁻¹(τ − τ_{≤p})‖∞ with the plant's M: what lower levels really do."""
-        first = np.array([level.U[0] for level in plan.levels])
-        acceleration = np.linalg.solve(M, (first[-1] - first[:-1]).T)
-        tasks = {level.name: level.tasks for level in self.settings.levels}
-        configuration = Configuration(self.robot, self._data, q, q)
-        leak = 0.0
-        for level, column in zip(plan.levels[:-1], acceleration.T, strict=True):
-            for task in tasks.get(level.name, ()):
-                leak = max(leak, float(np.abs(task.jacobian(configuration)[0] @ column).max()))
-        return leak
 
     def _is_wild(self, q: Array, v: Array) -> bool:
         # A comparison with NaN is false, so "not within" also catches what is not finite.

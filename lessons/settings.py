@@ -12,18 +12,19 @@ import numpy as np
 from himpc.controllers import CONTROLLERS, Settings
 from himpc.limits import Limits
 from himpc.stack import Level, Stack
-from robots import InputError, PlantSettings
+from robots import InputError, NominalSettings, PlantSettings
 from robots.errors import unknown_name
 
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Settings of a run; see `himpc.controllers.himpc.Settings` for the controller's own.
+    """Settings of a run; see `himpc.controllers.Settings` for the controller's own.
 
     Attributes:
         levels: the stack.
         M_bar: diagonal of M̄ before scaling.
         M_bar_scale: factor on all of it.
+        nominal: what model-based controllers believe the plant to be.
         plant: what the plant really is.
     """
 
@@ -38,6 +39,7 @@ class SceneSettings:
     solver: Literal["daqp", "proxqp"] = "daqp"
     damping: bool = True
     limits: Limits = field(default_factory=Limits)
+    nominal: NominalSettings = field(default_factory=NominalSettings)
     plant: PlantSettings = field(default_factory=PlantSettings)
 
     def for_controller(self) -> Settings:
@@ -56,12 +58,14 @@ class SceneSettings:
             solver=self.solver,
             R_on=self.R_on,
             damping=self.damping,
+            nominal=self.nominal,
         )
 
 
 _LEVEL_KEYS = ("Q", "R", "horizon", "enabled", "K_p", "K_v")
 _TASK_KEYS = ("K_p", "K_v")
 _EVERY_LEVEL = ("Q", "R")
+_PARTS = ("limits", "nominal", "plant")
 
 
 def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
@@ -69,7 +73,7 @@ def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
 
     Paths: a field ("horizon", "M_bar", …); "Q" or "R" for all levels (one number, or one per level);
     "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p, K_v
-    (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "plant.KEY".
+    (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY".
 
     Raises:
         InputError: unknown path (naming the nearest), or a value of the wrong type or range.
@@ -81,7 +85,7 @@ def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
         return _in_level(settings, path, rest, value)
     if head == "tasks":
         return _in_task(settings, path, rest, value)
-    if head in ("limits", "plant"):
+    if head in _PARTS:
         part = getattr(settings, head)
         names = [f.name for f in fields(part)]
         if rest not in names:
@@ -107,13 +111,12 @@ def paths(settings: SceneSettings) -> list[str]:
             for task in level.tasks
             for key in _TASK_KEYS
         ),
-        *(f"limits.{f.name}" for f in fields(settings.limits)),
-        *(f"plant.{f.name}" for f in fields(settings.plant)),
+        *(f"{part}.{f.name}" for part in _PARTS for f in fields(getattr(settings, part))),
     ]
 
 
 def _plain_fields() -> list[str]:
-    return [f.name for f in fields(SceneSettings) if f.name not in ("levels", "limits", "plant")]
+    return [f.name for f in fields(SceneSettings) if f.name not in ("levels", *_PARTS)]
 
 
 def _unknown_path(settings: SceneSettings, path: str) -> InputError:
@@ -202,7 +205,7 @@ def _typed(path: str, old: Any, value: Any) -> Any:
         return int(number)
     if isinstance(old, tuple) and not isinstance(value, (list, tuple, np.ndarray)):
         _number(path, value)
-        if path.startswith("plant."):
+        if path.startswith(("nominal.", "plant.")):
             return float(value)
         raise InputError(f"{path} is {value!r}: give a list of {len(old)} numbers, e.g. {list(old)}")
     return _weight(path, value)

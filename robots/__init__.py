@@ -4,6 +4,7 @@ from robots.catalog import CATALOG
 from robots.errors import InputError
 from robots.inertia import convergence_gauge, suggest_M_bar
 from robots.load import load_robot, load_urdf_text
+from robots.nominal import NominalModel, NominalSettings
 from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
@@ -16,6 +17,8 @@ __all__ = [
     "Finding",
     "ImportReport",
     "InputError",
+    "NominalModel",
+    "NominalSettings",
     "Plant",
     "PlantSettings",
     "PlantState",

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
 from himpc.configuration import Configuration
+from himpc.controllers.settings import Settings
 from himpc.prediction.task import ResidualModel, residual_model
 from himpc.references import Preview
 from himpc.references.hold import still
 from himpc.stack import Level
 from himpc.tasks import Damping, Task
 from robots import InputError, Robot
-
-if TYPE_CHECKING:
-    from himpc.controllers.himpc import Settings
 
 Array = NDArray[np.float64]
 

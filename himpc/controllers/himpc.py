@@ -4,72 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from time import perf_counter_ns
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.cascade import ROUTES, Route, solve_cascade
+from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
 from himpc.controllers.forms import StackForm, measure, stack_form
 from himpc.controllers.memory import Memory
+from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Plan
 from himpc.prediction.joint import JointState, predict_positions
-from himpc.qp import SOLVERS, Solver
 from himpc.references import Preview
-from himpc.stack import DAMPING_LEVEL, Stack, active_levels, check_names, freedom_left
+from himpc.stack import DAMPING_LEVEL, active_levels, freedom_left
 from robots import InputError, Robot
-from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
 
-MAX_HORIZON = 60
 ENABLE_SECONDS = 0.5
 _FAINTEST = 1e-8
 """A level switched on starts with this share of its Q and gains decades at a constant rate."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Everything about HIMPC that may change while the robot moves.
-
-    Attributes:
-        stack: levels, highest priority first.
-        horizon: N ≥ 1 knots; 1 is HIQP.
-        T_s: control period, s.
-        M_bar: diagonal of M̄, one per joint, kg·m².
-        limits: bounds to impose.
-        route: "structured" (fast) or "explicit" (all rows as printed).
-        solver: "daqp" or "proxqp".
-        R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ.
-        damping: add the damping level whenever the enabled levels leave freedom.
-    """
-
-    stack: Stack
-    M_bar: tuple[float, ...]
-    horizon: int = 5
-    T_s: float = 1e-3
-    limits: Limits = field(default_factory=Limits)
-    route: Route = "structured"
-    solver: Solver = "daqp"
-    R_on: Literal["torque", "acceleration"] = "torque"
-    damping: bool = True
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.horizon <= MAX_HORIZON:
-            raise InputError(f"horizon is {self.horizon}: give a whole number from 1 to {MAX_HORIZON}")
-        if not 1e-4 <= self.T_s <= 0.02:
-            raise InputError(f"T_s is {self.T_s} s: give a period from 0.0001 to 0.02, e.g. 0.001")
-        if not all(math.isfinite(value) and value > 0 for value in self.M_bar):
-            raise InputError(f"M_bar is {list(self.M_bar)}: every entry must be a finite number above 0")
-        for name, choices in (("route", ROUTES), ("solver", SOLVERS), ("R_on", ("torque", "acceleration"))):
-            if getattr(self, name) not in choices:
-                raise unknown_name(name, str(getattr(self, name)), choices)
-        check_names(self.stack)
 
 
 class HIMPC:

@@ -1,0 +1,67 @@
+"""The dynamic model that model-based controllers believe in: the robot's, with stated errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from robots.robot import Robot
+from robots.settings import PlantSettings
+from robots.truth import true_model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NominalSettings:
+    """What a model-based controller is told; the plant is described by `PlantSettings`, apart from this.
+
+    payload_kg, damping, armature, inertia_scale, gravity: as in `PlantSettings`, but as the controller
+        believes them; by default the robot as its URDF describes it, without armature or friction.
+
+    Raises InputError, naming the field, for values that cannot be.
+    """
+
+    payload_kg: float = 0.0
+    damping: float | tuple[float, ...] = 0.0
+    armature: float | tuple[float, ...] = 0.0
+    inertia_scale: float | tuple[float, ...] = 1.0
+    gravity: bool = True
+
+    def __post_init__(self) -> None:
+        self.as_plant()
+
+    def as_plant(self) -> PlantSettings:
+        """The same numbers as a plant would have them."""
+        return PlantSettings(
+            payload_kg=self.payload_kg,
+            damping=self.damping,
+            armature=self.armature,
+            inertia_scale=self.inertia_scale,
+            gravity=self.gravity,
+        )
+
+
+class NominalModel:
+    """M(q) and the bias torque C(q, q̇)q̇ + g(q) + D q̇ of (1), as believed.
+
+    Raises InputError for a per-joint list of the wrong length.
+    """
+
+    def __init__(self, robot: Robot, settings: NominalSettings) -> None:
+        plant = settings.as_plant()
+        self._model = true_model(robot, plant)
+        self._data = self._model.createData()
+        self._damping = plant.per_joint("damping", robot.n)
+
+    def mass_matrix(self, q: Array) -> Array:
+        """M(q) with armature, (n, n) symmetric, kg·m²."""
+        M = pin.crba(self._model, self._data, q)
+        return np.triu(M) + np.triu(M, 1).T
+
+    def bias(self, q: Array, v: Array) -> Array:
+        """The torque that keeps q̈ = 0, (n,) N·m."""
+        return np.asarray(pin.nonLinearEffects(self._model, self._data, q, v) + self._damping * v)
