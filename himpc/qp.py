@@ -101,10 +101,12 @@ def _daqp(
 
 _DAQP = (
     _daqp,
+    partial(_daqp, eps_prox=1e-6, eta_prox=1e-12),
+    partial(_daqp, eps_prox=1e-2, eta_prox=1e-12),
     partial(_daqp, scaled=False),
-    partial(_daqp, scaled=False, eps_prox=1e-6, eta_prox=1e-10),
 )
-"""DAQP calls 1 % of hard but feasible QPs infeasible; another scaling or tolerance then finds the optimum."""
+"""DAQP cycles on, or calls infeasible, 1 % of hard but feasible QPs: proximal steps, or another scaling, then
+find the optimum."""
 
 
 def _proxqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import lru_cache
+from itertools import accumulate, pairwise
 from time import perf_counter_ns
 from typing import Literal
 
@@ -15,6 +15,7 @@ from himpc.cascade.explicit import solve_explicit
 from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, LevelSolution, Point, Rung
 from himpc.cascade.null_space import nested_bases
 from himpc.cascade.structured import solve_structured
+from himpc.cascade.triangular import solve_triangular
 from himpc.limits.rows import Rows, least_slack
 from himpc.qp import Solver
 
@@ -51,35 +52,45 @@ def solve_cascade(
         solver: QP solver.
     """
     N, _, n = problems[0].B.shape
-    U = np.zeros((N, n))
-    bases = [_whole_space(N, n), *nested_bases([problem.B for problem in problems[:-1]])]
-    above: list[tuple[Array, Array]] = []
-    solutions: list[LevelSolution] = []
-    for problem, Z in zip(problems, bases, strict=True):
-        started = perf_counter_ns()
-        before = previous.get(problem.name)
-        if Z.shape[2] == 0:
-            point, rung = Point(U, NO_ROWS, 0.0, "empty"), "solve"
-        else:
-            point, rung, rows = _climb_down(problem, rows, U, above, Z, before, damping, route, solver)
-        U = point.U
-        leak = _leak(above, U)
-        above.append((problem.B, U))
-        solutions.append(
-            LevelSolution(
-                name=problem.name,
-                U=U,
-                cost=problem.cost(U, point.error),
-                active=point.active,
-                kkt_residual=point.kkt_residual,
-                status=point.status,
-                rung=rung,
-                time_us=(perf_counter_ns() - started) / 1e3,
-                qp_us=point.qp_us,
-                leak=leak,
-            )
+    warm = [_fitting(previous.get(problem.name), rows) for problem in problems]
+    upper = [problem.B for problem in problems[:-1]]
+    B = np.concatenate(upper, axis=1) if len(upper) > 1 else upper[0] if upper else np.empty((N, 0, n))
+    points = solve_triangular(problems, B, rows, warm) if route == "structured" else []
+    rungs: list[Rung] = ["solve"] * len(points)
+    if len(points) < len(problems):
+        U = points[-1].U if points else np.zeros((N, n))
+        above = [(problem.B, point.U) for problem, point in zip(problems, points, strict=False)]
+        bases = [_whole_space(N, n), *nested_bases(upper)]
+        for place in range(len(points), len(problems)):
+            started = perf_counter_ns()
+            problem, Z = problems[place], bases[place]
+            if Z.shape[2] == 0:
+                point, rung = Point(U, NO_ROWS, 0.0, "empty"), "solve"
+            else:
+                before = previous.get(problem.name)
+                point, rung, rows = _climb_down(
+                    problem, rows, U, above, Z, warm[place], before, damping, route, solver
+                )
+            U = point.U
+            above.append((problem.B, U))
+            points.append(point._replace(time_us=(perf_counter_ns() - started) / 1e3))
+            rungs.append(rung)
+    leaks = _leaks(upper, B, [point.U for point in points])
+    return [
+        LevelSolution(
+            problem.name,
+            point.U,
+            problem.cost(point.U, point.error),
+            point.active,
+            point.kkt_residual,
+            point.status,
+            rung,
+            point.time_us,
+            point.qp_us,
+            leak,
         )
-    return solutions
+        for problem, point, rung, leak in zip(problems, points, rungs, leaks, strict=True)
+    ]
 
 
 @lru_cache(maxsize=8)
@@ -89,7 +100,7 @@ def _whole_space(N: int, n: int) -> Array:
 
 def _fitting(before: LevelSolution | None, rows: Rows) -> ActiveRows:
     """Last tick's active rows, if the horizon and the kinds of rows are still the same."""
-    if before is None or not len(before.active):
+    if before is None or not before.active.row.size:
         return NO_ROWS
     return before.active if before.active.row.max() < len(rows.L) else NO_ROWS
 
@@ -100,6 +111,7 @@ def _climb_down(
     U: Array,
     above: list[tuple[Array, Array]],
     Z: Array,
+    warm: ActiveRows,
     before: LevelSolution | None,
     damping: Callable[[], LevelProblem],
     route: Route,
@@ -110,7 +122,7 @@ def _climb_down(
             return solve_explicit(problem, rows, U, above, Z, solver)
         return solve_structured(problem, rows, U if above else None, Z, warm, solver)
 
-    point = attempt(problem, rows, _fitting(before, rows))
+    point = attempt(problem, rows, warm)
     if point is not None:
         return point, "solve", rows
     if above:
@@ -128,7 +140,7 @@ def _climb_down(
             return Point(shifted, NO_ROWS, 0.0, "unsolved"), "previous", _containing(rows, shifted)
     point = attempt(damping(), torque)
     if point is not None:
-        return replace(point, kkt_residual=0.0, status="unsolved"), "damping", _containing(rows, point.U)
+        return point._replace(kkt_residual=0.0, status="unsolved"), "damping", _containing(rows, point.U)
     first = np.clip(np.zeros(U.shape[1]), torque.lower[0], torque.upper[0])
     held = np.vstack([first, np.zeros((len(U) - 1, U.shape[1]))])
     return Point(held, NO_ROWS, 0.0, "unsolved"), "hold", _containing(rows, held)
@@ -140,11 +152,20 @@ def _containing(rows: Rows, U: Array) -> Rows:
     return Rows(rows.L, np.minimum(rows.lower, value), np.maximum(rows.upper, value), rows.kinds)
 
 
-def _leak(above: list[tuple[Array, Array]], U: Array) -> float:
-    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above."""
-    leak = 0.0
-    for B, U_p in above:
-        difference = U - U_p
-        if difference.any():
-            leak = max(leak, float(np.abs(np.matmul(B, difference[:, :, None])).max()))
-    return leak
+def _leaks(upper: Sequence[Array], B: Array, increments: Sequence[Array]) -> list[float]:
+    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, for every level i.
+
+    Args:
+        upper: B_p of all levels but the last.
+        B: the same, one below the other.
+        increments: U_i of all levels, (N, n) each.
+    """
+    if not upper:
+        return [0.0]
+    effect = np.matmul(B, np.array(increments)[..., None])[..., 0]
+    own = np.empty(effect.shape[1:])
+    ends = [0, *accumulate(block.shape[1] for block in upper)]
+    for place, (start, end) in enumerate(pairwise(ends)):
+        own[:, start:end] = effect[place, :, start:end]
+    change = np.abs(effect[1:] - own)
+    return [0.0, *(float(change[i, :, :end].max()) for i, end in enumerate(ends[1:]))]

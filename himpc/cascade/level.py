@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ Array = NDArray[np.float64]
 Rung = Literal["solve", "soften", "previous", "inherit", "damping", "hold"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LevelProblem:
+class LevelProblem(NamedTuple):
     """The data of Problem i, (32) or (34): min Σ ‖e_{j+1}‖²_Q + ‖Δτ_j‖²_R, e affine in U.
 
     Attributes:
@@ -23,20 +22,24 @@ class LevelProblem:
         B: (N, m, n), Ĵ^j M̄⁻¹ at every knot.
         C: (N, m, N), effect coefficients of `prediction.task.ResidualModel`.
         free: (N, m), e for U = 0.
+        weighted_free: (N, m), √Q free.
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
         R: (n,).
         knots: K, how many knots this level looks ahead, ≤ N.
+        common_R: R if it is the same for all joints, else None.
     """
 
     name: str
     B: Array
     C: Array
     free: Array
+    weighted_free: Array
     root_Q: Array
     weighted_C: Array
     R: Array
     knots: int
+    common_R: float | None
 
     def residual(self, U: Array) -> Array:
         """e at knots 1 … N under U, (N, m)."""
@@ -46,7 +49,9 @@ class LevelProblem:
     def cost(self, U: Array, error: Array | None = None) -> float:
         """The value (32a) or (34a) of U over this level's knots; `error` is Q^½ e if it is known."""
         e = self.root_Q * self.residual(U)[: self.knots] if error is None else error
-        return float(np.vdot(e, e) + np.vdot(self.R * U[: self.knots], U[: self.knots]))
+        used = U if self.knots == len(U) else U[: self.knots]
+        effort = self.R * used if self.common_R is None else self.common_R * used
+        return float(np.vdot(e, e) + np.vdot(effort, used))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,8 +81,7 @@ class ActiveRows:
 NO_ROWS = ActiveRows(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0), np.empty(0))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LevelSolution:
+class LevelSolution(NamedTuple):
     """The evidence of one level.
 
     Attributes:
@@ -105,13 +109,13 @@ class LevelSolution:
     leak: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Point:
+class Point(NamedTuple):
     """Increments for one level, with what was verified about them.
 
     Attributes:
         error: Q^½ e over the level's knots, flattened, if the route has it at hand.
         qp_us: time spent in the QP solver, microseconds.
+        time_us: time spent on this level, if the route knows it, microseconds.
     """
 
     U: Array
@@ -120,3 +124,4 @@ class Point:
     status: str
     error: Array | None = None
     qp_us: float = 0.0
+    time_us: float = 0.0

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 RANK_TOLERANCE = 1e-10
 """Singular values below this share of ‖B‖ count as zero: such a direction is left to lower levels."""
 
-_CLEARLY_REGULAR = 1e-5
+CLEARLY_REGULAR = 1e-5
 """Diagonals of a triangular factor above this share of the largest entry prove full rank, room to spare."""
 
 
@@ -37,7 +37,7 @@ def nested_bases(levels: Sequence[Array]) -> list[Array]:
         stacked = np.concatenate(levels, axis=1).transpose(0, 2, 1)
         Q, R = np.linalg.qr(stacked, mode="complete")
         pivots = R.diagonal(axis1=1, axis2=2)
-        if float(np.abs(pivots).min()) > _CLEARLY_REGULAR * float(np.abs(stacked).max()):
+        if float(np.abs(pivots).min()) > CLEARLY_REGULAR * float(np.abs(stacked).max()):
             return [Q[:, :, end:] for end in sizes]
     bases = []
     Z = np.broadcast_to(np.eye(n), (N, n, n))

@@ -54,9 +54,8 @@ def solve_structured(
 
     The equality constraints (33) hold exactly for every y. Y is scaled so that YᵀRY = I: the cost is
     ½‖y‖² + (YᵀR U_{i−1})ᵀy + ½‖Q^½(e + Gy)‖² and its Hessian I + ĜᵀĜ is solved in the smaller
-    of its two dimensions. First the rows that were active a tick ago are tried as equalities; if
-    their multipliers have the right signs and no other row is violated, that is the optimum. Else
-    the QP with the violated rows is solved, and repeated with more rows until none is violated.
+    of its two dimensions. If that point violates rows, the QP with these and with the rows that were active
+    a tick ago is solved, and repeated with more rows until none is violated.
 
     Args:
         problem: the level's data.
@@ -70,7 +69,8 @@ def solve_structured(
         the optimum, or None if the solver gave no point within the KKT tolerance.
     """
     quadratic = _quadratic(problem, U_above, Z)
-    point, violated = _with_active(quadratic, rows, warm)
+    point = _without_rows(quadratic)
+    violated = None if point is None else _violated(rows, point.U)
     if point is not None and violated is None:
         return point
     mask = np.zeros(rows.lower.shape, bool) if violated is None else violated
@@ -85,11 +85,11 @@ def _quadratic(problem: LevelProblem, U_above: Array | None, Z: Array) -> _Quadr
     W = problem.B[:K] @ Y
     G = (problem.weighted_C[:, :, :, None] * W.transpose(1, 0, 2)).reshape(K * m, K * d)
     if U_above is None:
-        free, pull = problem.free, np.zeros(K * d)
+        free, pull = problem.weighted_free, np.zeros(K * d)
     else:
-        free = problem.residual(U_above)
+        free = problem.root_Q * problem.residual(U_above)
         pull = np.matmul((problem.R * U_above[:K])[:, None, :], Y).ravel()
-    return _Quadratic(U_above, len(problem.B), Y, G, (problem.root_Q * free[:K]).ravel(), pull)
+    return _Quadratic(U_above, len(problem.B), Y, G, free[:K].ravel(), pull)
 
 
 def _metric_basis(Z: Array, R: Array) -> Array:
@@ -103,68 +103,25 @@ def _metric_basis(Z: Array, R: Array) -> Array:
     return Z @ np.linalg.inv(np.linalg.cholesky(gram)).transpose(0, 2, 1)
 
 
-def _with_active(quadratic: _Quadratic, rows: Rows, active: ActiveRows) -> tuple[Point | None, Mask | None]:
-    """The optimum with some rows as equalities, and the mask of rows it violates (None: none).
-
-    The point is None where the rows are dependent, a multiplier has the wrong sign or the KKT
-    conditions do not hold.
-    """
+def _without_rows(quadratic: _Quadratic) -> Point | None:
+    """The optimum without any bound; None if the KKT conditions do not hold to the tolerance."""
     G, residual, pull = quadratic.G, quadratic.residual, quadratic.pull
     tall, wide = G.shape
-    A = quadratic.row_matrix(rows, active.row, active.joint) if len(active) else None
-    count = len(active)
     if tall < wide:
         # (I + ĜᵀĜ)⁻¹Ĝᵀ = Ĝᵀ(I + ĜĜᵀ)⁻¹ keeps the large residual out of any difference of large numbers.
         S = G @ G.T
         S.flat[:: tall + 1] += 1.0
-        right = np.empty((tall, 1 + count))
-        right[:, 0] = residual if quadratic.U_above is None else residual - G @ pull
-        if A is not None:
-            right[:, 1:] = G @ A.T
-        solved = G.T @ dposv(S, right, overwrite_a=1, overwrite_b=1)[1]
-        y = -solved[:, 0] - pull
-        across = None if A is None else A.T - solved[:, 1:]
+        y = -G.T @ dposv(S, residual - G @ pull)[1] - pull
     else:
         H = G.T @ G
         H.flat[:: wide + 1] += 1.0
-        right = np.empty((wide, 1 + count))
-        right[:, 0] = -(pull + G.T @ residual)
-        if A is not None:
-            right[:, 1:] = A.T
-        solved = dposv(H, right, overwrite_a=1, overwrite_b=1)[1]
-        y = solved[:, 0]
-        across = solved[:, 1:]
-    multipliers = None
-    if A is not None and across is not None:
-        target = np.where(
-            active.multiplier > 0, rows.upper[active.row, active.joint], rows.lower[active.row, active.joint]
-        )
-        if quadratic.U_above is not None:
-            target = target - (rows.L @ quadratic.U_above)[active.row, active.joint]
-        _, multipliers, info = dposv(A @ across, A @ y - target)
-        if info != 0 or not float((multipliers * active.multiplier).min()) > 0.0:
-            return None, None
-        y = y - across @ multipliers
-        if not float(np.abs(A @ y - target).max()) < _TOLERANCE:
-            return None, None
-    U = quadratic.increments(y)
+        y = dposv(H, -(pull + G.T @ residual))[1]
     error = residual + G @ y
     slope = G.T @ error
-    gradient = y + slope
-    if quadratic.U_above is not None:
-        gradient += pull
-    if A is not None and multipliers is not None:
-        gradient += A.T @ multipliers
-    kkt = float(np.abs(gradient).max())
-    if not kkt <= 0.1 * KKT_TOLERANCE:
-        # Only now the scale matters: ‖H‖ ≤ 1 + ‖Ĝ‖²_F.
-        kkt /= max(1.0, (1.0 + float(np.vdot(G, G))) * _norm(y), _norm(pull) + _norm(slope))
-        if not kkt <= KKT_TOLERANCE:
-            return None, None
-    found = NO_ROWS
-    if multipliers is not None:
-        found = ActiveRows(active.row, active.joint, multipliers, np.zeros(len(multipliers)))
-    return Point(U, found, kkt, "optimal", error), _violated(rows, U)
+    # ‖H‖ ≤ 1 + ‖Ĝ‖²_F.
+    scale = max(1.0, (1.0 + float(np.vdot(G, G))) * _norm(y), _norm(pull) + _norm(slope))
+    kkt = float(np.abs(y + pull + slope).max()) / scale
+    return Point(quadratic.increments(y), NO_ROWS, kkt, "optimal", error) if kkt <= KKT_TOLERANCE else None
 
 
 def _violated(rows: Rows, U: Array) -> Mask | None:

@@ -27,34 +27,47 @@ class LevelForm:
 
     Attributes:
         level: the level.
+        name: its identity.
         rows: its rows among those of all levels.
         C: (N, m, N), effect coefficients.
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
         R: (n,), in the weight's unit.
+        common_R: R if it is the same for all joints, else None.
         knots: the level's own horizon K ≤ N.
     """
 
     level: Level
+    name: str
     rows: slice
     C: Array
     root_Q: Array
     weighted_C: Array
     R: Array
+    common_R: float | None
     knots: int
 
-    def problem(self, B: Array, free: Array, share: float) -> LevelProblem:
+    def problem(self, B: Array, free: Array, weighted_free: Array, share: float) -> LevelProblem:
         """The level's QP data; `share` of its √Q counts while it fades in."""
-        faded = share < 1.0
+        rows, root_Q, weighted_C, weighted = (
+            self.rows,
+            self.root_Q,
+            self.weighted_C,
+            weighted_free[:, self.rows],
+        )
+        if share < 1.0:
+            root_Q, weighted_C, weighted = share * root_Q, share * weighted_C, share * weighted
         return LevelProblem(
-            name=self.level.name,
-            B=B[:, self.rows],
-            C=self.C,
-            free=free[:, self.rows],
-            root_Q=self.root_Q * share if faded else self.root_Q,
-            weighted_C=self.weighted_C * share if faded else self.weighted_C,
-            R=self.R,
-            knots=self.knots,
+            self.name,
+            B[:, rows],
+            self.C,
+            free[:, rows],
+            weighted,
+            root_Q,
+            weighted_C,
+            self.R,
+            self.knots,
+            self.common_R,
         )
 
 
@@ -67,12 +80,14 @@ class StackForm:
         tasks: their tasks in the order of the rows.
         sizes: number of rows of each task.
         model: coefficients of the residual for all rows.
+        root_Q: √Q of all rows, (m,).
     """
 
     levels: tuple[LevelForm, ...]
     tasks: tuple[Task, ...]
     sizes: tuple[int, ...]
     model: ResidualModel
+    root_Q: Array
 
     def jacobian(self, configuration: Configuration) -> Array:
         """Ĵ of all rows at every knot, (N, m, n)."""
@@ -83,19 +98,16 @@ class StackForm:
         self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int
     ) -> Array:
         """e at knots 1 … N for Δτ = 0, (N, m), all rows."""
-        found = [
-            still(N, rows) if isinstance(task, Damping) else previews[task.name]
-            for task, rows in zip(self.tasks, self.sizes, strict=True)
-        ]
-        if len(found) == 1:
-            desired = (found[0].displacement, found[0].velocity, found[0].acceleration)
-        else:
-            desired = (
-                np.concatenate([preview.displacement for preview in found], axis=1),
-                np.concatenate([preview.velocity for preview in found], axis=1),
-                np.concatenate([preview.acceleration for preview in found], axis=1),
-            )
-        return self.model.free(error, velocity, acceleration, *(rows[1:] for rows in desired))
+        desired = np.empty((3, N, error.size))
+        start = 0
+        for task, rows in zip(self.tasks, self.sizes, strict=True):
+            end = start + rows
+            preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
+            desired[0, :, start:end] = preview.displacement[1:]
+            desired[1, :, start:end] = preview.velocity[1:]
+            desired[2, :, start:end] = preview.acceleration[1:]
+            start = end
+        return self.model.free(error, velocity, acceleration, *desired)
 
 
 def measure(
@@ -139,17 +151,21 @@ def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> Sta
             K_v.append(_spread(task.K_v, m, f"K_v of task '{task.name}'"))
         m = sum(len(gain) for gain in K_p[first:])
         R = _spread(level.R, robot.n, f"R of level '{level.name}'")
+        if settings.R_on == "acceleration":
+            R = R / np.array(settings.M_bar) ** 2
         root_Q = np.sqrt(_spread(level.Q, m, f"Q of level '{level.name}'"))
         C = residual_model(np.concatenate(K_p[first:]), np.concatenate(K_v[first:]), N, settings.T_s).C
         K = min(level.horizon or N, N)
         forms.append(
             LevelForm(
                 level=level,
+                name=level.name,
                 rows=slice(start, start + m),
                 C=C,
                 root_Q=root_Q,
                 weighted_C=np.ascontiguousarray(root_Q[:, None] * C[:K, :, :K]),
-                R=R / np.array(settings.M_bar) ** 2 if settings.R_on == "acceleration" else R,
+                R=R,
+                common_R=float(R[0]) if (R[0] == R).all() else None,
                 knots=K,
             )
         )
@@ -159,6 +175,7 @@ def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> Sta
         tasks=tuple(task for level in levels for task in level.tasks),
         sizes=tuple(len(gain) for gain in K_p),
         model=residual_model(np.concatenate(K_p), np.concatenate(K_v), N, settings.T_s),
+        root_Q=np.concatenate([form.root_Q for form in forms]),
     )
 
 

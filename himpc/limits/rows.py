@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,7 @@ Array = NDArray[np.float64]
 Kind = Literal["torque", "velocity", "position"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class Rows(NamedTuple):
     """lower ≤ L U ≤ upper, U = (N, n) increments; every joint has the same L.
 
     All rows are in N·m: a velocity row is scaled by M̄/T_s, a position row by M̄/T_s², so that one
@@ -69,8 +67,9 @@ def _toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _remaining(N: int, rate: float) -> Array:
-    return np.asarray((1.0 - rate) ** np.arange(1.0, N + 1)[:, None], np.float64)
+def _approached(N: int, share: float) -> Array:
+    """Share of the distance to a velocity bound that may be gone at knots 1 … N, (N, 1); 1 for share 0."""
+    return 1.0 - np.asarray((1.0 - min(1.0, share or 1.0)) ** np.arange(1.0, N + 1)[:, None], np.float64)
 
 
 def build_rows(
@@ -105,13 +104,12 @@ def build_rows(
         v = viability_bounds(state.q, q_lower, q_upper, force.v_limit, force.a_max, reaction)
     else:
         v = np.array((-force.v_limit, force.v_limit))
-    if limits.velocity_approach:
-        share = _remaining(N, min(1.0, limits.velocity_approach * T_s))
-        v = v[:, None] + share * (state.v - v)[:, None]
-    else:
-        v = v[:, None]
     scale = M_bar / T_s
-    bounds[:, N : 2 * N] = (v - state.free_velocity(N, T_s)) * scale
+    velocity = bounds[:, N : 2 * N]
+    np.multiply(
+        _approached(N, limits.velocity_approach * T_s), ((v - state.v) * scale)[:, None], out=velocity
+    )
+    velocity -= state.gained_velocity(N, T_s) * scale
     if paper:
         q = np.array((force.q_lower, force.q_upper))[:, None]
         bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)

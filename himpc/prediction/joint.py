@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointState:
+class JointState(NamedTuple):
     """Measured joint state: q, q̇ and q̈ (the backward difference of q̇), (n,) each."""
 
     q: Array
@@ -21,17 +20,27 @@ class JointState:
 
     def free_velocity(self, N: int, T_s: float) -> Array:
         """q̇ at knots 1 … N for Δτ = 0, (N, n): (18) then keeps q̈ constant."""
-        return self.v + _steps(N, T_s) * self.a
+        return self.v + self.gained_velocity(N, T_s)
+
+    def gained_velocity(self, N: int, T_s: float) -> Array:
+        """q̇ at knots 1 … N minus q̇_k, for Δτ = 0, (N, n)."""
+        return _steps(N, T_s) * self.a
 
     def free_position(self, N: int, T_s: float) -> Array:
         """q at knots 1 … N for Δτ = 0, (N, n): explicit Euler, as printed."""
-        steps = _steps(N, T_s)
-        return self.q + steps * self.v + 0.5 * steps * (steps - T_s) * self.a
+        return self.q + _euler(N, T_s) @ np.array((self.v, self.a))
 
 
 @lru_cache(maxsize=64)
 def _steps(N: int, T_s: float) -> Array:
     return np.asarray(T_s * np.arange(1.0, N + 1)[:, None], np.float64)
+
+
+@lru_cache(maxsize=64)
+def _euler(N: int, T_s: float) -> Array:
+    """How q̇_k and q̈_k move q at knots 1 … N, (N, 2)."""
+    steps = _steps(N, T_s)
+    return np.hstack([steps, 0.5 * steps * (steps - T_s)])
 
 
 @lru_cache(maxsize=64)
@@ -55,7 +64,8 @@ def predict_positions(state: JointState, U: Array, M_bar: Array, T_s: float) -> 
     """
     q = np.empty((len(U) + 1, state.q.size))
     q[0] = state.q
-    q[1:] = state.free_position(len(U), T_s) + _lags(len(U), T_s)[1] @ (U / M_bar)
+    moved = np.matmul(_lags(len(U), T_s)[1], U / M_bar, out=q[1:])
+    moved += state.free_position(len(U), T_s)
     return q
 
 

@@ -26,11 +26,17 @@ class Circle:
     phase: Phase
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
-        phi, rate, acceleration = (row[:, None] for row in self.phase.at(times(t, T_s, N)))
+        phi, rate, acceleration = self.phase.at(times(t, T_s, N))
         cos, sin = np.cos(phi), np.sin(phi)
-        outward = cos * self.u + sin * self.w
-        tangent = cos * self.w - sin * self.u
-        return sampled(self.centre + outward, rate * tangent, acceleration * tangent - rate * rate * outward)
+        # Components along u and w: outward (cos, sin), along the tangent (−sin, cos).
+        part = np.empty((3, N + 1, 2))
+        part[0, :, 0], part[0, :, 1] = cos, sin
+        part[1, :, 0], part[1, :, 1] = -rate * sin, rate * cos
+        square = rate * rate
+        part[2, :, 0] = -acceleration * sin - square * cos
+        part[2, :, 1] = acceleration * cos - square * sin
+        outward, velocity, curvature = part @ np.array((self.u, self.w))
+        return sampled(self.centre + outward, velocity, curvature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +49,13 @@ class FigureEight:
     phase: Phase
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
-        phi, rate, acceleration = (row[:, None] for row in self.phase.at(times(t, T_s, N)))
-        first = np.cos(phi) * self.u + np.cos(2 * phi) * self.w
-        second = -np.sin(phi) * self.u - 2 * np.sin(2 * phi) * self.w
-        position = self.centre + np.sin(phi) * self.u + 0.5 * np.sin(2 * phi) * self.w
-        return sampled(position, rate * first, acceleration * first + rate * rate * second)
+        phi, rate, acceleration = self.phase.at(times(t, T_s, N))
+        axes = np.array((self.u, self.w))
+        position = np.stack((np.sin(phi), 0.5 * np.sin(2 * phi)), axis=1) @ axes
+        first = np.stack((np.cos(phi), np.cos(2 * phi)), axis=1) @ axes
+        second = np.stack((-np.sin(phi), -2 * np.sin(2 * phi)), axis=1) @ axes
+        rate, acceleration = np.reshape(rate, (-1, 1)), np.reshape(acceleration, (-1, 1))
+        return sampled(self.centre + position, rate * first, acceleration * first + rate * rate * second)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +67,10 @@ class Sinusoid:
     phase: Phase
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
-        phi, rate, acceleration = (row[:, None] for row in self.phase.at(times(t, T_s, N)))
+        phi, rate, acceleration = self.phase.at(times(t, T_s, N))
         cos, sin = np.cos(phi), np.sin(phi)
         return sampled(
-            self.offset + self.amplitude * sin,
-            self.amplitude * rate * cos,
-            self.amplitude * (acceleration * cos - rate * rate * sin),
+            self.offset + np.multiply.outer(sin, self.amplitude),
+            np.multiply.outer(rate * cos, self.amplitude),
+            np.multiply.outer(acceleration * cos - rate * rate * sin, self.amplitude),
         )

@@ -26,9 +26,9 @@ class Phase:
     law: Literal["uniform", "eased"] = "uniform"
     offset: float = 0.0
 
-    def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """(φ, φ̇, φ̈) at times t in seconds."""
+    def at(self, t: Array) -> tuple[Array, Array | float, Array | float]:
+        """(φ, φ̇, φ̈) at times t in seconds; rates that do not change are plain numbers."""
         w, wt = self.omega, self.omega * t
         if self.law == "uniform":
-            return wt + self.offset, np.full_like(wt, w), np.zeros_like(wt)
+            return wt + self.offset, w, 0.0
         return wt - np.sin(wt) + self.offset, w * (1 - np.cos(wt)), w * w * np.sin(wt)

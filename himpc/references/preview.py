@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from functools import lru_cache
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Preview:
+class Preview(NamedTuple):
     """x̄_d = col(x_d, ẋ_d, ẍ_d) of (28) at k … k+N.
 
     Attributes:
@@ -43,4 +42,9 @@ def sampled(position: Array, velocity: Array, acceleration: Array) -> Preview:
 
 def times(t: float, T_s: float, N: int) -> Array:
     """t + T_s·(0 … N), seconds."""
-    return np.asarray(t + T_s * np.arange(N + 1), np.float64)
+    return t + _offsets(T_s, N)
+
+
+@lru_cache(maxsize=64)
+def _offsets(T_s: float, N: int) -> Array:
+    return np.asarray(T_s * np.arange(N + 1), np.float64)

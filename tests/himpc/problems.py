@@ -27,11 +27,19 @@ def level_problem(
         B=B,
         C=C,
         free=free,
+        weighted_free=np.sqrt(Q) * free,
         root_Q=np.sqrt(Q),
         weighted_C=np.sqrt(Q)[:, None] * C[:K, :, :K],
         R=R,
         knots=K,
+        common_R=float(R[0]) if (R[0] == R).all() else None,
     )
+
+
+def shifted(problem: LevelProblem, change: Array) -> LevelProblem:
+    """The same level with another free residual."""
+    free = problem.free + change
+    return problem._replace(free=free, weighted_free=problem.root_Q * free)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,22 +80,23 @@ def row_blocks(N: int, kinds: Sequence[str]) -> Array:
 
 
 def random_hierarchy(
-    seed: int, n: int, N: int, levels: int, position_rows: bool = False, room: float = 1.0
+    seed: int, n: int, N: int, levels: int, position_rows: bool = False, room: float = 1.0, even: bool = False
 ) -> Hierarchy:
     """Regular levels with M̄ over decades, and bounds that admit a point and bind now and then.
 
     room: how wide the bounds are, as a share of what the levels would do without them.
+    even: one R for all joints of a level, and all levels look ahead equally far.
     """
     rng = np.random.default_rng(seed)
     M_bar = 10 ** rng.uniform(-3.0, 0.0, n)
-    scalar_R = rng.random() < 0.5
+    scalar_R = rng.random() < 0.5 or even
     problems = []
     for place in range(levels):
         m = int(rng.integers(1, min(4, n) + 1))
         J = rng.normal(0, 1, (m, n)) + 0.03 * rng.normal(0, 1, (N, m, n))
         C = residual_model(rng.uniform(0, 400, m), rng.uniform(0, 40, m), N, 1e-3).C
         R = np.full(n, 10 ** rng.uniform(0, 2)) if scalar_R else 10 ** rng.uniform(0, 2, n)
-        knots = int(rng.integers(1, N + 1)) if rng.random() < 0.3 else N
+        knots = int(rng.integers(1, N + 1)) if rng.random() < 0.3 and not even else N
         free = rng.normal(0, 10, (N, m))
         problems.append(
             level_problem(f"level{place}", J / M_bar, C, free, 10 ** rng.uniform(0, 2.5, m), R, knots)

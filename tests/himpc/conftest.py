@@ -1,0 +1,23 @@
+"""The robot and the scene most tests of the controller use."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lessons.scene import Scene
+from lessons.scenes import load_scene
+from robots import Robot, load_robot
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def iiwa() -> Robot:
+    return load_robot("iiwa14")
+
+
+@pytest.fixture(scope="module")
+def iiwa_scene() -> Scene:
+    return load_scene("iiwa14-hold")

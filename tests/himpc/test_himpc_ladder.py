@@ -1,0 +1,204 @@
+"""When a level has no sound solution: softened rows, the previous plan, damping, and torque bounds always."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from cascade_checks import assert_within, largest_difference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from problems import Hierarchy, random_hierarchy
+
+from himpc import qp
+from himpc.cascade.cascade import Route
+from himpc.limits import Rows
+from himpc.limits.rows import least_slack
+
+Array = NDArray[np.float64]
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def unreachable(hierarchy: Hierarchy, excess: float = 1.0) -> Hierarchy:
+    """The hierarchy with a velocity bound at the first knot that no torque within its bounds can meet."""
+    rows = hierarchy.rows
+    N, n = hierarchy.shape
+    lower, upper = rows.lower.copy(), rows.upper.copy()
+    lower[:N], upper[:N] = -np.ones((N, n)), np.ones((N, n))
+    # Every other bound is wide; joint 0 is asked for 1 + excess N·m where at most 1 N·m is to be had.
+    lower[N:], upper[N:] = -1e3, 1e3
+    lower[N, 0] = 1.0 + excess
+    return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
+
+
+@pytest.mark.parametrize("route", ["structured", "explicit"])
+@pytest.mark.parametrize("seed", range(6))
+def test_infeasible_rows_are_softened_by_the_least(seed: int, route: Route) -> None:
+    """State rows give way by what torque cannot do and no more; lower levels stay feasible (Theorem 2)."""
+    hierarchy = unreachable(random_hierarchy(seed, 5, 4, 3))
+    N, _ = hierarchy.shape
+    solutions = hierarchy.solve(route)
+    assert [solution.rung for solution in solutions] == ["soften", "solve", "solve"]
+    for solution in solutions:
+        value = hierarchy.rows.L @ solution.U
+        assert value[N, 0] == pytest.approx(1.0, abs=1e-6)
+        short = np.maximum(value - hierarchy.rows.upper, hierarchy.rows.lower - value)
+        short[N, 0] = 0.0
+        assert short.max() <= 1e-6
+        assert solution.kkt_residual <= 1e-6
+    assert max(solution.leak for solution in solutions) <= 1e-6
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_softened_routes_agree(seed: int) -> None:
+    """Both routes soften by the same slack and then find the same increments."""
+    hierarchy = unreachable(random_hierarchy(seed, 4, 3, 2))
+    assert largest_difference(hierarchy.solve("structured"), hierarchy.solve("explicit")) <= 1e-6
+
+
+def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
+    """The hierarchy with one torque box for all knots; joint 0 is `past` N·m outside it now."""
+    rows = hierarchy.rows
+    N, _ = hierarchy.shape
+    lower, upper = rows.lower.copy(), rows.upper.copy()
+    size = np.minimum(np.abs(lower[:N]), np.abs(upper[:N])).min(axis=0)
+    lower[:N], upper[:N] = -size, size
+    upper[:N, 0], lower[:N, 0] = upper[:N, 0] - past, lower[:N, 0] - past
+    return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
+
+
+NONSENSE = {
+    "garbage": lambda f, A: (np.full(f.size, 1e3), np.zeros(len(A)), "optimal"),
+    "nan": lambda f, A: (np.full(f.size, np.nan), np.full(len(A), np.nan), "optimal"),
+    "infinite": lambda f, A: (np.full(f.size, np.inf), np.zeros(len(A)), "optimal"),
+    "unsolved": lambda f, A: (np.zeros(f.size), np.zeros(len(A)), "daqp -4"),
+}
+
+
+def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution."""
+
+    def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
+        return NONSENSE[kind](f, A)
+
+    monkeypatch.setattr(qp, "_DAQP", (nonsense,))
+    monkeypatch.setattr(qp, "_proxqp", nonsense)
+
+
+@pytest.fixture(scope="module")
+def pressed() -> Hierarchy:
+    """Three levels whose bounds all bind, solved once in good health."""
+    hierarchy = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
+    assert len(hierarchy.solve()[0].active)
+    return hierarchy
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("solver", ["daqp", "proxqp"])
+@pytest.mark.parametrize("kind", NONSENSE)
+def test_a_broken_solver_falls_to_the_previous_plan(
+    monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, solver: qp.Solver
+) -> None:
+    """Level 1 goes on with its shifted plan, lower levels inherit, and the torque rows hold."""
+    previous = {s.name: s._replace(U=0.01 * s.U) for s in pressed.solve()}
+    break_solver(monkeypatch, kind)
+    solutions = pressed.solve("explicit", solver, previous)
+    assert solutions[0].rung == "previous"
+    assert {solution.rung for solution in solutions[1:]} <= {"inherit", "solve"}
+    shifted = np.vstack([previous[solutions[0].name].U[1:], np.zeros((1, pressed.shape[1]))])
+    np.testing.assert_array_equal(solutions[0].U, shifted)
+    for solution in solutions:
+        assert_within(pressed.rows.torque_only(), solution.U)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("kind", NONSENSE)
+@pytest.mark.parametrize("route", ["structured", "explicit"])
+def test_a_broken_solver_without_a_plan_damps_or_holds(
+    monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, route: Route
+) -> None:
+    """Without a previous plan the damping level is tried under torque rows, and at last the torque stays."""
+    break_solver(monkeypatch, kind)
+    solutions = pressed.solve(route)
+    # The damping problem asks for nothing at rest; the structured route needs no solver for it.
+    assert solutions[0].rung in ("damping", "hold")
+    if route == "explicit" and kind in ("garbage", "nan", "infinite"):
+        assert solutions[0].rung == "hold"
+    for solution in solutions:
+        assert np.isfinite(solution.U).all()
+        assert_within(pressed.rows.torque_only(), solution.U)
+        np.testing.assert_array_equal(solution.U, solutions[0].U)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """When only a lower level fails it keeps the increments of the level above, and says so."""
+    hierarchy = random_hierarchy(11, 6, 4, 3, room=0.3)
+    sound = hierarchy.solve()
+    assert all(len(solution.active) for solution in sound[:2])
+    healthy, calls = qp._DAQP, []
+
+    def fails_below(H: Array, f: Array, A: Array, lower: Array, upper: Array, **options: float) -> Any:
+        calls.append(len(f))
+        if len(f) < max(calls):
+            return np.full(f.size, np.nan), np.zeros(len(A)), "optimal"
+        return healthy[0](H, f, A, lower, upper)
+
+    monkeypatch.setattr(qp, "_DAQP", (fails_below,))
+    solutions = hierarchy.solve()
+    np.testing.assert_array_equal(solutions[0].U, sound[0].U)
+    assert [solution.rung for solution in solutions][:2] == ["solve", "inherit"]
+    np.testing.assert_array_equal(solutions[1].U, solutions[0].U)
+    for solution in solutions:
+        assert_within(hierarchy.rows, solution.U)
+
+
+@given(seeds, st.integers(1, 6), st.integers(1, 5), st.booleans())
+@settings(max_examples=60)
+def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, position_rows: bool) -> None:
+    """Random, mostly contradictory state rows: some rung answers, finite, within torque, no level leaks."""
+    hierarchy = random_hierarchy(seed, max(n, 2), N, 3, position_rows)
+    rng = np.random.default_rng(seed)
+    rows = hierarchy.rows
+    shift = np.where(np.arange(len(rows.L)) < N, 0.0, 1.0)[:, None] * rng.normal(0, 50, rows.lower.shape)
+    shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
+    contradictory = boxed(Hierarchy(hierarchy.problems, shifted), past=float(rng.choice([0.0, 0.3])))
+    solutions = contradictory.solve()
+    assert solutions[0].rung in ("solve", "soften", "damping", "hold")
+    for solution in solutions:
+        assert np.isfinite(solution.U).all()
+        assert solution.kkt_residual <= 1e-6
+        assert solution.leak <= 1e-6
+        assert_within(contradictory.rows.torque_only(), solution.U)
+
+
+@given(seeds, st.integers(1, 6), st.integers(1, 6), st.booleans())
+@settings(max_examples=60)
+def test_least_slack_makes_any_rows_feasible(seed: int, n: int, N: int, position_rows: bool) -> None:
+    """Rows widened by the least slack always admit a point within the torque rows."""
+    hierarchy = random_hierarchy(seed, max(n, 2), N, 1, position_rows)
+    rng = np.random.default_rng(seed)
+    rows = hierarchy.rows
+    shift = np.where(np.arange(len(rows.L)) < N, 0.0, 1.0)[:, None] * rng.normal(0, 20, rows.lower.shape)
+    shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
+    slack = least_slack(shifted)
+    assert (slack >= 0).all()
+    assert not slack[:N].any()
+    assert feasible(shifted.widened(slack + 1e-9 * (slack > 0)))
+
+
+def feasible(rows: Rows) -> bool:
+    """Whether some increments meet all rows, by linear programming joint by joint."""
+    from scipy.optimize import linprog
+
+    N = rows.L.shape[1]
+    for joint in range(rows.lower.shape[1]):
+        lower, upper = rows.lower[:, joint], rows.upper[:, joint]
+        A = np.vstack([rows.L[np.isfinite(upper)], -rows.L[np.isfinite(lower)]])
+        b = np.concatenate([upper[np.isfinite(upper)], -lower[np.isfinite(lower)]]) + 1e-7
+        if not linprog(np.zeros(N), A_ub=A, b_ub=b, bounds=(None, None), method="highs").success:
+            return False
+    return True
