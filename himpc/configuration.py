@@ -69,8 +69,7 @@ class Configuration:
 
     def joint_jacobians(self, joints: tuple[str, ...]) -> Array:
         """(N, m, n) selection of the named joints, the same at every knot."""
-        selection = _joint_selection(self.robot, joints)
-        return np.broadcast_to(selection, (self.horizon, *selection.shape))
+        return _joint_selection(self.robot, joints, self.horizon)
 
 
 @lru_cache(maxsize=256)
@@ -87,5 +86,6 @@ def joint_indices(robot: Robot, joints: tuple[str, ...]) -> list[int]:
 
 
 @lru_cache(maxsize=256)
-def _joint_selection(robot: Robot, joints: tuple[str, ...]) -> Array:
-    return np.eye(robot.n)[joint_indices(robot, joints)]
+def _joint_selection(robot: Robot, joints: tuple[str, ...], N: int) -> Array:
+    selection = np.eye(robot.n)[joint_indices(robot, joints)]
+    return np.broadcast_to(selection, (N, *selection.shape))

@@ -39,6 +39,7 @@ class Plan(NamedTuple):
         limits: the bounds in force.
         step_us: wall time from state to torque, microseconds, kinematics included.
         unsolved: how many QPs had no verified point at the first attempt.
+        iterations: how many times the cascade was solved; 1 but for NHIMPC.
     """
 
     tau: Array
@@ -51,6 +52,7 @@ class Plan(NamedTuple):
     limits: LimitsInForce
     step_us: float
     unsolved: int
+    iterations: int = 1
 
     @property
     def leak(self) -> float | None:

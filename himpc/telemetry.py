@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,16 @@ __all__ = [
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 """Bits of the field `at_bound`."""
 
-_SCALARS = ("t", "step_us", "priority_leak", "dynamic_leak", "gauge_norm", "gauge_radius", "unsolved")
+_SCALARS = (
+    "t",
+    "step_us",
+    "priority_leak",
+    "dynamic_leak",
+    "gauge_norm",
+    "gauge_radius",
+    "unsolved",
+    "iterations",
+)
 _PER_JOINT = (
     "q",
     "v",
@@ -111,8 +121,10 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
     """Writes what a plan knows into a row; the session adds time, plant state and the honest leak."""
     fields = layout.fields
     row[fields["step_us"]] = plan.step_us
-    row[fields["priority_leak"]] = np.nan if plan.leak is None else plan.leak
+    leak = plan.leak
+    row[fields["priority_leak"]] = math.nan if leak is None else leak
     row[fields["unsolved"]] = plan.unsolved
+    row[fields["iterations"]] = plan.iterations
     row[fields["delta_tau"]] = plan.tau - plan.tau_0
     # Six fields of n numbers each that stand side by side in the order of _PER_JOINT.
     limits = plan.limits
@@ -134,9 +146,9 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
             RUNGS.index(level.rung),
             level.time_us,
             level.leak,
-            len(level.active),
+            level.active.row.size,
         )
-        if len(level.active):
+        if level.active.row.size:
             _mark_bounds(row[fields["at_bound"]], level.active, plan.rows)
 
 

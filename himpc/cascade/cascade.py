@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from itertools import accumulate, pairwise
 from time import perf_counter_ns
@@ -31,7 +31,7 @@ _ROOM = 1e-7
 def solve_cascade(
     problems: Sequence[LevelProblem],
     rows: Rows,
-    previous: dict[str, LevelSolution],
+    previous: Mapping[str, LevelSolution],
     damping: Callable[[], LevelProblem],
     route: Route,
     solver: Solver,

@@ -201,10 +201,10 @@ def _on_rows(
     L = rows.L[row]
     A = L[:, :, None] * Q[:, joint, start:].transpose(1, 0, 2)
     A_own, A_rest = A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1)
-    target = np.where(active.multiplier > 0, rows.upper[row, joint], rows.lower[row, joint])
+    target = np.where(active.multiplier > 0.0, rows.upper[row, joint], rows.lower[row, joint])
     if start:
         above = np.matmul(Q[:, :, :start], y[:, :start, None])[:, :, 0]
-        target -= np.einsum("kj,jk->k", L, above[:, joint])
+        target -= (L * above.T[joint]).sum(axis=1)
     right = np.empty((1 + count, N * own))
     right[0], right[1:] = slope, A_own
     across = dposv(H, right.T, overwrite_a=1, overwrite_b=1)[1].T

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from time import perf_counter_ns
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from himpc.configuration import Configuration
 from himpc.controllers.forms import StackForm, measure, stack_form
 from himpc.controllers.memory import Memory
 from himpc.controllers.settings import Settings
-from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
+from himpc.limits import Limits, LimitsInForce, Rows, build_rows, in_force, ramp
 from himpc.plan import Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
@@ -27,6 +28,26 @@ Array = NDArray[np.float64]
 ENABLE_SECONDS = 0.5
 _FAINTEST = 1e-8
 """A level switched on starts with this share of its Q and gains decades at a constant rate."""
+
+
+class Tick(NamedTuple):
+    """What one control period starts from; `values` and `errors` are filled while it is solved."""
+
+    state: JointState
+    memory: Memory
+    previews: Mapping[str, Preview]
+    rows: Rows
+    values: dict[str, Array]
+    errors: dict[str, Array]
+
+
+class Found(NamedTuple):
+    """What one control period found: levels, ẋ_k of all rows, q at knots 0 … N, how many cascades it took."""
+
+    solutions: list[LevelSolution]
+    x_dot: Array
+    predicted_q: Array
+    iterations: int = 1
 
 
 class HIMPC:
@@ -80,6 +101,7 @@ class HIMPC:
         self._off = [task for level in settings.stack if level not in levels for task in level.tasks]
         self._M_bar = np.array(settings.M_bar)
         self._idle = not active
+        self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
         self._settings = settings
 
@@ -106,37 +128,23 @@ class HIMPC:
         memory = self._memory or Memory.start(q, v, T_s)
         state = JointState(q, v, (v - memory.v) / memory.period)
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, T_s)
+        values: dict[str, Array] = {}
+        errors: dict[str, Array] = {}
         with np.errstate(all="ignore"):
-            configuration = Configuration(self.robot, self._data, q, v, memory.knots(q, v, N, T_s))
-            values: dict[str, Array] = {}
-            errors: dict[str, Array] = {}
-            problems, x_dot = self._problems(self._form, configuration, memory, previews, values, errors)
             if self._off:
-                measure(self._off, configuration, previews, values, errors)
+                here = Configuration(self.robot, self._data, q, v)
+                measure(self._off, here, previews, values, errors)
             rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, self._limits, N, T_s)
-            if problems is None:
-                return self._hold(q, started)
-
-            def last_rung() -> LevelProblem:
-                form = stack_form(self.robot, (DAMPING_LEVEL,), settings)
-                found, _ = self._problems(form, configuration, memory, previews, {}, {})
-                return (found or problems)[0]
-
-            # With no level on and damping off nothing is asked for: the torque stays.
-            solutions = (
-                []
-                if self._idle
-                else solve_cascade(
-                    problems, rows, memory.solutions, last_rung, settings.route, settings.solver
-                )
-            )
-        U = solutions[-1].U if solutions else np.zeros((N, self.robot.n))
-        tau = np.minimum(np.maximum(self._tau_0 + U[0], self._limits.tau_lower), self._limits.tau_upper)
+            found = self._search(Tick(state, memory, previews, rows, values, errors))
+        if found is None:
+            return self._hold(q, started)
+        solutions, predicted_q = found.solutions, found.predicted_q
+        first = solutions[-1].U[0] if solutions else 0.0
+        tau = np.minimum(np.maximum(self._tau_0 + first, self._limits.tau_lower), self._limits.tau_upper)
         if not _usable(tau):
             return self._hold(q, started)
-        predicted_q = predict_positions(state, U, self._M_bar, T_s)
-        found = {solution.name: solution for solution in solutions}
-        self._memory = Memory(q, v, T_s, x_dot, self._form, predicted_q, found)
+        by_name = {solution.name: solution for solution in solutions}
+        self._memory = Memory(q, v, T_s, found.x_dot, self._form, predicted_q, by_name)
         plan = Plan(
             tau=tau,
             tau_0=self._tau_0,
@@ -148,9 +156,43 @@ class HIMPC:
             limits=self._limits,
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=sum(solution.rung != "solve" for solution in solutions),
+            iterations=found.iterations,
         )
         self._tau_0 = tau
         return plan
+
+    def _search(self, tick: Tick) -> Found | None:
+        """The plan along the previous prediction (30); None if the state's consequences are not finite."""
+        state, settings = tick.state, self._settings
+        return self._solve(tick, tick.memory.knots(state.q, state.v, settings.horizon, settings.T_s))
+
+    def _solve(self, tick: Tick, knots: Array) -> Found | None:
+        """The cascade with the Jacobians taken at q_k and at `knots`, (N−1, n)."""
+        state, memory, settings = tick.state, tick.memory, self._settings
+        configuration = Configuration(self.robot, self._data, state.q, state.v, knots)
+        problems, x_dot = self._problems(
+            self._form, configuration, memory, tick.previews, tick.values, tick.errors
+        )
+        if problems is None:
+            return None
+        if self._idle:
+            # With no level on and damping off nothing is asked for: the torque stays.
+            return Found([], x_dot, predict_positions(state, self._still, self._M_bar, settings.T_s))
+
+        def last_rung() -> LevelProblem:
+            form = stack_form(self.robot, (DAMPING_LEVEL,), settings)
+            found, _ = self._problems(form, configuration, memory, tick.previews, {}, {})
+            return (found or problems)[0]
+
+        solutions = self._cascade(problems, tick, last_rung)
+        return Found(solutions, x_dot, predict_positions(state, solutions[-1].U, self._M_bar, settings.T_s))
+
+    def _cascade(
+        self, problems: list[LevelProblem], tick: Tick, damping: Callable[[], LevelProblem]
+    ) -> list[LevelSolution]:
+        """Problem 1 to Problem r; `damping` makes the last rung's problem."""
+        previous, settings = tick.memory.solutions, self._settings
+        return solve_cascade(problems, tick.rows, previous, damping, settings.route, settings.solver)
 
     def _problems(
         self,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +15,7 @@ from himpc.controllers.forms import StackForm
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Memory:
+class Memory(NamedTuple):
     """The time-delayed signals of (9) and the previous plan.
 
     Attributes:
@@ -32,7 +33,7 @@ class Memory:
     x_dot: Array | None = None
     form: StackForm | None = None
     predicted_q: Array | None = None
-    solutions: dict[str, LevelSolution] = field(default_factory=dict)
+    solutions: Mapping[str, LevelSolution] = MappingProxyType({})
 
     @classmethod
     def start(cls, q: Array, v: Array, T_s: float) -> Memory:
