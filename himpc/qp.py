@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from io import StringIO
 from time import perf_counter_ns
 from typing import Literal
 
@@ -15,8 +19,9 @@ import proxsuite
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Solver = Literal["daqp", "proxqp"]
-SOLVERS: tuple[Solver, ...] = ("daqp", "proxqp")
+Solver = Literal["daqp", "proxqp", "qpoases"]
+SOLVERS: tuple[Solver, ...] = ("daqp", "proxqp", "qpoases")
+"""qpoases, the paper's, comes with CasADi and is there only if that is installed: see `is_installed`."""
 
 KKT_TOLERANCE = 1e-6
 """A point whose scaled KKT residual is larger counts as unsolved, whatever the solver says."""
@@ -43,6 +48,11 @@ class QPSolution:
         return self.kkt_residual <= KKT_TOLERANCE
 
 
+def is_installed(solver: Solver) -> bool:
+    """Whether a solver can be used here."""
+    return solver != "qpoases" or find_spec("casadi") is not None
+
+
 def solve_qp(H: Array, f: Array, A: Array, lower: Array, upper: Array, solver: Solver = "daqp") -> QPSolution:
     """min ½xᵀHx + fᵀx subject to lower ≤ Ax ≤ upper; a row with lower = upper is an equality.
 
@@ -56,7 +66,7 @@ def solve_qp(H: Array, f: Array, A: Array, lower: Array, upper: Array, solver: S
     Returns:
         The solver's point with the residual that we computed ourselves: never trust the status.
     """
-    attempts = [_proxqp] if solver == "proxqp" else _DAQP
+    attempts = _ATTEMPTS[solver]
     solution = _attempt(attempts[0], H, f, A, lower, upper)
     for attempt in attempts[1:]:
         if solution.solved:
@@ -121,6 +131,22 @@ def _proxqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[A
     multipliers[equal], multipliers[free] = qp.results.y, qp.results.z
     status = str(qp.results.info.status).rsplit(".", 1)[-1]
     return qp.results.x, multipliers, "optimal" if status == "PROXQP_SOLVED" else status.lower()
+
+
+def _qpoases(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:
+    casadi = import_module("casadi")
+    shapes = {"h": casadi.Sparsity.dense(*H.shape), "a": casadi.Sparsity.dense(*A.shape)}
+    options = {"printLevel": "none", "error_on_fail": False, "print_time": False}
+    # A solver of its own for every QP: a warm start would make the point depend on what was solved before.
+    with redirect_stdout(StringIO()):  # it prints its licence
+        qp = casadi.conic("qp", "qpoases", shapes, options)
+        found = qp(h=H, g=f, a=A, lba=lower, uba=upper)
+    status = str(qp.stats()["return_status"])
+    x, multipliers = (np.array(found[key], float).ravel() for key in ("x", "lam_a"))
+    return x, multipliers, "optimal" if status == "Successful return." else status.lower()
+
+
+_ATTEMPTS = {"daqp": _DAQP, "proxqp": (_proxqp,), "qpoases": (_qpoases,)}
 
 
 def kkt_residual(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from himpc.cascade.cascade import Route
-from himpc.qp import Solver
+from himpc.qp import Solver, is_installed
 from lessons.scenes import load_scene
 from lessons.session import Session
 
@@ -18,7 +18,9 @@ CONTENDERS: tuple[tuple[Route, Solver], ...] = (
     ("structured", "daqp"),
     ("explicit", "daqp"),
     ("explicit", "proxqp"),
+    ("explicit", "qpoases"),
 )
+"""The last takes part if CasADi is installed."""
 _LONGEST_EXPLICIT = 20
 """The explicit route is left out beyond this horizon: one step takes seconds there."""
 _TURN = 5
@@ -57,7 +59,8 @@ def bench(
     timings = []
     for place, N in enumerate(horizons):
         sessions = {}
-        for route, solver in CONTENDERS if N <= _LONGEST_EXPLICIT else CONTENDERS[:1]:
+        contenders = CONTENDERS if N <= _LONGEST_EXPLICIT else CONTENDERS[:1]
+        for route, solver in (each for each in contenders if is_installed(each[1])):
             settings = replace(loaded.settings, horizon=N, route=route, solver=solver)
             sessions[route, solver] = Session(replace(loaded, settings=settings))
         steps: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
@@ -100,4 +103,7 @@ def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
             "explicit_proxqp_over_structured": proxqp.step_ms["median"] / structured,
             "proxqp_qp_over_daqp_qp": proxqp.qp_ms / daqp.qp_ms if daqp.qp_ms else None,
         }
+        qpoases = found.get((N, "explicit", "qpoases"))
+        if qpoases is not None and daqp.qp_ms:
+            result[str(N)]["qpoases_qp_over_daqp_qp"] = qpoases.qp_ms / daqp.qp_ms
     return result

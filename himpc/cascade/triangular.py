@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import accumulate
 from time import perf_counter_ns
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgeqrf, dorgqr, dposv  # pyright: ignore[reportAttributeAccessIssue]
+from scipy.linalg.lapack import dgeqrf, dorgqr, dposv, dpotrs  # pyright: ignore[reportAttributeAccessIssue]
 
 from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, Point
 from himpc.cascade.null_space import CLEARLY_REGULAR
@@ -23,6 +24,7 @@ _TOLERANCE = 1e-9
 """N·m: a row violated by less counts as met."""
 _ACCURACY = 1e-8
 """N·m: how far a point may be from the optimum; normal equations can lose more, the other routes do not."""
+_NOTHING = np.empty(0)
 _WORK = 64
 """LAPACK's work space, enough for any small matrix; without it each call asks first."""
 
@@ -162,68 +164,104 @@ def _level(
     G = (effect[:, :, start:] if start else effect).reshape(N * m, N * own)
     H = G.T @ G
     H.reshape(-1)[:: N * own + 1] += R
-    if len(active):
-        found = _on_rows(H, G.T @ error, R, y, start, own, Q, rows, active)
-        if found is None:
-            return None
-        solved, push, active = found
-        gradient = R * solved + push
-    else:
-        solved = dposv(H, G.T @ -error, overwrite_a=1, overwrite_b=1)[1]
+    bound = _bound(active, y, start, own, Q, rows) if len(active) else None
+    if bound is None:
+        factor, solved, _ = dposv(H, G.T @ -error, overwrite_b=1)
         gradient = R * solved
-    y[:, start:end] = solved.reshape(N, own)
+    else:
+        right = np.empty((1 + active.row.size, N * own))
+        right[0], right[1:] = G.T @ error, bound.A_own
+        factor, across, _ = dposv(H, right.T, overwrite_b=1)
+        solved = -across[:, 0]
+        bound = bound.solve(across[:, 1:], solved, R)
+        if bound is None:
+            return None
+        gradient = R * solved + bound.multipliers @ bound.A_own
     error += G @ solved
     gradient += G.T @ error
+    tolerance = min(_ACCURACY * R, KKT_TOLERANCE)
     kkt = math.sqrt(gradient @ gradient)
-    # H ≥ R: the optimum is at most ‖gradient‖/R away.
-    return (error, active, kkt) if kkt <= min(_ACCURACY * R, KKT_TOLERANCE) else None
+    if not kkt <= tolerance:
+        # The normal equations lose digits on long horizons; one step of refinement brings them back.
+        change = -dpotrs(factor, gradient)[0]
+        if bound is not None:
+            bound = bound.refined(change, R)
+        solved += change
+        error += G @ change
+        gradient = R * solved + G.T @ error
+        if bound is not None:
+            gradient += bound.multipliers @ bound.A_own
+        kkt = math.sqrt(gradient @ gradient)
+        if not kkt <= tolerance:
+            return None
+    y[:, start:end] = solved.reshape(N, own)
+    if bound is None:
+        return error, NO_ROWS, kkt
+    missed = bound.missed(solved, bound.rest)
+    if not (float((bound.multipliers * active.multiplier).min()) > 0.0 and missed @ missed < _TOLERANCE**2):
+        return None
+    y[:, end:] = bound.rest.reshape(N, -1)
+    return error, ActiveRows(active.row, active.joint, bound.multipliers, missed), kkt
 
 
-def _on_rows(
-    H: Array,
-    slope: Array,
-    R: float,
-    y: Array,
-    start: int,
-    own: int,
-    Q: Array,
-    rows: Rows,
-    active: ActiveRows,
-) -> tuple[Array, Array, ActiveRows] | None:
-    """The own coordinates with some rows as equalities; the coordinates beyond are written into y.
+class _Bound(NamedTuple):
+    """Rows taken as equalities: A_own y_own + A_rest y_rest = target, (k, ·), and what they ask for.
 
-    Returns:
-        own coordinates, the rows' share of the gradient, and the rows with their multipliers; None if
-        the rows are dependent or a multiplier has lost its sign.
+    Attributes:
+        pulled: H⁻¹ A_ownᵀ.
+        schur: Cholesky factor of A_own H⁻¹ A_ownᵀ + A_rest A_restᵀ/R.
+        multipliers: (k,).
+        rest: the coordinates beyond the level's own.
+        lost: what the equalities are still missed by.
     """
-    N = len(y)
+
+    A_own: Array
+    A_rest: Array
+    target: Array
+    pulled: Array
+    schur: Array
+    multipliers: Array
+    rest: Array
+    lost: Array
+
+    def missed(self, own: Array, rest: Array) -> Array:
+        """By how much the equalities are missed, (k,)."""
+        missed = self.A_own @ own - self.target
+        return missed + self.A_rest @ rest if rest.size else missed
+
+    def solve(self, pulled: Array, own: Array, R: float) -> _Bound | None:
+        """Moves `own`, the optimum without rows, onto them; None if they are dependent."""
+        S = self.A_own @ pulled
+        if self.A_rest.size:
+            S += self.A_rest @ (self.A_rest.T / R)
+        schur, multipliers, info = dposv(S, self.A_own @ own - self.target)
+        if info != 0:
+            return None
+        own -= pulled @ multipliers
+        rest = multipliers @ self.A_rest / -R
+        return self._replace(
+            pulled=pulled, schur=schur, multipliers=multipliers, rest=rest, lost=self.missed(own, rest)
+        )
+
+    def refined(self, change: Array, R: float) -> _Bound:
+        """The same after `change` of the own coordinates, which is corrected so that the rows are met."""
+        more = dpotrs(self.schur, self.A_own @ change + self.lost)[0]
+        change -= self.pulled @ more
+        multipliers = self.multipliers + more
+        return self._replace(multipliers=multipliers, rest=multipliers @ self.A_rest / -R)
+
+
+def _bound(active: ActiveRows, y: Array, start: int, own: int, Q: Array, rows: Rows) -> _Bound:
+    """The rows in the coordinates that a level may change."""
     row, joint, count = active.row, active.joint, active.row.size
     L = rows.L[row]
     A = L[:, :, None] * Q[:, joint, start:].transpose(1, 0, 2)
-    A_own, A_rest = A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1)
     target = np.where(active.multiplier > 0.0, rows.upper[row, joint], rows.lower[row, joint])
     if start:
         above = np.matmul(Q[:, :, :start], y[:, :start, None])[:, :, 0]
         target -= (L * above.T[joint]).sum(axis=1)
-    right = np.empty((1 + count, N * own))
-    right[0], right[1:] = slope, A_own
-    across = dposv(H, right.T, overwrite_a=1, overwrite_b=1)[1].T
-    solved, pulled = -across[0], across[1:]
-    schur = A_own @ pulled.T
-    if A_rest.size:
-        schur += A_rest @ (A_rest.T / R)
-    _, multipliers, info = dposv(schur, A_own @ solved - target)
-    if info != 0 or not float((multipliers * active.multiplier).min()) > 0.0:
-        return None
-    solved -= multipliers @ pulled
-    missed = A_own @ solved - target
-    if A_rest.size:
-        rest = multipliers @ A_rest / -R
-        y[:, start + own :] = rest.reshape(N, -1)
-        missed += A_rest @ rest
-    if not float(missed @ missed) < _TOLERANCE**2:
-        return None
-    return solved, multipliers @ A_own, ActiveRows(row, joint, multipliers, missed)
+    A_own, A_rest = A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1)
+    return _Bound(A_own, A_rest, target, *(_NOTHING,) * 5)
 
 
 def _within(

@@ -8,7 +8,7 @@ from typing import Literal
 
 from himpc.cascade.cascade import ROUTES, Route
 from himpc.limits import Limits
-from himpc.qp import SOLVERS, Solver
+from himpc.qp import SOLVERS, Solver, is_installed
 from himpc.stack import Stack, check_names
 from robots import InputError, NominalSettings
 from robots.errors import unknown_name
@@ -27,7 +27,7 @@ class Settings:
         M_bar: diagonal of M̄, one per joint, kg·m².
         limits: bounds to impose.
         route: "structured" (fast) or "explicit" (all rows as printed).
-        solver: "daqp" or "proxqp".
+        solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
         R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ.
         damping: add the damping level whenever the enabled levels leave freedom.
         nominal: the dynamic model that model-based controllers use; incremental ones never read it.
@@ -54,4 +54,8 @@ class Settings:
         for name, choices in (("route", ROUTES), ("solver", SOLVERS), ("R_on", ("torque", "acceleration"))):
             if getattr(self, name) not in choices:
                 raise unknown_name(name, str(getattr(self, name)), choices)
+        if not is_installed(self.solver):
+            raise InputError(
+                f"solver '{self.solver}' comes with CasADi, which is not here: pip install casadi, or take daqp"
+            )
         check_names(self.stack)

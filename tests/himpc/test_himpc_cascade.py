@@ -13,6 +13,7 @@ from problems import Hierarchy, level_problem, quadratic, random_hierarchy, shif
 from himpc.cascade.level import LevelProblem
 from himpc.cascade.null_space import RANK_TOLERANCE
 from himpc.limits import Rows
+from himpc.qp import is_installed
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,16 @@ def test_proxqp_agrees_where_it_solves(seed: int, n: int, N: int, levels: int) -
         scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(solution.U)), float(np.linalg.norm(f)))
         assume(solution.rung == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6)
     assert_agree(hierarchy.solve("structured"), proxqp)
+
+
+@pytest.mark.skipif(not is_installed("qpoases"), reason="CasADi, which brings qpOASES, is not installed")
+@pytest.mark.parametrize("seed", range(8))
+def test_qpoases_agrees(seed: int) -> None:
+    """The paper's own solver finds the same increments on the explicit QPs."""
+    hierarchy = random_hierarchy(seed, 5, 4, 3)
+    qpoases = hierarchy.solve("explicit", "qpoases")
+    assert all(solution.rung == "solve" for solution in qpoases)
+    assert_agree(hierarchy.solve("structured"), qpoases)
 
 
 @given(seeds, joints, horizons, st.integers(2, 4))
