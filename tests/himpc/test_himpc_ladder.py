@@ -84,8 +84,7 @@ def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
         return NONSENSE[kind](f, A)
 
-    monkeypatch.setattr(qp, "_DAQP", (nonsense,))
-    monkeypatch.setattr(qp, "_proxqp", nonsense)
+    monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(qp.SOLVERS, (nonsense,)))
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +138,7 @@ def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) ->
     hierarchy = random_hierarchy(11, 6, 4, 3, room=0.3)
     sound = hierarchy.solve()
     assert all(len(solution.active) for solution in sound[:2])
-    healthy, calls = qp._DAQP, []
+    healthy, calls = qp._ATTEMPTS["daqp"], []
 
     def fails_below(H: Array, f: Array, A: Array, lower: Array, upper: Array, **options: float) -> Any:
         calls.append(len(f))
@@ -147,7 +146,7 @@ def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) ->
             return np.full(f.size, np.nan), np.zeros(len(A)), "optimal"
         return healthy[0](H, f, A, lower, upper)
 
-    monkeypatch.setattr(qp, "_DAQP", (fails_below,))
+    monkeypatch.setattr(qp, "_ATTEMPTS", {"daqp": (fails_below,)})
     solutions = hierarchy.solve()
     np.testing.assert_array_equal(solutions[0].U, sound[0].U)
     assert [solution.rung for solution in solutions][:2] == ["solve", "inherit"]
