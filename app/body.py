@@ -28,7 +28,7 @@ from lessons.events import Reset
 from lessons.scenes import load_scene
 from lessons.session import Session
 from lessons.settings import SceneSettings
-from robots import InputError
+from robots import InputError, convergence_gauge
 
 _LISTED = 24  # binding rows sent to the page: more cannot be read in a tenth of a second
 
@@ -74,7 +74,8 @@ class Body:
             case Post(Reset() as event):
                 self.session.post(event)
                 self.resets += 1
-                self._steps = max(self._steps, 1)  # a reset must show while paused, too
+                if not self.running:
+                    self._steps = max(self._steps, 1)  # a reset must show while paused, too
             case Post(event):
                 self.session.post(event)
             case Play(running):
@@ -120,6 +121,10 @@ class Body:
             block.write(row)
             self.ticks += 1
             self.over_budget += bool(row[self._step_us] > 1e6 * session.settings.T_s)
+
+    def settle(self) -> None:
+        """While paused: what was asked for takes effect at once, though no time passes."""
+        self.session.drain()
 
     def write_poses(self) -> None:
         """The plant's true link poses, for the 3D view."""
@@ -191,7 +196,15 @@ class Body:
             binding=tuple(BindingRow(*row) for row in session.binding()[:_LISTED]) if ran else (),
             notices=notices,
             settings=settings if changed else None,
+            gauge=None if self.running else self._gauge(),
         )
+
+    def _gauge(self) -> tuple[float, float] | None:
+        session = self.session
+        if not np.isfinite(session.plant.q).all():
+            return None
+        M_bar = np.array(session.settings.M_bar) * session.settings.M_bar_scale
+        return convergence_gauge(session.plant.mass_matrix(), M_bar)
 
     def close(self) -> None:
         """Frees the memory; for use without a page, which otherwise does it."""

@@ -128,7 +128,8 @@ class Status:
     real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
     over_budget: ticks whose control step took longer than T_s; resets: how often the scene was reset (the
     page then puts its gizmo back); targets: raw targets by task; path: (N + 1, 3) predicted tip, m;
-    settings: only after a change.
+    settings: only after a change; gauge: norm and spectral radius of I − M⁻¹M̄ while paused, when no row of
+    telemetry tells them.
     """
 
     t: float
@@ -144,6 +145,7 @@ class Status:
     binding: tuple[BindingRow, ...]
     notices: tuple[str, ...] = ()
     settings: SceneSettings | None = field(default=None)
+    gauge: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from app.learner import Learner
 from app.messages import Load, Ready, SceneChoice
 from app.stage import Stage
 from app.text import block, stopped
+from app.view.robot import aim
 from lessons.scenes import SCENES
 
 RATE = 30.0  # Hz, poses
@@ -22,12 +24,23 @@ _TEXTS = 8
 class Page:
     """A thread that looks at the learner. It builds a `Stage` whenever the learner has another scene."""
 
-    def __init__(self, client: viser.ClientHandle, learner: Learner, dark: bool, by_path: bool) -> None:
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        learner: Learner,
+        dark: bool,
+        by_path: bool,
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        """by_path: whether this page may name files of the machine; loop: viser's event loop."""
         self.learner = learner
         self.on_dark: Callable[[bool], None] = lambda _: None
         self._client = client
         self._dark = dark
         self._by_path = by_path
+        self._event_loop = loop
+        self._phone = False
+        self._seen: tuple[SceneChoice, str] | None = None  # what the camera was last turned to
         self._stage: Stage | None = None
         self._built = -1
         self._failure: str | None = None
@@ -37,6 +50,9 @@ class Page:
         self._thread = threading.Thread(target=self._loop, daemon=True)
 
     def start(self) -> None:
+        # Told now, because docked panels will leave a desktop's scene as narrow as a phone's.
+        camera = self._client.camera
+        self._phone = camera.image_width < camera.image_height
         gui = self._client.gui
         gui.set_panel_label("himpc-lab")
         gui.main_panel.dock_right()
@@ -126,7 +142,12 @@ class Page:
                 self._choose,
                 self._theme,
                 self._by_path,
+                self._event_loop,
             )
+            seen = (ready.choice, ready.robot.name)
+            if seen != self._seen:  # a restart leaves the learner's view as it was
+                aim(self._client.camera, ready.robot, self._phone)
+                self._seen = seen
         self._failure = None
 
     def _pass_on(self) -> None:

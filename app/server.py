@@ -140,7 +140,7 @@ class PageServer:
             return False
         kept = [token for token in tokens if token != learner.token][-7:]
         client.local_storage.set_item(_TOKENS, json.dumps([*kept, learner.token]))
-        page = Page(client, learner, dark, by_path=self._local)
+        page = Page(client, learner, dark, self._local, self._viser.get_event_loop())
         page.on_dark = lambda on: client.local_storage.set_item(_DARK, "1" if on else "0")
         with self._lock:
             self._pages[client.client_id] = page

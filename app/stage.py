@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
 
 import numpy as np
 import viser
-import viser.transforms as vtf
 
-from app.judge import Judge, Question, Verdict
+from app.hand import Hand
 from app.learner import Learner
 from app.messages import Post, Ready, SceneChoice
 from app.palette import LEVELS, level_colours
@@ -24,11 +24,12 @@ from app.panels.robot import RobotPanel
 from app.panels.snapshot import Snapshot
 from app.panels.start import StartPanel
 from app.panels.tasks import TasksPanel
-from app.view.coordinates import draggable, full, in_order, raw, xyzw
+from app.text import PHONE
+from app.view.coordinates import draggable, in_order
 from app.view.robot import RobotView, camera_for
-from app.view.target import Frames, TargetGizmo
+from app.view.target import Frames
 from app.view.trails import Trails
-from lessons.events import Event, MoveTarget
+from lessons.events import Event
 from lessons.settings import SceneSettings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
@@ -47,15 +48,14 @@ class Stage:
         choose: Callable[[SceneChoice], None],
         theme: Callable[[bool], None],
         by_path: bool,
+        loop: asyncio.AbstractEventLoop,
     ) -> None:
         self._client, self._learner, self._ready = client, learner, ready
         self._theme, self._dark = theme, dark
         self._colours = level_colours([task.level for task in in_order(ready)])
-        self._verdict: Verdict | None = None
         self._resets: int | None = None
         self._T_s = ready.settings.T_s
-        self._judge: Judge | None = None
-        self._build_panels(client.gui, scenes, choose, by_path)
+        self._build_panels(client.gui, scenes, choose, by_path, loop)
         self._build_scene(client)
 
     # ---------------------------------------------------------------- building
@@ -66,11 +66,13 @@ class Stage:
         scenes: Mapping[str, str],
         choose: Callable[[SceneChoice], None],
         by_path: bool,
+        loop: asyncio.AbstractEventLoop,
     ) -> None:
         ready, settings = self._ready, self._learner.settings or self._ready.settings
         by_hand = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
-        self._bindings = Bindings(self._post)
-        self._playback = PlaybackPanel(gui, self._learner)
+        gui.add_html(PHONE)
+        self._bindings = Bindings(self._post, loop)
+        self._playback = PlaybackPanel(gui, self._learner, loop)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Start"):
             self._start = StartPanel(gui, self._post, ready.robot.joint_names, by_hand, self._dark)
@@ -109,7 +111,7 @@ class Stage:
 
     def _build_scene(self, client: viser.ClientHandle) -> None:
         ready, scene = self._ready, client.scene
-        eye, at, reach = camera_for(ready.robot)
+        reach = camera_for(ready.robot)[2]
         # Shadows triple the cost of a frame, which decides on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
         self._floor = scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
@@ -117,39 +119,25 @@ class Stage:
         self._robot = RobotView(scene, ready.robot)
         poses = self._learner.read(lambda block, _: block.poses())
         tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
-        position, orientation = draggable(ready.tasks)
-        colour = LEVELS[0]
-        self._gizmo: TargetGizmo | None = None
         self._frames = Frames(scene)
-        if position is not None:
-            colour = self._colours[position.level]
-            size = float(np.clip(0.2 * reach, 0.12, 0.4))
-            targets = {} if self._learner.status is None else self._learner.status.targets
-            self._gizmo = TargetGizmo(
-                scene,
-                position,
-                orientation,
-                colour,
-                full(position, targets.get(position.name, position.raw), tip[:3]),
-                np.eye(3) if orientation is None else targets.get(orientation.name, raw(orientation)),
-                size,
-                self._moved,
-            )
-            self._judge = Judge(ready.robot, self._judged)
+        position = draggable(ready.tasks)[0]
+        self._hand = Hand(
+            scene,
+            ready,
+            self._colours,
+            {} if self._learner.status is None else self._learner.status.targets,
+            tip,
+            float(np.clip(0.2 * reach, 0.12, 0.4)),
+            self._post,
+            lambda: bool(self._start.clamp.value),
+            self._start.dragged,
+        )
         curves = [
             (task.path, self._colours[task.level])
             for task in ready.tasks
             if task.kind == "position" and task.path is not None
         ]
-        self._trails = Trails(scene, curves, colour)
-        client.camera.up_direction = (0.0, 0.0, 1.0)
-        if client.camera.image_width < client.camera.image_height:
-            # A phone: viser's sheet covers the lower half, so the robot goes, smaller, into the upper one.
-            eye = at + 1.7 * (eye - at)
-            down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])
-            eye, at = eye - down, at - down
-        client.camera.position = eye
-        client.camera.look_at = at
+        self._trails = Trails(scene, curves, LEVELS[0] if position is None else self._colours[position.level])
 
     def _change_theme(self, dark: bool) -> None:
         self._theme(dark)
@@ -169,31 +157,10 @@ class Stage:
     def _post(self, event: Event) -> None:
         self._learner.send(Post(event))
 
-    def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
-        """The hand moved the target: the judge first, so that the controller gets one answer, not two."""
-        gizmo = self._gizmo
-        assert gizmo is not None and self._judge is not None
-        self._start.dragged()
-        self._judge.ask(Question(position, rotation, gizmo.position.frame))
-        if rotation is not None and gizmo.orientation is not None:
-            self._post(MoveTarget(gizmo.orientation.name, xyzw(rotation)))
-
-    def _judged(self, verdict: Verdict) -> None:
-        gizmo = self._gizmo
-        assert gizmo is not None
-        clamp = bool(self._start.clamp.value)
-        place = verdict.accepted if clamp else verdict.question.position
-        axes = ["xyz".index(axis) for axis in gizmo.position.axes]
-        self._post(MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes)))
-        self._verdict = verdict
-
     def _recall(self) -> None:
-        gizmo = self._gizmo
         poses = self._learner.read(lambda block, _: block.poses())
-        if gizmo is not None and poses is not None:
-            rotation = vtf.SO3(poses[-1, 3:]).as_matrix()
-            gizmo.put(poses[-1, :3], rotation)
-            self._moved(poses[-1, :3], rotation if gizmo.orientation is not None else None)
+        if poses is not None:
+            self._hand.recall(poses[-1])
 
     # ---------------------------------------------------------------- following
 
@@ -235,12 +202,7 @@ class Stage:
         if first:
             return
         self._learner.read(lambda _, history: history.forget())
-        gizmo = self._gizmo
-        if gizmo is not None:
-            place = status.targets.get(gizmo.position.name)
-            turned = None if gizmo.orientation is None else status.targets.get(gizmo.orientation.name)
-            gizmo.put(full(gizmo.position, place, gizmo.raw), turned)
-        self._verdict = None
+        self._hand.after_reset(status.targets)
 
     def _draw(self) -> None:
         learner, settings = self._learner, self._settings()
@@ -253,39 +215,31 @@ class Stage:
             learner.read(lambda _, history: self._joint_plots.draw(history, settings.T_s))
 
     def _show(self) -> None:
-        gizmo, settings = self._gizmo, self._settings()
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
-        if gizmo is None:
-            return
-        fields = self._ready.layout.fields
         latest = self._learner.read(lambda _, history: history.latest)
-        if latest is not None:
-            turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
-            self._frames.desired(
-                full(gizmo.position, latest[fields[f"x_d/{gizmo.position.name}"]], gizmo.raw), turned
-            )
-        if gizmo.orientation is not None:
-            name = gizmo.orientation.level
-            gizmo.show_rings(any(level.name == name and level.enabled for level in settings.levels))
-        verdict = self._verdict
-        if verdict is not None:
-            gizmo.show_accepted(verdict.accepted, verdict.missing)
+        self._hand.show(self._frames, self._settings(), latest, self._ready.layout.fields)
 
     def _write(self) -> None:
         learner, settings = self._learner, self._settings()
         found = learner.read(lambda _, history: (history.latest, history.bound_ticks.copy(), history.count))
         if found is None or learner.status is None or found[2] == 0:
             return
-        now = Snapshot(self._ready, settings, learner.status, found[0], found[1] * settings.T_s)
+        latest = found[0]
+        if learner.status.gauge is not None:
+            fields = self._ready.layout.fields
+            latest = latest.copy()
+            latest[fields["gauge_norm"]], latest[fields["gauge_radius"]] = learner.status.gauge
+        now = Snapshot(self._ready, settings, learner.status, latest, found[1] * settings.T_s)
         with self._client.atomic():
             self._playback.update(now)
-            self._start.show_verdict(self._verdict, bool(self._start.clamp.value))
+            self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
             self._tasks.update(now)
             self._controller.update(now)
             self._binding.update(now)
-            self._bindings.refresh(settings, learner.status.ticks)
+            self._bindings.refresh(settings)
 
     def close(self) -> None:
-        if self._judge is not None:
-            self._judge.close()
+        self._bindings.close()
+        self._playback.close()
+        self._hand.close()

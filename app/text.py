@@ -52,6 +52,11 @@ def block(inner: str, style: str = "") -> str:
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
 
 
+PHONE = '<style>@media (max-width: 36em) { div[style*="width: 20em"] { width: 100vw !important } }</style>'
+"""A style that makes viser's sheet on a phone as wide as the screen, not 20em with an empty strip beside it.
+It counts while an HTML element with it is shown."""
+
+
 def stopped(sentence: str) -> str:
     """What a page shows instead of a simulation that died."""
     return block(

@@ -83,6 +83,7 @@ def _simulate(pipe: Connection, body: Body) -> None:
             _run(body, pacer, due, until=now + _CHUNK)
         else:
             pacer.rest(now)
+            body.settle()
             body.tick(body.take_steps())
             due = 0
         now = time.perf_counter()

@@ -19,6 +19,7 @@ from himpc.stack import Stack
 from himpc.tasks import FrameOrientation, FramePosition, Task
 from himpc.telemetry import Layout, layout_of, write_plan
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.handover import Handover, settled
 from lessons.scene import Scene
 from lessons.settings import SceneSettings, changed
 from lessons.truth import dynamic_leak
@@ -27,7 +28,7 @@ from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
 
-TRUTH_TICKS = 5
+TRUTH_TICKS = 10
 """What needs the plant's M (the gauge of M̄ and the honest leak) is refreshed every so many ticks."""
 
 LOST_POSITION = 0.5
@@ -104,7 +105,9 @@ class Session:
         """Puts an event in the mailbox; it takes effect at the next tick, or leaves a notice."""
         self._mailbox.append(event)
 
-    def _drain(self) -> None:
+    def drain(self) -> None:
+        """Lets what waits in the mailbox take effect now, without time passing. `tick` does it by itself;
+        a page that is paused does it to show a change at once."""
         while self._script and self._script[0][0] <= self.t + 1e-9:
             self._mailbox.append(self._script.popleft()[1])
         while self._mailbox:
@@ -145,9 +148,9 @@ class Session:
         if settings.controller == self.settings.controller:
             self.controller.configure(settings.for_controller())
         else:
-            # A controller takes over at the torque that acts now.
-            self.controller = make_controller(settings.controller, self.robot, settings.for_controller())
-            self.controller.reset(self.plant.tau)
+            taking = make_controller(settings.controller, self.robot, settings.for_controller())
+            taking.reset(self.plant.tau)
+            self.controller = Handover(self.controller, taking)
         self.settings = settings
 
     def _move_target(self, name: str, value: tuple[float, ...]) -> None:
@@ -180,12 +183,13 @@ class Session:
         A row holds the true joint state, the references, what the controller decided, and the torque
         applied from this tick on.
         """
-        self._drain()
+        self.drain()
         settings, plant = self.settings, self.plant
         T_s, N, t = settings.T_s, settings.horizon, plant.t
         q, v = plant.q, plant.v
         state = plant.measure(T_s)
         previews = {name: reference.preview(t, T_s, N) for name, reference in self.references.items()}
+        self.controller = settled(self.controller)
         plan = self.controller.step(state.q, state.v, previews, plant.tau)
         row = self._row
         row.fill(np.nan)
@@ -231,17 +235,18 @@ class Session:
         row[start : start + 3] = self._truth
 
     def _is_wild(self, q: Array, v: Array) -> bool:
+        share = v / self.robot.v_limit
         # A comparison with NaN is false, so "not within" also catches what is not finite.
-        fastest = float((np.abs(v) / self.robot.v_limit).max())
-        return not fastest <= LOST_SPEED or not math.isfinite(float(q.sum()))
+        slow = float(share @ share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
+        return not slow or not math.isfinite(float(q.sum()))
 
     def _is_far(self, plan: Plan) -> bool:
         """Level 1 is lost. A hand that drags a target out of reach does that too, so it is no notice."""
         first = next((level for level in self.settings.levels if level.enabled), None)
         return first is not None and any(
-            isinstance(task, FramePosition) and float(np.linalg.norm(plan.errors[task.name])) > LOST_POSITION
+            isinstance(task, FramePosition) and float(error @ error) > LOST_POSITION**2
             for task in first.tasks
-            if task.name in plan.errors
+            if (error := plan.errors.get(task.name)) is not None
         )
 
     def predicted_path(self, frame: str = "") -> Array:

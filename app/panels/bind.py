@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import viser
+from viser import _messages
 
 from lessons.events import Event
 from lessons.settings import SceneSettings
@@ -15,7 +17,31 @@ from lessons.settings import SceneSettings
 HOLD = 0.8
 """s during which a control that was just touched is not overwritten: the session's answer is on its way."""
 
+REMIND = 2.0
+"""s between two reminders of what every control must show. viser sends at most one change per 50 ms and
+tab and drops all but the latest: of two controls changed at once (or while the browser stutters) one may
+never arrive, and would go on showing what the session does not have."""
+
 Post = Callable[[Event], None]
+T = TypeVar("T")
+
+
+class Wish(Generic[T]):
+    """What was last asked for, as long as the session's answer may be on its way. A second key press or
+    click in that time builds on the first instead of on what the page still shows."""
+
+    def __init__(self) -> None:
+        self._asked: tuple[float, T] | None = None
+
+    def ask(self, value: T) -> T:
+        self._asked = (time.monotonic(), value)
+        return value
+
+    def now(self, shown: T) -> T:
+        """The wish, or what is shown if it was long ago."""
+        if self._asked is None or time.monotonic() - self._asked[0] > HOLD:
+            return shown
+        return self._asked[1]
 
 
 @dataclass
@@ -23,17 +49,24 @@ class _Mirror:
     handle: viser.GuiInputHandle[Any]
     read: Callable[[SceneSettings], Any]
     touched: float = -float("inf")
-    ticks: int = -1  # when it was touched: a paused session answers with its next tick
 
 
 class Bindings:
     """Two ways: a control posts an event, and settings that changed otherwise (a reset, a hotkey, an event
-    that was refused) move the control. Callbacks only post: they never touch the simulation."""
+    that was refused) move the control. Callbacks only post: they never touch the simulation.
 
-    def __init__(self, post: Post) -> None:
+    Controls are written on the server's event loop only. There a value that arrives from the browser and the
+    callback that posts it are one piece; written from any other thread, a control could be put back between
+    the two, and the callback would post the old value: the learner's edit would be lost.
+    """
+
+    def __init__(self, post: Post, loop: asyncio.AbstractEventLoop) -> None:
+        """loop: the server's, on which viser handles what browsers send."""
         self.post = post
+        self._loop = loop
         self._mirrors: list[_Mirror] = []
-        self._ticks = 0
+        self._reminded = -float("inf")
+        self._closed = False
 
     def bind(
         self,
@@ -49,17 +82,38 @@ class Bindings:
         async def _(change: viser.GuiEvent[Any]) -> None:
             if change.client is None:
                 return  # written by `refresh`
-            mirror.touched, mirror.ticks = time.monotonic(), self._ticks
+            mirror.touched = time.monotonic()
             self.post(event(handle.value))
 
-    def refresh(self, settings: SceneSettings, ticks: int) -> None:
-        """Shows what the session has after so many ticks."""
-        now, self._ticks = time.monotonic(), ticks
+    def refresh(self, settings: SceneSettings) -> None:
+        """Shows what the session has. Returns at once; the event loop does it."""
+        self._loop.call_soon_threadsafe(self._write, settings)
+
+    def close(self) -> None:
+        """The controls are about to be removed: writes nothing any more."""
+        self._closed = True
+
+    def _write(self, settings: SceneSettings) -> None:
+        if self._closed:
+            return
+        now = time.monotonic()
+        remind = now - self._reminded > REMIND
+        if remind:
+            self._reminded = now
         for mirror in self._mirrors:
-            if now - mirror.touched > HOLD and ticks != mirror.ticks:
+            if now - mirror.touched > HOLD:
                 value = mirror.read(settings)
                 if value != mirror.handle.value:
                     mirror.handle.value = value
+                elif remind:
+                    _send(mirror.handle)
+
+
+def _send(handle: viser.GuiInputHandle[Any]) -> None:
+    """The control's value once more; assigning it would send nothing, since viser knows it already."""
+    control = handle._impl
+    update = _messages.GuiUpdateMessage(control.uuid, {"value": control.value})
+    control.gui_api._websock_interface.queue_message(update)
 
 
 def scalar(value: object) -> float:

@@ -72,16 +72,22 @@ class Chart:
         )
 
     def show(self, ages: np.ndarray, values: Sequence[np.ndarray]) -> None:
-        """values: one array per line; what is not finite or beyond the axis is drawn at its edge."""
+        """values: one array per line. What is beyond the axis is drawn at its edge. uPlot cannot leave out
+        what is before the first known value: a linear curve is flat there, since a jump would look like a
+        motion; a logarithmic one lies on the axis."""
         low, high = self._span
         known = np.isfinite(values[0])
         if np.count_nonzero(known) < 2:
             return
         if self._log:
             values = [np.log10(np.maximum(column, 10.0 ** (low - 1))) for column in values]
-        clipped = (
+        clipped = [
             np.clip(np.nan_to_num(column, nan=low, posinf=high, neginf=low), low, high) for column in values
-        )
+        ]
+        if not self._log:
+            start = int(np.argmax(known))
+            for column in clipped:
+                column[:start] = column[start]
         self._shows += 1
         if self._shows % _NUDGE == 0:
             ages = ages.copy()

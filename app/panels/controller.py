@@ -1,4 +1,4 @@
-"""The controller: horizon, M̄ with its gauge, time step, limits, solver."""
+"""The controller: which one, horizon, M̄ with its gauge, time step, limits, solver."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import viser
 from app.palette import BAD, GOOD
 from app.panels.bind import Bindings
 from app.panels.snapshot import Snapshot
-from app.text import bar, block, formula
+from app.text import bar, block, esc, formula
+from himpc.controllers import CONTROLLERS
 from lessons.events import Set
+from lessons.handover import HANDOVER_SECONDS
 from lessons.settings import SceneSettings
 from robots import Robot
 
@@ -17,10 +19,24 @@ class ControllerPanel:
     """Everything about the controller that can be changed while it runs."""
 
     def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings, robot: Robot) -> None:
+        self._choice(gui, bindings, settings)
         self._horizon(gui, bindings, settings)
         self._inertia(gui, bindings, settings, robot)
         self._limits(gui, bindings, settings)
         self._solver(gui, bindings, settings)
+
+    def _choice(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
+        with gui.add_folder("Which controller"):
+            menu = gui.add_dropdown(
+                "Controller",
+                tuple(CONTROLLERS),
+                initial_value=settings.controller,
+                hint="Switch while the robot moves: in "
+                f"{HANDOVER_SECONDS:g} s the torque goes over from one controller to the other",
+            )
+            self._what = gui.add_html(block(esc(CONTROLLERS[settings.controller])))
+        self._shown = settings.controller
+        bindings.bind(menu, lambda s: s.controller, lambda name: Set("controller", str(name)))
 
     def _horizon(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
         with gui.add_folder("Horizon"):
@@ -138,6 +154,9 @@ class ControllerPanel:
             )  # fmt: skip
 
     def update(self, now: Snapshot) -> None:
+        if now.settings.controller != self._shown:
+            self._shown = now.settings.controller
+            self._what.content = block(esc(CONTROLLERS[self._shown]))
         self._diagonal_now = tuple(float(value) for value in now.settings.M_bar)
         norm, radius = now.number("gauge_norm"), now.number("gauge_radius")
         self._gauge.content = block(

@@ -12,6 +12,7 @@ _KEYS = (
     ("R", "robot back to its start, settings kept"),
     ("1 … 9", "switch the level at that place on or off"),
     ("Ctrl K", "every command, searchable"),
+    ("", "a field or a checkbox you just used keeps the keys: click beside it first"),
 )
 _WORDS = (
     ("level", "priority, 1 is the highest; a lower level never disturbs a higher one"),
@@ -27,7 +28,11 @@ _WORDS = (
     ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
 )
 _DRAWN = (
-    ("ball with arrows", "the target your hand holds; rings turn it while the orientation level is on"),
+    (
+        "ball with arrows",
+        "the target your hand holds; arrows along the world's axes move it, rings turn it while the "
+        "orientation level is on",
+    ),
     ("small frame with a ball", "the filtered target the controller follows (speed, acceleration capped)"),
     ("large thin frame", "the actual hand"),
     ("line behind the hand", "where it went in the last seconds"),

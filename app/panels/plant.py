@@ -15,7 +15,16 @@ _SLIDERS = (
     ("Coulomb friction [N·m]", "friction", 0.0, 10.0, 0.1, "The same at every joint"),
     ("Viscous friction [N·m·s/rad]", "damping", 0.0, 10.0, 0.1, "The same at every joint"),
     ("Armature [kg·m²]", "armature", 0.0, 1.0, 0.01, "Reflected inertia of the motors"),
-    ("Inertia scale", "inertia_scale", 0.2, 3.0, 0.05, "Factor on the mass and inertia of every link"),
+    ("Mass scale", "mass_scale", 0.2, 3.0, 0.05, "Factor on the mass of every link"),
+    ("Inertia scale", "inertia_scale", 0.2, 3.0, 0.05, "Factor on the rotational inertia of every link"),
+    (
+        "M(q) diagonal scale",
+        "diagonal_scale",
+        0.5,
+        2.0,
+        0.05,
+        "Factor on the diagonal of M(q) alone, the letter of the paper's Table V: no real arm is like this",
+    ),
     (
         "Encoder [10⁻³ °]",
         "encoder_resolution_deg",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
 
@@ -10,7 +11,7 @@ import viser
 from app.learner import Learner
 from app.messages import Play, Post, Speed, Step
 from app.palette import GOOD, LEVELS
-from app.panels.bind import HOLD
+from app.panels.bind import HOLD, Wish
 from app.panels.snapshot import Snapshot
 from app.text import badge, block, stopped
 from lessons.events import Reset
@@ -21,8 +22,10 @@ _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Rese
 class PlaybackPanel:
     """Buttons and a status line."""
 
-    def __init__(self, gui: viser.GuiApi, learner: Learner) -> None:
-        self._learner = learner
+    def __init__(self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop) -> None:
+        self._learner, self._loop = learner, loop
+        self._running: Wish[bool] = Wish()
+        self._closed = False
         self._failure = gui.add_html("", visible=False)
         self._status = gui.add_html(block("Starting the simulation …"))
         self._buttons = gui.add_button_group(
@@ -31,15 +34,14 @@ class PlaybackPanel:
             hint="Space: run or pause · S: one control tick · R: robot back to its start. "
             "Reset all also brings every setting back.",
         )
-        with gui.add_folder(None):
-            self._speed = gui.add_slider(
-                "Speed",
-                min=0.1,
-                max=1.0,
-                step=0.1,
-                initial_value=1.0,
-                hint="Simulated seconds per second",
-            )
+        self._speed = gui.add_slider(
+            "Speed",
+            min=0.1,
+            max=1.0,
+            step=0.1,
+            initial_value=1.0,
+            hint="Simulated seconds per second",
+        )
         self._touched = -math.inf
 
         @self._buttons.on_click
@@ -69,13 +71,15 @@ class PlaybackPanel:
     def _click(self, choice: str) -> None:
         learner = self._learner
         if choice in (_PAUSE, _RUN):
-            running = learner.status is not None and learner.status.running
-            learner.send(Play(not running))
+            running = self._running.now(learner.status is not None and learner.status.running)
+            learner.send(Play(self._running.ask(not running)))
         elif choice == _STEP:
+            self._running.ask(False)
             learner.send(Step())
         elif choice == _RESET and learner.failure is None:
             learner.send(Post(Reset()))
         else:
+            self._running.ask(True)
             learner.reset_all()
 
     def show_failure(self, sentence: str | None) -> None:
@@ -85,13 +89,20 @@ class PlaybackPanel:
             self._failure.content = stopped(sentence)
             self._status.content = block("No simulation is running.")
 
+    def close(self) -> None:
+        self._closed = True
+
+    def _show_speed(self, speed: float) -> None:
+        # On the event loop, for the reason `Bindings` gives.
+        if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
+            self._speed.value = speed
+
     def update(self, now: Snapshot) -> None:
         status = now.status
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
-        if self._speed.value != status.speed and time.monotonic() - self._touched > HOLD:
-            self._speed.value = status.speed
+        self._loop.call_soon_threadsafe(self._show_speed, status.speed)
         state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
         if status.capped:
             why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."

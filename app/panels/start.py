@@ -101,9 +101,9 @@ class StartPanel:
 
 
 _GUIDE = block(
-    '<div style="font-size:1.15em"><b>Drag the orange ball by its arrows.</b></div>'
-    "The robot's hand follows: that is <b>level 1</b>. Orientation (level 2) and posture (level 3) get only "
-    "the freedom that is left.",
+    '<div style="font-size:1.15em"><b>Drag the target by its arrows.</b></div>'
+    "It is the orange ball at the robot's hand, and the hand follows it: that is <b>level 1</b>. "
+    "Orientation (level 2) and posture (level 3) get only the freedom that is left.",
     "padding-top:0.5em",
 )
 _GUIDE_FOLLOWING = block(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from app.palette import BAD, DAMPING, RGB, css
-from app.panels.bind import Bindings, scalar
+from app.panels.bind import Bindings, Wish, scalar
 from app.panels.snapshot import Snapshot
 from app.text import badge, block, esc, formula, quantity, swatch
 from himpc.stack import Level
@@ -30,8 +30,11 @@ class TasksPanel:
         current: Callable[[], SceneSettings],
     ) -> None:
         self._current = current
+        self._post = bindings.post
+        self._order: Wish[tuple[str, ...]] = Wish()
+        self._enabled: dict[str, Wish[bool]] = {level.name: Wish() for level in settings.levels}
         self._cards = [
-            _Card(gui, bindings, level, colours, place, current)
+            _Card(gui, bindings, level, colours, place, self._move)
             for place, level in enumerate(settings.levels)
         ]
         with gui.add_folder("Last level: damping", order=900.0):
@@ -55,11 +58,23 @@ class TasksPanel:
 
     def toggle(self, place: int) -> Set | None:
         """The event for the hotkey of a place (0-based); None if no level stands there."""
-        levels = self._current().levels
-        if place >= len(levels):
+        levels = {level.name: level for level in self._current().levels}
+        names = self._order.now(tuple(levels))
+        if place >= len(names):
             return None
-        level = levels[place]
-        return Set(f"levels.{level.name}.enabled", not level.enabled)
+        name = names[place]
+        wish = self._enabled[name]
+        return Set(f"levels.{name}.enabled", wish.ask(not wish.now(levels[name].enabled)))
+
+    def _move(self, name: str, by: int) -> None:
+        """Moves a level one place up (−1) or down (+1), if there is one."""
+        names = list(self._order.now(tuple(level.name for level in self._current().levels)))
+        to = names.index(name) + by
+        if 0 <= to < len(names):
+            names.remove(name)
+            names.insert(to, name)
+            self._order.ask(tuple(names))
+            self._post(MoveLevel(name, to))
 
     def update(self, now: Snapshot) -> None:
         for place, level in enumerate(now.settings.levels):
@@ -90,7 +105,7 @@ class _Card:
         level: Level,
         colours: dict[str, RGB],
         place: int,
-        current: Callable[[], SceneSettings],
+        shift: Callable[[str, int], None],
     ) -> None:
         name = self.name = level.name
         self._colour = colours[name]
@@ -133,11 +148,7 @@ class _Card:
 
         @move.on_click
         async def _(_: object) -> None:
-            names = [each.name for each in current().levels]
-            place = names.index(name)
-            to = place - 1 if move.value == _UP else place + 1
-            if 0 <= to < len(names):
-                bindings.post(MoveLevel(name, to))
+            shift(name, -1 if move.value == _UP else 1)
 
     @staticmethod
     def _slider(
@@ -151,11 +162,9 @@ class _Card:
         hint: str,
     ) -> None:
         low, high, step = span
-        # Each in its own container: viser keeps only the latest change within 50 ms per container.
-        with gui.add_folder(None):
-            slider = gui.add_slider(
-                label, min=min(low, value), max=max(high, value), step=step, initial_value=value, hint=hint
-            )
+        slider = gui.add_slider(
+            label, min=min(low, value), max=max(high, value), step=step, initial_value=value, hint=hint
+        )
         bindings.bind(slider, read, lambda number: Set(path, float(number)))
 
     def update(self, now: Snapshot, level: Level, place: int) -> None:

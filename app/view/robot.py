@@ -42,7 +42,6 @@ class RobotView:
 
 def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     """(position, look_at) from which a robot is well seen, and the length of its arm, m."""
-
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, robot.home)
     joints = np.array([data.oMi[j].translation for j in range(1, robot.model.njoints)])
@@ -54,3 +53,16 @@ def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     planar = float(np.ptp(points[:, 2])) < 0.05 * reach
     direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5])
     return middle + reach * direction, middle, reach
+
+
+def aim(camera: viser.CameraHandle, robot: Robot, phone: bool) -> None:
+    """Turns the camera to a robot. phone: viser's sheet covers the lower half of the scene, so the robot
+    goes, smaller, into the upper one."""
+    eye, at, _ = camera_for(robot)
+    if phone:
+        eye = at + 1.7 * (eye - at)
+        down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])
+        eye, at = eye - down, at - down
+    camera.up_direction = (0.0, 0.0, 1.0)
+    camera.position = eye
+    camera.look_at = at

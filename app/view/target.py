@@ -15,10 +15,12 @@ Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
 _BALL = 0.07  # m: larger than most wrists, which it encloses like a bubble
 _FRAME = 0.09  # m
+_INVITATION = "drag an arrow"
 
 
 class TargetGizmo:
-    """A gizmo on a position task, with rotation rings while an orientation task of the same frame is on.
+    """Arrows along the world's axes on a position task, and rings that turn with the target while an
+    orientation task of the same frame is on.
 
     The ball is where the hand is. If that is out of reach it turns into a red ghost, and a ball in the
     task's colour with a line to it marks the place the controller was given instead.
@@ -39,16 +41,27 @@ class TargetGizmo:
         the raw position and, if rings are shown, the raw rotation."""
         self.position, self.orientation = position, orientation
         self._rings = orientation is not None
-        self.dragging = False
+        x, y, z = (axis in position.axes for axis in "xyz")
+        active = (x, y, z)
         self._gizmo = scene.add_transform_controls(
             "/target",
             scale=size,
             position=start,
-            wxyz=_wxyz(rotation),
-            active_axes=tuple(axis in position.axes for axis in "xyz"),  # pyright: ignore[reportArgumentType]
-            disable_rotations=orientation is None,
+            active_axes=active,
+            disable_rotations=True,
             depth_test=False,
             line_width=3.0,
+        )
+        self._turn = scene.add_transform_controls(
+            "/target/turn",
+            scale=size,
+            wxyz=_wxyz(rotation),
+            active_axes=active,
+            disable_axes=True,
+            disable_sliders=True,
+            depth_test=False,
+            line_width=3.0,
+            visible=orientation is not None,
         )
         self._ball = scene.add_icosphere(
             "/target/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False
@@ -56,7 +69,8 @@ class TargetGizmo:
         self._ghost = scene.add_icosphere(
             "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False
         )
-        self._label = scene.add_label("/target/label", "", position=(0.0, 0.0, 0.12), visible=False)
+        self._label = scene.add_label("/target/label", _INVITATION, position=(0.0, 0.0, size + 0.05))
+        self._invites = True
         self._accepted = scene.add_icosphere(
             "/accepted", radius=_BALL, color=colour, opacity=0.6, visible=False, cast_shadow=False
         )
@@ -65,8 +79,9 @@ class TargetGizmo:
         )
 
         @self._gizmo.on_update
-        async def _(event: viser.TransformControlsEvent) -> None:
-            self.dragging = event.phase != "end"
+        @self._turn.on_update
+        async def _(_: viser.TransformControlsEvent) -> None:
+            self._invites = False
             moved(self.raw, self.rotation if self._rings else None)
 
     @property
@@ -75,27 +90,28 @@ class TargetGizmo:
 
     @property
     def rotation(self) -> np.ndarray:
-        return vtf.SO3(np.array(self._gizmo.wxyz, float)).as_matrix()
+        return vtf.SO3(np.array(self._turn.wxyz, float)).as_matrix()
 
     def show_rings(self, on: bool) -> None:
         """Whether the hand may turn the target."""
         on = on and self.orientation is not None
         if on != self._rings:
             self._rings = on
-            self._gizmo.disable_rotations = not on
+            self._turn.visible = on
 
     def put(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         """Moves the gizmo itself, after a reset."""
         self._gizmo.position = position
         if rotation is not None:
-            self._gizmo.wxyz = _wxyz(rotation)
+            self._turn.wxyz = _wxyz(rotation)
         self.show_accepted(position, 0.0)
 
     def show_accepted(self, accepted: np.ndarray, missing: float) -> None:
         """What the judge said: the place the controller was given, and how far it is from the hand, m."""
         out = missing > 0.0
-        for handle in (self._ghost, self._label, self._accepted, self._gap):
+        for handle in (self._ghost, self._accepted, self._gap):
             handle.visible = out
+        self._label.visible = out or self._invites
         self._ball.visible = not out
         if out:
             self._accepted.position = accepted

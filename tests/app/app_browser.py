@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable
 from typing import Any
@@ -108,13 +109,68 @@ def position(page: Page, node: str) -> tuple[float, float, float]:
     return float(found[0]), float(found[1]), float(found[2])
 
 
+def is_drawn(page: Page, node: str) -> bool:
+    return bool(
+        page.evaluate(
+            "(n) => { const x = window.__viserMutable.nodeRefFromName[n]; return !!x && x.visible; }", node
+        )
+    )
+
+
+def camera(page: Page) -> tuple[float, float, float]:
+    """Where the learner looks from, in the browser's own axes."""
+    found: Any = page.evaluate(
+        "() => { const p = window.__viserMutable.camera.position; return [p.x, p.y, p.z]; }"
+    )
+    return float(found[0]), float(found[1]), float(found[2])
+
+
+def sheet(page: Page) -> tuple[float, float]:
+    """Left and right edge of a phone's panel, pixels."""
+    found: Any = page.evaluate(
+        """() => { const r = [...document.querySelectorAll("div")].find((d) =>
+             getComputedStyle(d).position === "fixed" && d.textContent.includes("Playback"))
+             .getBoundingClientRect(); return [r.left, r.right]; }"""
+    )
+    return float(found[0]), float(found[1])
+
+
+def target_position(page: Page) -> tuple[float, float, float]:
+    """Where the browser draws the ball that a hand drags, in the world's axes."""
+    found: Any = page.evaluate(
+        """() => { const m = window.__viserMutable, node = m.nodeRefFromName["/target/ball"];
+             node.updateWorldMatrix(true, false);
+             const world = (name) => { const n = m.nodeRefFromName[name]; n.updateWorldMatrix(true, false);
+                                       return n.matrixWorld.clone(); };
+             const p = world("").invert().multiply(world("/target/ball")).elements;
+             return [p[12], p[13], p[14]]; }"""
+    )
+    return float(found[0]), float(found[1]), float(found[2])
+
+
 def drag_target(page: Page, axis: int, along: float) -> None:
-    """Pulls the gizmo's arrow of an axis by so many metres, in twelve steps like a hand would."""
+    """Pulls the gizmo's arrow of a world axis by so many metres."""
     arm = 0.18
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
     start = page.evaluate(_PROJECT, ["/target", [arm * c for c in direction]])
     end = page.evaluate(_PROJECT, ["/target", [(arm + along) * c for c in direction]])
+    _drag(page, start, end)
+
+
+def turn_target(page: Page, degrees: float) -> None:
+    """Pulls the ring about the target's own z axis."""
+    radius = 0.13  # 0.65 of the gizmo's size for the iiwa
+
+    def on_ring(angle: float) -> Any:
+        at = [radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle)), 0.0]
+        return page.evaluate(_PROJECT, ["/target/turn", at])
+
+    _drag(page, on_ring(45.0), on_ring(45.0 + degrees))
+
+
+def _drag(page: Page, start: list[float], end: list[float]) -> None:
+    """In twelve steps, like a hand would."""
     page.mouse.move(*start)
     page.wait_for_timeout(250)  # the arrow must have noticed the mouse
     page.mouse.down()

@@ -48,6 +48,6 @@ def page(shared_page: Page) -> Page:
     as it was when it was opened."""
     tab(shared_page, "Start")
     press(shared_page, "Reset all")
-    expect(shared_page.get_by_text("RUNNING").first).to_be_visible()
+    expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     wait_for_scene(shared_page)
     return shared_page

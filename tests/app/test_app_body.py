@@ -13,7 +13,8 @@ from app.body import Body
 from app.history import BUCKETS, History
 from app.messages import Load, Play, Post, Ready, Refused, ResetAll, SceneChoice, Speed, Step
 from app.pacing import BACKLOG, Pacer
-from lessons.events import MoveTarget, Reset, Set
+from lessons.events import MoveLevel, MoveTarget, Reset, Set
+from lessons.session import TRUTH_TICKS
 from robots import InputError
 
 
@@ -59,8 +60,35 @@ def test_pause_step_speed(body: Body) -> None:
     body.handle(Play(True))
     body.handle(Step())
     assert not body.running and body.take_steps() == 1 and body.take_steps() == 0
+    body.handle(Post(Reset()))
+    assert body.take_steps() == 1  # a reset shows while paused
+    body.handle(Play(True))
+    body.handle(Post(Reset()))
+    body.handle(Step())
+    assert body.take_steps() == 1  # one press, one tick
     body.handle(Speed(0.5))
     assert body.status().speed == 0.5
+
+
+def test_paused_edits_take_effect_though_no_time_passes(body: Body) -> None:
+    """Settings, order, gauge and refusals are those of after the edits; the clock and the robot stand."""
+    body.tick(3)
+    assert body.status().gauge is None  # the rows tell it
+    body.handle(Play(False))
+    before = body.status()
+    for event in (Set("M_bar_scale", 3.0), MoveLevel("posture", 0), Set("horizon", 0)):
+        body.handle(Post(event))
+    body.settle()
+    after = body.status()
+    assert after.t == before.t and after.ticks == before.ticks
+    assert after.settings is not None and after.settings.M_bar_scale == 3.0
+    assert [level.name for level in after.settings.levels] == ["posture", "position", "orientation"]
+    assert len(after.notices) == 1 and "horizon" in after.notices[0]
+    assert before.gauge is not None and after.gauge is not None and after.gauge != before.gauge
+    body.handle(Play(True))
+    body.tick(TRUTH_TICKS)
+    row = body.block.since(0)[1][-1]
+    assert row[body.session.layout.fields["gauge_radius"]][0] == pytest.approx(after.gauge[1], rel=1e-6)
 
 
 def test_reset_keeps_settings_and_reset_all_does_not(body: Body) -> None:

@@ -10,21 +10,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app_browser import (
+    camera,
     drag_target,
     eventually,
+    is_drawn,
     key,
     number,
     open_page,
     position,
     press,
+    row,
     set_number,
+    sheet,
     tab,
+    target_position,
+    turn_target,
     wait_for_scene,
     write,
 )
 from playwright.sync_api import Browser, Page, expect
 
 from app.learner import Learner
+from app.messages import Load, SceneChoice
 from app.process import wait_until
 from app.server import PageServer
 from robots import CATALOG
@@ -46,8 +53,8 @@ def error(learner: Learner, task: str) -> float:
 
 
 def test_the_page_invites_and_holds(page: Page, learner: Learner) -> None:
-    expect(page.get_by_text("Drag the orange ball")).to_be_visible()
-    expect(page.get_by_text("RUNNING").first).to_be_visible()
+    expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
+    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.5)
     assert error(learner, "position") < 1e-3
 
@@ -57,8 +64,31 @@ def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: Learner) -> None:
     drag_target(page, axis=1, along=0.15)
     assert eventually(page, lambda: position(page, "/actual")[1] > before[1] + 0.08)
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
+    # The arrows are the world's, however the hand is turned.
+    assert np.allclose(np.delete(target_position(page), 1), np.delete(before, 1), atol=1e-3)
     expect(page.get_by_text("Target within reach")).to_be_visible()
     expect(page.get_by_text("Now switch a level off")).to_be_visible()
+
+
+def test_rings_turn_the_target_while_its_level_is_on(page: Page, learner: Learner) -> None:
+    assert learner.status is not None
+    before = learner.status.targets
+    turn_target(page, 30.0)
+    assert eventually(page, lambda: turned(learner, before["orientation"]) > np.radians(10.0))
+    assert np.allclose(learner.status.targets["position"], before["position"], atol=1e-6)
+    assert eventually(page, lambda: error(learner, "orientation") < np.radians(1.0))
+    assert turned(learner, before["orientation"]) > np.radians(10.0)
+    key(page, "2")
+    assert eventually(page, lambda: not is_drawn(page, "/target/turn"))
+    key(page, "2")
+    assert eventually(page, lambda: is_drawn(page, "/target/turn"))
+
+
+def turned(learner: Learner, before: np.ndarray) -> float:
+    """Angle of the orientation target's turn since `before`, rad."""
+    assert learner.status is not None
+    trace = float(np.trace(learner.status.targets["orientation"] @ before.T))
+    return float(np.arccos(np.clip((trace - 1) / 2, -1.0, 1.0)))
 
 
 def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: Learner) -> None:
@@ -122,8 +152,9 @@ def test_N_and_M_bar_change_while_it_runs(page: Page, learner: Learner) -> None:
 def test_pause_step_reset(page: Page, learner: Learner) -> None:
     drag_target(page, axis=1, along=0.15)
     assert eventually(page, lambda: position(page, "/actual")[1] > 0.05)
+    assert target_position(page)[1] > 0.1
     key(page, "Space")
-    expect(page.get_by_text("PAUSED").first).to_be_visible()
+    expect(page.get_by_text("PAUSED", exact=True).first).to_be_visible()
     assert learner.status is not None
     ticks = learner.status.ticks
     press(page, "Step")
@@ -132,9 +163,43 @@ def test_pause_step_reset(page: Page, learner: Learner) -> None:
     assert eventually(page, lambda: learner.status is not None and learner.status.ticks == ticks + 2)
     key(page, "r")
     assert eventually(page, lambda: abs(position(page, "/actual")[1]) < 0.01)
-    assert eventually(page, lambda: abs(position(page, "/target")[1]) < 0.01)
+    assert eventually(page, lambda: abs(target_position(page)[1]) < 0.01)
     press(page, "Run")
-    expect(page.get_by_text("RUNNING").first).to_be_visible()
+    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+
+
+def test_paused_edits_show_at_once(page: Page, learner: Learner) -> None:
+    """Nothing moves, but panel, order of the stack and gauge are those of the edited settings."""
+    key(page, "Space")
+    expect(page.get_by_text("PAUSED", exact=True).first).to_be_visible()
+    assert learner.status is not None
+    t = learner.status.t
+    tab(page, "Tasks")
+    page.get_by_role("button", name="▼ Down").first.click()
+    expect(page.get_by_text("1 · orientation")).to_be_visible()
+    tab(page, "Control")
+    page.wait_for_timeout(500)
+    before = page.get_by_text("spectral radius").text_content()
+    set_number(page, "M̄ scale", 3)
+    assert eventually(page, lambda: page.get_by_text("spectral radius").text_content() != before)
+    assert learner.status.t == t
+
+
+def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: Learner) -> None:
+    """Typed into a field they are text; pressed twice quickly they cancel out."""
+    tab(page, "Robot")
+    row(page, "Hand frame").locator("input").click()
+    page.keyboard.type("s 2r")
+    key(page, "Tab")
+    assert row(page, "Hand frame").locator("input").input_value() == "s 2r"
+    page.wait_for_timeout(500)
+    assert learner.status is not None and learner.status.running
+    assert learner.settings is not None and learner.settings.levels[1].enabled
+    tab(page, "Start")
+    for name in ("Space", "Space", "2", "2", "3"):
+        key(page, name)
+    assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[2].enabled)
+    assert learner.settings.levels[1].enabled and learner.status.running
 
 
 def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> None:
@@ -173,13 +238,16 @@ def test_two_browsers_and_no_third(
 def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Learner) -> None:
     pid = learner.pid
     assert pid is not None
+    view = camera(page)
     os.kill(pid, signal.SIGKILL)
     expect(page.get_by_text("ended from outside")).to_be_visible()
     expect(page.get_by_text("Press Reset to start again")).to_be_visible()
     press(page, "Reset")
-    expect(page.get_by_text("RUNNING").first).to_be_visible()
+    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     assert learner.pid != pid
     wait_for_scene(page)
+    page.wait_for_timeout(500)
+    assert np.allclose(camera(page), view, atol=1e-3)  # looked at from where it was
 
 
 def test_wrong_robots_are_one_sentence_and_uploads_work(page: Page, learner: Learner, tmp_path: Path) -> None:
@@ -215,19 +283,15 @@ def _upload(page: Page, path: Path) -> None:
 def test_other_scenes_and_the_phone(browser: Browser, server: PageServer) -> None:
     phone = open_page(browser, server.url, 390, 844)
     learner = server.sessions.learners[-1]
-    expect(phone.get_by_text("Drag the orange ball")).to_be_visible()
+    expect(phone.get_by_text("Drag the target by its arrows")).to_be_visible()
+    left, right = sheet(phone)
+    assert left < 1 and 389 <= right <= 391  # the sheet fills the screen
     tab(phone, "Robot")
     phone.get_by_role("button", name="Load robot").scroll_into_view_if_needed()
-    learner.send(_load("iiwa14-circle"))
+    learner.send(Load(SceneChoice("iiwa14-circle")))
     assert eventually(
         phone, lambda: learner.ready is not None and learner.ready.choice.name == "iiwa14-circle"
     )
     wait_for_scene(phone, "/reference/0")
     expect(phone.get_by_text("Watch the hand follow the curve")).to_be_visible()
     phone.context.close()
-
-
-def _load(name: str):
-    from app.messages import Load, SceneChoice
-
-    return Load(SceneChoice(name))

@@ -1,0 +1,78 @@
+"""Switching the controller while the robot moves: for a moment both control it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.controllers import Controller, Settings
+from himpc.plan import Plan
+from himpc.references import Preview
+from robots import InputError
+
+Array = NDArray[np.float64]
+
+HANDOVER_SECONDS = 0.3
+
+
+class Handover:
+    """Two controllers at work, the torque going over from one to the other: τ = (1 − s) τ_old + s τ_new.
+
+    s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. A controller that computes its torque from a model
+    disagrees with the one before by its model's error; the blend spreads that step. Both see the measured
+    state and the torque that really acted, so each closes its own loop all the time, and their blend lies
+    within the torque bounds if both torques do. Evidence and prediction are the new controller's.
+    """
+
+    def __init__(self, old: Controller, new: Controller) -> None:
+        """`new` must have been reset to the torque that acts now."""
+        self._old: Controller | None = old
+        self.new = new
+        self._elapsed = 0.0
+
+    @property
+    def settings(self) -> Settings:
+        """The new controller's settings."""
+        return self.new.settings
+
+    @property
+    def done(self) -> bool:
+        """Whether the new controller is on its own."""
+        return self._old is None
+
+    def reset(self, tau_0: Array) -> None:
+        """Ends the hand-over: the new controller starts afresh from τ₀."""
+        self._old = None
+        self.new.reset(tau_0)
+
+    def configure(self, settings: Settings) -> None:
+        """Both take the settings. If they do not fit the new controller: InputError, and nothing changes."""
+        self.new.configure(settings)
+        if self._old is not None:
+            try:
+                self._old.configure(settings)
+            except InputError:
+                self._old = None
+
+    def step(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
+    ) -> Plan:
+        """One control period of both; `step_us` counts the new controller only."""
+        plan = self.new.step(q, v, previews, tau_applied)
+        if self._old is None:
+            return plan
+        leaving = self._old.step(q, v, previews, tau_applied).tau
+        self._elapsed += self.new.settings.T_s
+        x = min(1.0, self._elapsed / HANDOVER_SECONDS)
+        if x >= 1.0 or not np.isfinite(leaving).all():
+            self._old = None
+            return plan
+        share = x * x * (3.0 - 2.0 * x)
+        return plan._replace(tau=(1.0 - share) * leaving + share * plan.tau)
+
+
+def settled(controller: Controller) -> Controller:
+    """The controller itself, or the new one of a hand-over that is done."""
+    return controller.new if isinstance(controller, Handover) and controller.done else controller

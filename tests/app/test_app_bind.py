@@ -1,0 +1,116 @@
+"""Controls and settings: no edit is lost, whatever else happens at that moment."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import viser
+from viser import _messages
+
+from app.panels import bind
+from app.panels.bind import Bindings, Wish
+from lessons.events import Event, Set
+from lessons.scenes import load_scene
+from lessons.settings import SceneSettings, changed
+
+
+@pytest.fixture(scope="module")
+def viser_server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def settings() -> SceneSettings:
+    return load_scene("planar3-hold").settings
+
+
+class Panel:
+    """One slider of N with its bindings, and a browser that changes it through viser's own handler."""
+
+    def __init__(self, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.posted: list[Event] = []
+        self.gui, self.loop = server.gui, server.get_event_loop()
+        monkeypatch.setattr(self.gui, "_resolve_client", lambda _: object())
+        self.slider = self.gui.add_slider("N", min=1, max=30, step=1, initial_value=5)
+        self.bindings = Bindings(self.posted.append, self.loop)
+        self.bindings.bind(self.slider, lambda s: s.horizon, lambda value: Set("horizon", int(value)))
+
+    def browser_sets(self, value: int, meanwhile: Callable[[], None] = lambda: None) -> None:
+        """`meanwhile` runs in another thread between the value's arrival and the control's callback."""
+
+        def run(*_: Any) -> None:
+            thread = threading.Thread(target=meanwhile)
+            thread.start()
+            thread.join()
+
+        self.slider._impl.sync_cb = run
+        message = _messages.GuiUpdateMessage(self.slider._impl.uuid, {"value": value})
+        asyncio.run_coroutine_threadsafe(self.gui._handle_gui_updates(0, message), self.loop).result(10)  # pyright: ignore
+
+    def refresh(self, settings: SceneSettings) -> None:
+        """A refresh, and what it left on the loop."""
+        self.bindings.refresh(settings)
+        done: Future[None] = Future()
+        self.loop.call_soon_threadsafe(done.set_result, None)
+        done.result(10)
+
+
+@pytest.fixture
+def panel(viser_server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> Panel:
+    return Panel(viser_server, monkeypatch)
+
+
+def test_an_edit_is_not_lost_to_a_refresh_at_the_same_moment(panel: Panel, settings: SceneSettings) -> None:
+    """The page shows the settings of before while the new value has just arrived: the new value is posted."""
+    panel.browser_sets(12, meanwhile=lambda: panel.bindings.refresh(settings))
+    assert panel.posted == [Set("horizon", 12)]
+    panel.refresh(settings)
+    assert panel.slider.value == 12  # the answer is on its way
+
+
+def test_what_changes_elsewhere_is_shown_and_a_refused_edit_taken_back(
+    panel: Panel, settings: SceneSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panel.refresh(changed(settings, "horizon", 9))
+    assert panel.slider.value == 9 and panel.posted == []
+    panel.browser_sets(12)
+    monkeypatch.setattr(bind, "HOLD", 0.0)
+    panel.refresh(settings)
+    assert panel.slider.value == settings.horizon
+
+
+def test_controls_are_reminded_of_what_the_session_has(
+    panel: Panel, settings: SceneSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A change that the browser never sent must not stay on the screen: unchanged values are sent again."""
+    sent: list[Any] = []
+    monkeypatch.setattr(panel.gui._websock_interface, "queue_message", sent.append)
+    panel.refresh(replace(settings, horizon=5))
+    panel.refresh(replace(settings, horizon=5))
+    assert [message.updates for message in sent] == [{"value": 5}]  # not more often than every REMIND s
+    monkeypatch.setattr(bind, "REMIND", 0.0)
+    panel.refresh(replace(settings, horizon=5))
+    assert len(sent) == 2
+    panel.bindings.close()
+    panel.refresh(replace(settings, horizon=7))
+    assert len(sent) == 2 and panel.slider.value == 5
+
+
+def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two quick presses of a toggle end where they began."""
+    wish: Wish[bool] = Wish()
+    assert wish.now(True) is True
+    assert wish.ask(not wish.now(True)) is False
+    assert wish.ask(not wish.now(True)) is True
+    later = time.monotonic() + bind.HOLD + 1.0
+    monkeypatch.setattr(bind.time, "monotonic", lambda: later)
+    assert wish.now(False) is False
