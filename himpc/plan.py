@@ -29,7 +29,8 @@ class Plan(NamedTuple):
     """The first input, the prediction, and per level what was found.
 
     Attributes:
-        tau: torque to apply now, τ₀ + Δτ*_{r,k|k}, (n,) N·m, inside the torque bounds.
+        tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; what controllers
+            that know no bounds (OSF, TDEOSF) demand.
         tau_0: torque that was applied last, (n,) N·m.
         levels: one solution per active level, highest priority first.
         q: predicted positions at knots 0 … N, (N+1, n).

@@ -28,7 +28,8 @@ class Scene:
         robot: the robot.
         settings: controller, limits, plant and stack at the start.
         references: makes a fresh reference per task name for each run; tasks without one get a
-            draggable target that starts where the task's value is at the start.
+            draggable target that starts where the task's value is at the start. A scene whose settings
+            have options takes it from them.
         q_0: initial positions, (n,) rad.
         v_0: initial velocities, (n,) rad/s.
         tau_0: torque acting at the start, (n,) N·m; None: the plant's holding torque.
@@ -48,3 +49,7 @@ class Scene:
     duration: float = 4.0
     events: tuple[tuple[float, Event], ...] = ()
     sources: Mapping[str, str | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.settings.options is not None:
+            object.__setattr__(self, "references", self.settings.options.references)

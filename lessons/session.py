@@ -89,7 +89,8 @@ class Session:
         self._truth = (math.nan, math.nan, math.nan)
 
     def _fresh_references(self) -> dict[str, Reference]:
-        given = dict(self.scene.references(self.robot, self.settings.levels))
+        motion = self.settings.options or self.scene
+        given = dict(motion.references(self.robot, self.settings.levels))
         start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
         for task in _tasks(self.settings.levels):
             if task.name not in given:

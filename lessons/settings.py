@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
-import numpy as np
-
 from himpc.controllers import CONTROLLERS, Settings
 from himpc.limits import Limits
+from himpc.references import Reference
 from himpc.stack import Level, Stack
-from robots import InputError, NominalSettings, PlantSettings
+from lessons.values import typed, weight
+from robots import InputError, NominalSettings, PlantSettings, Robot
 from robots.errors import unknown_name
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What a scene lets one choose about its motion: a subclass has one field per choice, with its default.
+
+    Each field is a path of its own (`--set smooth=true`). A change takes effect when a run starts.
+    """
+
+    def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
+        """A fresh reference per task name, like `Scene.references`."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -26,6 +38,7 @@ class SceneSettings:
         M_bar_scale: factor on all of it.
         nominal: what model-based controllers believe the plant to be.
         plant: what the plant really is.
+        options: the scene's own choices, if it has any.
     """
 
     levels: Stack
@@ -36,11 +49,12 @@ class SceneSettings:
     T_s: float = 1e-3
     R_on: Literal["torque", "acceleration"] = "torque"
     route: Literal["structured", "explicit"] = "structured"
-    solver: Literal["daqp", "proxqp"] = "daqp"
+    solver: Literal["daqp", "proxqp", "qpoases"] = "daqp"
     damping: bool = True
     limits: Limits = field(default_factory=Limits)
     nominal: NominalSettings = field(default_factory=NominalSettings)
     plant: PlantSettings = field(default_factory=PlantSettings)
+    options: SceneOptions | None = None
 
     def for_controller(self) -> Settings:
         """The controller's part. Raises InputError for values that cannot be."""
@@ -73,7 +87,8 @@ def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
 
     Paths: a field ("horizon", "M_bar", …); "Q" or "R" for all levels (one number, or one per level);
     "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p, K_v
-    (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY".
+    (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY"; the fields of
+    the scene's options.
 
     Raises:
         InputError: unknown path (naming the nearest), or a value of the wrong type or range.
@@ -90,10 +105,14 @@ def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
         names = [f.name for f in fields(part)]
         if rest not in names:
             raise _unknown_path(settings, path)
-        return replace(settings, **{head: replace(part, **{rest: _typed(path, getattr(part, rest), value)})})
+        return replace(settings, **{head: replace(part, **{rest: typed(path, getattr(part, rest), value)})})
+    options = settings.options
+    if options is not None and path in _option_fields(settings):
+        choice = typed(path, getattr(options, path), value)
+        return replace(settings, options=replace(options, **{path: choice}))
     if rest or head not in _plain_fields():
         raise _unknown_path(settings, path)
-    updated = replace(settings, **{head: _typed(path, getattr(settings, head), value)})
+    updated = replace(settings, **{head: typed(path, getattr(settings, head), value)})
     updated.for_controller()
     return updated
 
@@ -102,6 +121,7 @@ def paths(settings: SceneSettings) -> list[str]:
     """Every path that `changed` takes for these settings."""
     return [
         *_plain_fields(),
+        *_option_fields(settings),
         *_EVERY_LEVEL,
         *(f"levels.{place}.{key}" for place in range(1, len(settings.levels) + 1) for key in _LEVEL_KEYS),
         *(f"levels.{level.name}.{key}" for level in settings.levels for key in _LEVEL_KEYS),
@@ -116,7 +136,11 @@ def paths(settings: SceneSettings) -> list[str]:
 
 
 def _plain_fields() -> list[str]:
-    return [f.name for f in fields(SceneSettings) if f.name not in ("levels", *_PARTS)]
+    return [f.name for f in fields(SceneSettings) if f.name not in ("levels", "options", *_PARTS)]
+
+
+def _option_fields(settings: SceneSettings) -> list[str]:
+    return [] if settings.options is None else [f.name for f in fields(settings.options)]
 
 
 def _unknown_path(settings: SceneSettings, path: str) -> InputError:
@@ -128,7 +152,7 @@ def _every_level(settings: SceneSettings, key: str, value: Any) -> SceneSettings
     if len(values) != len(settings.levels):
         raise InputError(f"{key} has {len(values)} values: give one number, or one per level")
     levels = [
-        replace(level, **{key: _weight(f"{key} of level '{level.name}'", each)})
+        replace(level, **{key: weight(f"{key} of level '{level.name}'", each)})
         for level, each in zip(settings.levels, values, strict=True)
     ]
     return replace(settings, levels=tuple(levels))
@@ -144,13 +168,13 @@ def _in_level(settings: SceneSettings, path: str, rest: str, value: Any) -> Scen
 
     def update(level: Level) -> Level:
         if key in _TASK_KEYS:
-            gain = _weight(path, value)
+            gain = weight(path, value)
             return replace(level, tasks=tuple(replace(task, **{key: gain}) for task in level.tasks))
         if key in ("Q", "R"):
-            return replace(level, **{key: _weight(path, value)})
+            return replace(level, **{key: weight(path, value)})
         if key == "horizon":
-            return replace(level, horizon=None if value is None else _typed(path, 1, value))
-        return replace(level, enabled=_typed(path, True, value))
+            return replace(level, horizon=None if value is None else typed(path, 1, value))
+        return replace(level, enabled=typed(path, True, value))
 
     return _updated(settings, name, update)
 
@@ -160,7 +184,7 @@ def _in_task(settings: SceneSettings, path: str, rest: str, value: Any) -> Scene
     owner = {task.name: level.name for level in settings.levels for task in level.tasks}
     if name not in owner or key not in _TASK_KEYS:
         raise _unknown_path(settings, path)
-    gain = _weight(path, value)
+    gain = weight(path, value)
 
     def update(level: Level) -> Level:
         tasks = (replace(task, **{key: gain}) if task.name == name else task for task in level.tasks)
@@ -172,40 +196,3 @@ def _in_task(settings: SceneSettings, path: str, rest: str, value: Any) -> Scene
 def _updated(settings: SceneSettings, name: str, update: Callable[[Level], Level]) -> SceneSettings:
     levels = tuple(update(level) if level.name == name else level for level in settings.levels)
     return replace(settings, levels=levels)
-
-
-def _weight(path: str, value: Any) -> float | tuple[float, ...]:
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return tuple(_number(path, each) for each in value)
-    return _number(path, value)
-
-
-def _number(path: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InputError(f"{path} is {value!r}: give a number")
-    if not math.isfinite(value):
-        raise InputError(f"{path} is {value}: give a finite number")
-    return float(value)
-
-
-def _typed(path: str, old: Any, value: Any) -> Any:
-    """The value in the type of the one it replaces."""
-    if isinstance(old, bool):
-        if isinstance(value, bool):
-            return value
-        raise InputError(f"{path} is {value!r}: give true or false")
-    if isinstance(old, str):
-        if isinstance(value, str):
-            return value
-        raise InputError(f"{path} is {value!r}: give a word")
-    if isinstance(old, int):
-        number = _number(path, value)
-        if number != int(number):
-            raise InputError(f"{path} is {value}: give a whole number")
-        return int(number)
-    if isinstance(old, tuple) and not isinstance(value, (list, tuple, np.ndarray)):
-        _number(path, value)
-        if path.startswith(("nominal.", "plant.")):
-            return float(value)
-        raise InputError(f"{path} is {value!r}: give a list of {len(old)} numbers, e.g. {list(old)}")
-    return _weight(path, value)

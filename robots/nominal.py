@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 class NominalSettings:
     """What a model-based controller is told; the plant is described by `PlantSettings`, apart from this.
 
-    payload_kg, damping, armature, inertia_scale, gravity: as in `PlantSettings`, but as the controller
-        believes them; by default the robot as its URDF describes it, without armature or friction.
+    payload_kg, damping, armature, mass_scale, inertia_scale, gravity: as in `PlantSettings`, but as the
+        controller believes them; by default the robot as its URDF describes it, without armature or friction.
 
     Raises InputError, naming the field, for values that cannot be.
     """
@@ -28,6 +28,7 @@ class NominalSettings:
     payload_kg: float = 0.0
     damping: float | tuple[float, ...] = 0.0
     armature: float | tuple[float, ...] = 0.0
+    mass_scale: float | tuple[float, ...] = 1.0
     inertia_scale: float | tuple[float, ...] = 1.0
     gravity: bool = True
 
@@ -40,6 +41,7 @@ class NominalSettings:
             payload_kg=self.payload_kg,
             damping=self.damping,
             armature=self.armature,
+            mass_scale=self.mass_scale,
             inertia_scale=self.inertia_scale,
             gravity=self.gravity,
         )

@@ -1,0 +1,47 @@
+"""HIQP: HIMPC with a horizon of one knot, the local optimum the paper compares with in section V."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.controllers.himpc import HIMPC
+from himpc.controllers.settings import Settings
+from himpc.plan import Plan
+from himpc.references import Preview
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+_KNOTS = 1
+
+
+class HIQP(HIMPC):
+    """HIMPC with N = 1, whatever horizon the settings name.
+
+    Δτ_k moves ẍ_{k+1} and ẋ_{k+1}, not x_{k+1}: the printed position rows (32d) are beyond its reach.
+    """
+
+    def __init__(self, robot: Robot, settings: Settings) -> None:
+        """Raises InputError if the settings name frames or joints that the robot does not have."""
+        super().__init__(robot, replace(settings, horizon=_KNOTS))
+
+    def configure(self, settings: Settings) -> None:
+        """Takes new settings at once, but for the horizon. InputError if they do not fit: nothing changes."""
+        super().configure(replace(settings, horizon=_KNOTS))
+
+    def step(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
+    ) -> Plan:
+        """One control period, see `HIMPC.step`; of the previews it reads the next knot only."""
+        return super().step(q, v, {name: _next(each) for name, each in previews.items()}, tau_applied)
+
+
+def _next(preview: Preview) -> Preview:
+    ahead = slice(_KNOTS + 1)
+    return Preview(
+        preview.value, preview.displacement[ahead], preview.velocity[ahead], preview.acceleration[ahead]
+    )

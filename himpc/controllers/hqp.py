@@ -1,0 +1,109 @@
+"""HQP: one-step hierarchical quadratic programming on the nominal model, [16] of the HIMPC paper."""
+
+from __future__ import annotations
+
+from time import perf_counter_ns
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import NO_ROWS, ActiveRows, LevelSolution, Rung
+from himpc.controllers.null_space_control import split
+from himpc.controllers.one_step import Demand, Law, OneStepController, leak
+from himpc.controllers.settings import Settings
+from himpc.limits import Rows
+from himpc.qp import solve_qp
+from robots import NominalModel
+
+Array = NDArray[np.float64]
+
+_BINDING = 1e-9
+"""N·m: a row with a larger multiplier that is closer than a thousand times this to its bound is binding."""
+
+
+_REST = 5.0
+"""1/s: K_v of the last rung, q̈ = −K_v q̇ within the torque bounds, if the first QP has no verified point."""
+
+
+class Found(NamedTuple):
+    """A level's y with what was verified about it."""
+
+    y: Array
+    active: ActiveRows = NO_ROWS
+    kkt_residual: float = 0.0
+    status: str = "optimal"
+    qp_us: float = 0.0
+    usable: bool = True
+
+
+class HQP(OneStepController):
+    """Level i: min over y = τ − N_n of ‖J_i M_n⁻¹ y − (ẍ_i − J̇_i q̇)‖²_Q + ‖y‖²_R within the torque bounds.
+
+    Priority: J_p M_n⁻¹ y_i = J_p M_n⁻¹ y_p for all levels p above, as in (34g) with the nominal M_n
+    (`settings.nominal`) in M̄'s place. ẍ_i closes (4) with the gains of the tasks. As in section V only the
+    torque is bounded: velocity and position limits are not known to it.
+
+    [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
+    singularity. Multiplied out, as here, no product of Jacobians is inverted, and R > 0 keeps every Hessian
+    positive definite. y counts from N_n, so that R does not pull an arm at rest down.
+    """
+
+    clips = True
+
+    def _adopt(self, settings: Settings) -> None:
+        self._nominal = NominalModel(self.robot, settings.nominal)
+
+    def _law(self, q: Array, v: Array, a: Array, demands: list[Demand]) -> Law:
+        M, bias = self._nominal.mass_matrix(q), self._nominal.bias(q, v)
+        inverse = np.asarray(np.linalg.inv(M), np.float64)
+        rows = self._rows(self._limits, bias)
+        y, free = np.clip(np.zeros(len(bias)), rows.lower[0], rows.upper[0]), np.eye(len(bias))
+        levels: list[LevelSolution] = []
+        accelerations: list[Array] = []
+        for i, demand in enumerate(demands):
+            started = perf_counter_ns()
+            B = demand.J @ inverse
+            rung: Rung = "solve"
+            found = self._optimum(demand, B, y, free, rows) if free.shape[1] else Found(y, status="empty")
+            if not found.usable:
+                # Staying where the levels above are keeps every priority; below nothing, come to rest.
+                braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
+                rung = "inherit" if i else "damping"
+                found = Found(y if i else braking, status=found.status, qp_us=found.qp_us)
+            y = found.y
+            free = free @ split(B @ free, float(np.linalg.norm(B)))[3]
+            accelerations.append(inverse @ y)
+            error = demand.residual(B @ y)
+            increment = bias + y - self._tau_0
+            levels.append(
+                LevelSolution(
+                    name=demand.form.level.name,
+                    U=y[None],
+                    cost=float(error @ error + (demand.form.R * increment) @ increment),
+                    active=found.active,
+                    kkt_residual=found.kkt_residual,
+                    status=found.status,
+                    rung=rung,
+                    time_us=(perf_counter_ns() - started) / 1e3,
+                    qp_us=found.qp_us,
+                    leak=leak(demands, accelerations, i),
+                )
+            )
+        return Law(bias, levels)
+
+    def _optimum(self, demand: Demand, B: Array, y: Array, free: Array, rows: Rows) -> Found:
+        """The level's QP over w in y_i = y_{i−1} + Z w, Z = `free`: the priorities hold exactly."""
+        weighted = demand.form.root_Q[:, None] * B
+        H = free.T @ (weighted.T @ weighted + np.diag(demand.form.R)) @ free
+        f = free.T @ (weighted.T @ demand.residual(B @ y) + demand.form.R * y)
+        # y meets the bounds up to rounding; it must stay feasible exactly.
+        lower, upper = np.minimum(rows.lower[0] - y, 0.0), np.maximum(rows.upper[0] - y, 0.0)
+        solution = solve_qp(H, f, free, lower, upper, self._settings.solver)
+        if not solution.solved:
+            return Found(y, status=solution.status, qp_us=solution.time_us, usable=False)
+        step = free @ solution.x
+        slack = np.where(solution.multipliers > 0, upper - step, step - lower)
+        joint = np.flatnonzero((np.abs(solution.multipliers) > _BINDING) & (slack < 1e3 * _BINDING))
+        active = ActiveRows(np.zeros_like(joint), joint, solution.multipliers[joint], slack[joint])
+        return Found(y + step, active, solution.kkt_residual, solution.status, solution.time_us)

@@ -1,0 +1,67 @@
+"""NHIMPC: HIMPC with the Jacobians taken along the current prediction, section VI-C of the paper."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from himpc.cascade.level import LevelSolution
+from himpc.controllers.himpc import HIMPC, Found, Tick
+from himpc.controllers.settings import Settings
+from robots import Robot
+
+TOLERANCE = 1e-6
+"""N·m: the iteration ends when no increment of any level changes by more."""
+MAX_ITERATIONS = 10
+"""The iteration ends after so many solutions of all levels, converged or not."""
+
+
+class NHIMPC(HIMPC):
+    """J_i(q_{k+j|k}) in place of Ĵ_i^j, the simplification (29): a nonlinear problem, since q_{k+j|k} depends
+    on Δτ. It is the only difference to HIMPC.
+
+    Solved by sequential QPs: all levels under the Jacobians of the last prediction, a new prediction by (18)
+    from their increments, and again until the increments stay within `tolerance`. The point this ends in
+    satisfies (15), (33) and all bounds with the Jacobians of its own prediction. An exact SQP would also have
+    the derivative of the Jacobians in its gradient: over N periods that is of the order of (N T_s)² times the
+    rest.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: Settings,
+        tolerance: float = TOLERANCE,
+        max_iterations: int = MAX_ITERATIONS,
+    ) -> None:
+        """Raises InputError if the settings name frames or joints that the robot does not have.
+
+        Args:
+            robot: gives geometry and limits.
+            settings: as for HIMPC.
+            tolerance: N·m, see TOLERANCE.
+            max_iterations: ≥ 1, see MAX_ITERATIONS; with 1 this is HIMPC.
+        """
+        self.tolerance = tolerance
+        self.max_iterations = max_iterations
+        super().__init__(robot, settings)
+
+    def _search(self, tick: Tick) -> Found | None:
+        fading = dict(self._weight)
+        found = super()._search(tick)
+        iterations = 1
+        while found is not None and found.solutions and iterations < self.max_iterations:
+            # A level that fades in advances once per tick, not once per iteration.
+            self._weight = dict(fading)
+            again = self._solve(tick, found.predicted_q[1:-1])
+            iterations += 1
+            if again is None:
+                break
+            change, found = _change(found.solutions, again.solutions), again
+            if change <= self.tolerance:
+                break
+        return None if found is None else found._replace(iterations=iterations)
+
+
+def _change(before: list[LevelSolution], after: list[LevelSolution]) -> float:
+    """The largest change of an increment at any level, N·m."""
+    return max(float(np.abs(new.U - old.U).max()) for new, old in zip(after, before, strict=True))

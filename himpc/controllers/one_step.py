@@ -1,0 +1,263 @@
+"""What the one-step controllers share: they look at this tick only and ask for an acceleration per level."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from time import perf_counter_ns
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import NO_ROWS, LevelSolution
+from himpc.configuration import Configuration
+from himpc.controllers.forms import LevelForm, StackForm, measure, stack_form
+from himpc.controllers.settings import Settings
+from himpc.limits import Limits, LimitsInForce, Rows, in_force, ramp
+from himpc.plan import Plan
+from himpc.references import Preview
+from himpc.stack import DAMPING_LEVEL, active_levels, freedom_left
+from himpc.tasks import Damping
+from robots import InputError, Robot
+
+Array = NDArray[np.float64]
+
+BLEND_SECONDS = 0.5
+"""How long what a change of settings would have done to the torque at once takes to arrive."""
+
+_NUDGE = 1e-4
+"""rad or m: how far the joints are moved to both sides to see the Jacobians change."""
+
+
+class Demand(NamedTuple):
+    """What one level asks for now: q̈ with J q̈ = ẍ_d − K_v(ẋ − ẋ_d) − K_p x̃ − J̇q̇, which is (4).
+
+    Attributes:
+        form: the level with its weights.
+        J: (m, n).
+        acceleration: the right-hand side, (m,).
+    """
+
+    form: LevelForm
+    J: Array
+    acceleration: Array
+
+    def residual(self, effect: Array) -> Array:
+        """√Q times what J q̈ misses, (m,); effect: J q̈, (m,)."""
+        return self.form.root_Q * (effect - self.acceleration)
+
+
+class Law(NamedTuple):
+    """A controller's answer for one tick.
+
+    Attributes:
+        bias: torque of q̈ = 0 in the controller's model, (n,) N·m.
+        levels: per level, U relative to the bias.
+    """
+
+    bias: Array
+    levels: list[LevelSolution]
+
+
+class OneStepController(ABC):
+    """State, settings and their bumpless change for OSF, TDEOSF and HQP; a subclass gives the law.
+
+    A change of settings is bumpless: the difference it makes to the torque at once is taken back and fades
+    in over BLEND_SECONDS. `reset` starts with the pure law.
+    """
+
+    clips: bool = False
+    """Whether the torque bounds are imposed; otherwise the plan's torque is what the law demands."""
+    incremental: bool = False
+    """Whether the bias is counted from τ₀: it then carries the torque over, and only the rest can jump."""
+
+    def __init__(self, robot: Robot, settings: Settings) -> None:
+        """Raises InputError if the settings name frames or joints that the robot does not have."""
+        self.robot = robot
+        self._data = robot.model.createData()
+        self._settings = settings
+        self._apply(settings)
+        self.reset(np.zeros(robot.n))
+
+    @property
+    def settings(self) -> Settings:
+        """The settings in use."""
+        return self._settings
+
+    def reset(self, tau_0: Array) -> None:
+        """Forgets its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""
+        self._tau_0 = np.array(tau_0, float)
+        self._before: tuple[Array, float] | None = None
+        self._limits = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
+        self._offset = np.zeros(self.robot.n)
+        self._share = 0.0
+        self._lead = np.zeros(self.robot.n)
+        self._changed = False
+
+    def configure(self, settings: Settings) -> None:
+        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        self._apply(settings)
+        self._changed = True
+
+    def _apply(self, settings: Settings) -> None:
+        if len(settings.M_bar) != self.robot.n:
+            raise InputError(
+                f"M_bar has {len(settings.M_bar)} entries: '{self.robot.name}' has {self.robot.n} joints"
+            )
+        freedom = freedom_left(self.robot, settings.stack)
+        levels = active_levels(settings.stack, settings.damping, freedom)
+        # Levels that are off are prepared too: a wrong gain must be refused now, not when it is switched on.
+        stack_form(self.robot, (*settings.stack, DAMPING_LEVEL), settings)
+        form = stack_form(self.robot, levels or (DAMPING_LEVEL,), settings)
+        self._adopt(settings)
+        self._form, self._idle = form, not levels
+        self._off = [task for level in settings.stack if level not in levels for task in level.tasks]
+        self._goal = in_force(self.robot, settings.limits)
+        self._settings = settings
+
+    @abstractmethod
+    def _adopt(self, settings: Settings) -> None:
+        """Prepares what the law needs beyond the stack; raises InputError before it changes anything."""
+
+    @abstractmethod
+    def _law(self, q: Array, v: Array, a: Array, demands: list[Demand]) -> Law:
+        """The torque of every level.
+
+        Args:
+            q, v: measured state, (n,).
+            a: q̈ by backward difference of q̇, (n,).
+            demands: the levels, highest priority first; none if nothing is asked for.
+
+        Raises:
+            numpy.linalg.LinAlgError: the model cannot be evaluated here; the torque is then held.
+        """
+
+    def step(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
+    ) -> Plan:
+        """One control period: measured state in, torque and evidence out; arguments as in `HIMPC.step`.
+
+        Returns:
+            the plan, whose torque is finite. A state that is not finite holds the last torque.
+        """
+        started = perf_counter_ns()
+        if tau_applied is not None and _usable(tau_applied):
+            self._tau_0 = np.array(tau_applied, float)
+        if not (_usable(q) and _usable(v)):
+            return self._hold(q, "state not finite", started)
+        T_s = self._settings.T_s
+        self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, T_s)
+        v_before, period = self._before or (v, T_s)
+        values: dict[str, Array] = {}
+        errors: dict[str, Array] = {}
+        with np.errstate(all="ignore"):
+            try:
+                demands = self._demands(self._form, q, v, previews, values, errors)
+                law = self._law(q, v, (v - v_before) / period, [] if self._idle else demands)
+                tau, levels = self._blended(law)
+            except np.linalg.LinAlgError:
+                return self._hold(q, "model or reference not finite", started)
+        if not _usable(tau):
+            return self._hold(q, "torque not finite", started)
+        self._before = (v, T_s)
+        plan = self._plan(tau, levels, np.array((q, q + T_s * v)), errors, values, started)
+        self._tau_0 = tau
+        return plan
+
+    def _demands(
+        self,
+        form: StackForm,
+        q: Array,
+        v: Array,
+        previews: Mapping[str, Preview],
+        values: dict[str, Array],
+        errors: dict[str, Array],
+    ) -> list[Demand]:
+        """The demands of a form's levels; x and x̃ of every task are written to `values` and `errors`."""
+        h = _NUDGE / max(1.0, float(np.abs(v).max()))
+        configuration = Configuration(self.robot, self._data, q, v, np.array((q + h * v, q - h * v)))
+        J, ahead, behind = form.jacobian(configuration)
+        drift = (ahead - behind) @ v / (2 * h)
+        error = measure(form.tasks, configuration, previews, values, errors)
+        if self._off:
+            measure(self._off, configuration, previews, values, errors)
+        wanted = np.zeros((2, error.size))
+        start = 0
+        for task, rows in zip(form.tasks, form.sizes, strict=True):
+            if not isinstance(task, Damping):
+                preview = previews[task.name]
+                wanted[:, start : start + rows] = preview.velocity[0], preview.acceleration[0]
+            start += rows
+        model = form.model
+        acceleration = wanted[1] - model.K_v * (J @ v - wanted[0]) - model.K_p * error - drift
+        if not math.isfinite(float(acceleration.sum())):
+            raise np.linalg.LinAlgError("the demand is not finite")
+        return [Demand(level, J[level.rows], acceleration[level.rows]) for level in form.levels]
+
+    def _blended(self, law: Law) -> tuple[Array, list[LevelSolution]]:
+        """The torque, and the levels relative to τ₀; what the last change of settings did fades in."""
+        lead = law.levels[-1].U[0] if law.levels else np.zeros(self.robot.n)
+        if self._changed:
+            self._offset = (self._lead if self.incremental else self._tau_0 - law.bias) - lead
+            self._share, self._changed = 1.0, False
+        base = law.bias + self._share * self._offset
+        self._share = max(0.0, self._share - self._settings.T_s / BLEND_SECONDS)
+        tau = base + lead
+        self._lead = tau - law.bias
+        if self.clips:
+            tau = np.minimum(np.maximum(tau, self._limits.tau_lower), self._limits.tau_upper)
+        return tau, [level._replace(U=level.U + (base - self._tau_0)) for level in law.levels]
+
+    def _hold(self, q: Array, status: str, started: int) -> Plan:
+        """The plan for a tick without a usable state or model: keep the torque, forget the velocity."""
+        self._before = None
+        if self.clips:
+            self._tau_0 = np.clip(self._tau_0, self._limits.tau_lower, self._limits.tau_upper)
+        still = np.zeros((1, self.robot.n))
+        name = self._form.levels[0].level.name
+        held = LevelSolution(name, still, math.nan, NO_ROWS, 0.0, status, "hold", 0.0, 0.0, 0.0)
+        return self._plan(self._tau_0, [held], np.tile(q, (2, 1)), {}, {}, started)
+
+    def _plan(
+        self,
+        tau: Array,
+        levels: list[LevelSolution],
+        q: Array,
+        errors: dict[str, Array],
+        values: dict[str, Array],
+        started: int,
+    ) -> Plan:
+        return Plan(
+            tau=tau,
+            tau_0=self._tau_0,
+            levels=tuple(levels),
+            q=q,
+            errors=errors,
+            values=values,
+            rows=self._rows(self._limits, self._tau_0),
+            limits=self._limits,
+            step_us=(perf_counter_ns() - started) / 1e3,
+            unsolved=sum(level.rung != "solve" for level in levels),
+        )
+
+    def _rows(self, limits: LimitsInForce, origin: Array) -> Rows:
+        """The bounds of this tick on torques counted from `origin`; infinite if none are imposed."""
+        bound = limits.tau_upper - origin, limits.tau_lower - origin
+        upper, lower = bound if self.clips else (np.full_like(origin, np.inf), np.full_like(origin, -np.inf))
+        return Rows(np.ones((1, 1)), lower[None], upper[None], ("torque",))
+
+
+def leak(demands: list[Demand], accelerations: list[Array], level: int) -> float:
+    """‖J_p (q̈_i − q̈_p)‖∞ over the levels p above level i.
+
+    accelerations: q̈_p (n,) that the levels down to each p cause in the model.
+    """
+    moved = (demands[p].J @ (accelerations[level] - accelerations[p]) for p in range(level))
+    return max((float(np.abs(each).max()) for each in moved), default=0.0)
+
+
+def _usable(x: Array) -> bool:
+    """Finite, and small enough that its squares stay so."""
+    return float(x @ x) < 1e18

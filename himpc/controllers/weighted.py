@@ -1,0 +1,116 @@
+"""All tasks in one cost: what strict priorities are compared with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter_ns
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import LevelProblem, LevelSolution
+from himpc.controllers.himpc import HIMPC, Tick
+from himpc.plan import Plan
+from himpc.references import Preview
+from himpc.stack import DAMPING_LEVEL
+
+Array = NDArray[np.float64]
+
+DAMPING_SHARE = 1e-4
+"""Share of the damping level's Q that counts: it must calm what no task uses, not compete with tasks."""
+
+
+class Weighted(HIMPC):
+    """HIMPC without priorities: min Σ_i V_i over one U, V_i the cost (32a) of level i, under the same rows.
+
+    Model, weights, bounds and hand-over are HIMPC's; only (33) is missing, so a level is as important as its
+    Q. The order of the levels does not matter. A level's own horizon (Remark 8) ends its residual, not its
+    effort: R of (31) adds up over all levels and the longest horizon.
+
+    Evidence: entry p of the plan is the same problem of levels 1 … p alone, the last one is applied. The leak
+    thus tells, as for HIMPC, how far the levels below p move level p from where it would be without them.
+    `cost` is V_p under the applied U. The r − 1 QPs needed for evidence only are left out of `step_us`.
+    """
+
+    _evidence_us = 0.0
+
+    def step(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
+    ) -> Plan:
+        """One control period, see `HIMPC.step`."""
+        self._evidence_us = 0.0
+        plan = super().step(q, v, previews, tau_applied)
+        return plan._replace(step_us=plan.step_us - self._evidence_us)
+
+    def _cascade(
+        self, problems: list[LevelProblem], tick: Tick, damping: Callable[[], LevelProblem]
+    ) -> list[LevelSolution]:
+        problems = [_softened(each) if each.name == DAMPING_LEVEL.name else each for each in problems]
+
+        def solve(count: int) -> LevelSolution:
+            return super(Weighted, self)._cascade([sum_of_costs(problems[:count])], tick, damping)[0]
+
+        applied = solve(len(problems))
+        started = perf_counter_ns()
+        found = [*(solve(count) for count in range(1, len(problems))), applied]
+        increments = [solution.U for solution in found]
+        solutions = [
+            solution._replace(
+                name=problem.name,
+                cost=problem.cost(applied.U),
+                leak=_leak(problems[:place], increments, place),
+            )
+            for place, (problem, solution) in enumerate(zip(problems, found, strict=True))
+        ]
+        self._evidence_us = (perf_counter_ns() - started) / 1e3
+        return solutions
+
+
+def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:
+    """One problem whose cost is the sum of theirs, named after the last: where it stands in the stack."""
+    knots = max(problem.knots for problem in problems)
+    N = len(problems[0].B)
+    weighted_C = []
+    for problem in problems:
+        block = np.zeros((knots, problem.B.shape[1], knots))
+        block[: problem.knots, :, : problem.knots] = problem.weighted_C
+        weighted_C.append(block)
+
+    def within(rows: Array, own: int) -> Array:
+        return rows if own == N else np.where(_before(own, rows), rows, 0.0)
+
+    common = [problem.common_R for problem in problems]
+    return LevelProblem(
+        name=problems[-1].name,
+        B=np.concatenate([problem.B for problem in problems], axis=1),
+        C=np.concatenate([within(problem.C, problem.knots) for problem in problems], axis=1),
+        free=np.concatenate([within(problem.free, problem.knots) for problem in problems], axis=1),
+        weighted_free=np.concatenate(
+            [within(problem.weighted_free, problem.knots) for problem in problems], axis=1
+        ),
+        root_Q=np.concatenate([problem.root_Q for problem in problems]),
+        weighted_C=np.concatenate(weighted_C, axis=1),
+        R=np.sum([problem.R for problem in problems], axis=0),
+        knots=knots,
+        common_R=None if None in common else sum(each for each in common if each is not None),
+    )
+
+
+def _before(own: int, rows: Array) -> NDArray[np.bool_]:
+    return np.arange(len(rows)).reshape(-1, *[1] * (rows.ndim - 1)) < own
+
+
+def _softened(problem: LevelProblem) -> LevelProblem:
+    share = math.sqrt(DAMPING_SHARE)
+    return problem._replace(
+        root_Q=share * problem.root_Q,
+        weighted_free=share * problem.weighted_free,
+        weighted_C=share * problem.weighted_C,
+    )
+
+
+def _leak(above: Sequence[LevelProblem], increments: Sequence[Array], place: int) -> float:
+    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and the levels p above level i."""
+    effects = (problem.B @ (increments[place] - increments[p])[:, :, None] for p, problem in enumerate(above))
+    return max((float(np.abs(effect).max()) for effect in effects), default=0.0)

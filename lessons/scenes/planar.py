@@ -1,0 +1,166 @@
+"""RT1, RT2 and RT3: the planar arm of section V."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from himpc.limits import Limits
+from himpc.references import Circle, Hold, Phase, Preview, Reference, Sinusoid
+from himpc.references.preview import sampled, times
+from himpc.stack import Level, Stack
+from himpc.tasks import FramePosition, Joints
+from lessons.scene import Scene
+from lessons.settings import SceneOptions, SceneSettings
+from robots import InputError, NominalSettings, PlantSettings, Robot, load_robot
+
+OMEGA = 2 * math.pi / 8
+"""rad/s; every circle takes 8 s."""
+
+_ARMATURE = (0.05, 0.05, 0.03)
+
+PLANT = PlantSettings(armature=_ARMATURE, damping=(0.15, 0.1, 0.08), friction=(0.1, 0.08, 0.05))
+"""Geared motors and joint friction, our own choice: the paper does not print the arm's mechanics."""
+
+NOMINAL = NominalSettings(
+    mass_scale=0.8, inertia_scale=0.8, armature=tuple(0.8 * value for value in _ARMATURE)
+)
+"""The identified model: everything that is inert 20 % light, friction unknown."""
+
+CONFLICT_LIMITS = Limits(velocity_approach=8.0)
+"""Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other. The
+faster it may come up to them, the more the lag of time-delay estimation (M̄ is far below M) costs level 1: its
+RMSE is 0.15 mm with a rate of 5, 0.25 with 8, 0.36 with 10, 0.69 with 15 and 0.54 with 0, as printed. Below 8
+the bounds would get in the way of RT1 too (q₁ off by 1.4° with 5)."""
+
+
+@dataclass(frozen=True)
+class CircleOptions(SceneOptions):
+    """RT1 and RT2: the EE's circle with q₁ swinging once meanwhile.
+
+    Attributes:
+        q1_amplitude_deg: how far q₁ swings and comes back, degrees.
+    """
+
+    q1_amplitude_deg: float
+
+    def __post_init__(self) -> None:
+        value = self.q1_amplitude_deg
+        if isinstance(value, tuple) or not abs(value) <= 360:
+            raise InputError(f"q1_amplitude_deg is {value}: give a number from -360 to 360, in degrees")
+
+    def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
+        """Circle r = 0.1 m about (0.5, 0.3), phase ωt − sin ωt; q₁ = amplitude·(1 − cos ωt)/2."""
+        half = np.array([0.5 * math.radians(self.q1_amplitude_deg)])
+        return {
+            "position": _circle(0.5, 0.3, 0.1, Phase(OMEGA, "eased")),
+            "q1": Sinusoid(half, half, Phase(OMEGA, offset=-0.5 * math.pi)),
+        }
+
+
+@dataclass(frozen=True)
+class SingularOptions(SceneOptions):
+    """RT3: two circles through the point that only the straight arm reaches.
+
+    Attributes:
+        smooth: phase ωt − sin ωt, at rest in the singular point, instead of ωt.
+    """
+
+    smooth: bool = False
+
+    def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
+        """Circles r = 0.1 and 0.2 m through (0.9, 0), internally tangent there, 8 s each; q₁ = 0."""
+        phase = Phase(OMEGA, "eased" if self.smooth else "uniform")
+        return {
+            "position": Switched(_circle(0.8, 0.0, 0.1, phase), _circle(0.7, 0.0, 0.2, phase), 8.0),
+            "q1": Hold(np.zeros(1)),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Switched:
+    """One reference until a time (s), another one from then on; nothing is smoothed in between."""
+
+    before: Reference
+    after: Reference
+    at: float
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        first, second = self.before.preview(t, T_s, N), self.after.preview(t, T_s, N)
+        late = (times(t, T_s, N) >= self.at - 1e-9)[:, None]
+        return sampled(
+            np.where(late, second.value + second.displacement, first.value + first.displacement),
+            np.where(late, second.velocity, first.velocity),
+            np.where(late, second.acceleration, first.acceleration),
+        )
+
+
+def planar3_circle() -> Scene:
+    """`planar3-circle`, RT1: q₁ swings by 20°, which the circle allows.
+
+    From the paper: link lengths, limits, gains (Table I), Q = 200, R = 10, N = 5, M̄, q₀. Left open there and
+    chosen here: masses and inertias (see the URDF), armature and friction (`plant.…`), the nominal model of
+    OSF and HQP (`nominal.…`), centre, radius and time law of the circle, and the swing of q₁
+    (`q1_amplitude_deg`): Fig. 3 has no readable scale.
+    """
+    robot = load_robot("planar3")
+    levels = (
+        Level((FramePosition(name="position", axes="xy", K_p=200.0, K_v=10.0),)),
+        Level((Joints(name="q1", joints=robot.joint_names[:1], K_p=50.0, K_v=5.0),)),
+    )
+    options = CircleOptions(q1_amplitude_deg=20.0)
+    return Scene(
+        name="planar3-circle",
+        title="planar arm on RT1 of the HIMPC paper",
+        robot=robot,
+        settings=SceneSettings(
+            levels=levels, M_bar=tuple(robot.M_bar), nominal=NOMINAL, plant=PLANT, options=options
+        ),
+        references=options.references,
+        q_0=np.radians([0.0, 90.0, -90.0]),
+        v_0=np.zeros(3),
+        duration=8.0,
+    )
+
+
+def planar3_conflict() -> Scene:
+    """`planar3-conflict`, RT2: q₁ is asked to swing by −120°, from where the circle cannot be reached.
+
+    Else as `planar3-circle`, with velocity bounds approached more slowly. The paper prints no amplitude; −60°
+    and 170° conflict too (`q1_amplitude_deg`). The plant takes any torque, so that what a controller demands
+    is what happens (`plant.saturate`).
+    """
+    scene = planar3_circle()
+    settings = replace(
+        scene.settings,
+        limits=CONFLICT_LIMITS,
+        plant=replace(PLANT, saturate=False),
+        options=CircleOptions(q1_amplitude_deg=-120.0),
+    )
+    title = "planar arm on RT2: its two tasks conflict"
+    return replace(scene, name="planar3-conflict", title=title, settings=settings)
+
+
+def planar3_singular() -> Scene:
+    """`planar3-singular`, RT3: starts straight, and is straight again after 8 s and 16 s.
+
+    Else as `planar3-circle`. Fig. 9 shows two tangent circles without their sizes, time law or q₁: read as
+    radii 0.1 and 0.2 m, phase ωt (velocity jumps at 0 s and 8 s, as section V-C says of 8 s; `smooth=true`
+    removes the jumps) and q₁ = 0, which both circles allow.
+    """
+    scene = planar3_circle()
+    return replace(
+        scene,
+        name="planar3-singular",
+        title="planar arm on RT3: straight, thus singular, three times",
+        settings=replace(scene.settings, options=SingularOptions()),
+        q_0=np.zeros(3),
+        duration=16.0,
+    )
+
+
+def _circle(x: float, y: float, radius: float, phase: Phase) -> Circle:
+    return Circle(np.array([x, y]), np.array([radius, 0.0]), np.array([0.0, radius]), phase)
