@@ -73,6 +73,10 @@ def summary(recording: Recording) -> dict[str, Any]:
             "route": settings.route,
             "solves": int(sum(np.isfinite(recording[f"kkt/{name}"]).sum() for name in layout.levels)),
             "unsolved": int(np.nansum(recording["unsolved"])),
+            "iterations": {
+                "mean": float(recording["iterations"].mean()),
+                "max": float(recording["iterations"].max()),
+            },
             "fallbacks": _fallbacks(recording),
             "max_kkt_residual": max(_peak(recording[f"kkt/{name}"]) or 0.0 for name in layout.levels),
         },
@@ -124,9 +128,9 @@ def _average_cost(recording: Recording, level: str) -> float:
 def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
     q, v = recording["q"], recording["v"]
     T_s = recording.session.settings.T_s
-    middle = 0.5 * (recording["q_lower"] + recording["q_upper"])
-    half = 0.5 * (recording["q_upper"] - recording["q_lower"])
     with np.errstate(all="ignore"):
+        middle = 0.5 * (recording["q_lower"] + recording["q_upper"])
+        half = 0.5 * (recording["q_upper"] - recording["q_lower"])
         acceleration = np.diff(v, axis=0) / T_s
         return {
             "torque": {
@@ -134,7 +138,7 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
                 "max_ratio": _peak(_share(recording["tau_demand"], recording)),
                 "applied_max_ratio": _peak(_share(recording["tau"], recording)),
             },
-            "velocity": {"max_ratio": _peak(np.abs(v) / recording["v_limit"])},
+            "velocity": {"max_ratio": _peak(np.abs(v) / _bounded(recording["v_limit"]))},
             "position": {"max_ratio": _peak(np.abs(q - middle) / half)},
             "acceleration": {"max_ratio": _peak(np.abs(acceleration) / recording.session.robot.a_max)},
             # The catalog's torque-controlled arms have no jerk limit.
@@ -144,7 +148,12 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 def _share(tau: Array, recording: Recording) -> Array:
     """Torque over the bound on its side."""
-    return np.maximum(tau / recording["tau_upper"], tau / recording["tau_lower"])
+    return np.maximum(tau / _bounded(recording["tau_upper"]), tau / _bounded(recording["tau_lower"]))
+
+
+def _bounded(limit: Array) -> Array:
+    """NaN where there is no limit: unbounded joints are left out."""
+    return np.where(np.isfinite(limit), limit, np.nan)
 
 
 def _fallbacks(recording: Recording) -> dict[str, int]:

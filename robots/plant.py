@@ -15,9 +15,10 @@ import pinocchio as pin
 
 from robots.errors import InputError
 from robots.robot import Robot
+from robots.runge_kutta import rk4
 from robots.settings import PlantSettings
-from robots.signals import Encoders, Motors, PlantState
-from robots.truth import joint_axis, true_model
+from robots.signals import Encoders, Motors, PlantState, as_vector
+from robots.truth import encoder_resolution, inertial, joint_axis, pose, true_model
 
 _ZERO = (0.0, 0.0, 0.0)
 # MuJoCo's friction is a spring-damper in disguise. Its default lets a stuck light joint slide at tenths of
@@ -54,10 +55,10 @@ class Plant:
         self._data = mujoco.MjData(self._model)
         self._probe = mujoco.MjData(self._model)
         self._fresh = False
-        resolution = math.radians(settings.encoder_resolution_deg)
-        revolute = [not joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
-        self._resolution = np.where(revolute, resolution, 0.0)
-        self._reads_encoders = resolution > 0.0 and any(revolute)
+        self._armature = self._model.dof_armature.copy()
+        self._diagonal = settings.per_joint("diagonal_scale", robot.n)
+        self._altered = bool((self._diagonal != 1.0).any())
+        self._resolution = encoder_resolution(robot, settings)
         limit = robot.tau_limit if settings.saturate else np.full(robot.n, np.inf)
         self._tau_lower, self._tau_upper = -limit, limit
         self._lag, self._delay = 1e-3 * settings.torque_lag_ms, 1e-3 * settings.delay_ms
@@ -95,23 +96,23 @@ class Plant:
         tau: N·m, the torque the motors were giving before; default: `holding_torque`, as when the brakes
         open. Raises ValueError for vectors of the wrong length or with non-finite entries.
         """
-        position = self._vector("q", q)
-        velocity = np.zeros(self.n) if v is None else self._vector("v", v)
-        torque = None if tau is None else self._vector("tau", tau)
+        position = as_vector("q", q, self.n)
+        velocity = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
+        torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
         self._data.qpos[:] = position
         self._data.qvel[:] = velocity
         self._push = (None, np.zeros(6))
         self._fresh = False
-        torque = self._clip(self.holding_torque() if torque is None else torque)
-        self._motors = Motors(torque, 0.0)
+        torque = self.holding_torque() if torque is None else torque
+        self._motors = Motors(np.clip(torque, self._tau_lower, self._tau_upper), 0.0)
         self._encoders = Encoders(position, velocity, 0.0)
 
     def measure(self, period: float) -> PlantState:
         """The state as the sensors see it. With ideal encoders that is the true one; else q is rounded and
         v is its backward difference over `period` (s, the control period). Calling it changes nothing.
         """
-        if not self._reads_encoders:
+        if not self._resolution.any():
             return PlantState(self.t, self.q, self.v)
         q, v = self._encoders.read(period, self._resolution)
         return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self._data.qvel))
@@ -125,14 +126,15 @@ class Plant:
         """
         if not (math.isfinite(period) and period > 0.0):
             raise ValueError(f"the period is {period} s; it must be positive")
-        model, data, motors = self._model, self._data, self._motors
-        motors.command(self._clip(self._vector("tau", tau)), data.time)
+        data, motors = self._data, self._motors
+        within = np.clip(as_vector("tau", tau, self.n), self._tau_lower, self._tau_upper)
+        motors.command(within, data.time)
         count = max(1, math.ceil(period / self.timestep - 1e-9))
         h = period / count
-        model.opt.timestep = h
+        self._model.opt.timestep = h
         for _ in range(count):
             data.ctrl[:] = motors.advance(data.time, h, self._delay, self._lag)
-            mujoco.mj_step(model, data)
+            self._advance(h)
             self._encoders.record(data.qpos.copy(), data.time)
         self._fresh = False
         return motors.torque.copy()
@@ -207,41 +209,51 @@ class Plant:
         """(n,) rad/s² if the torque tau (N·m) acted on the joints now: friction, damping and push included,
         saturation, delay and lag not.
         """
-        probe = self._probe
-        probe.qpos[:], probe.qvel[:] = self._data.qpos, self._data.qvel
-        probe.xfrc_applied[:] = self._data.xfrc_applied
-        probe.qacc_warmstart[:] = self._data.qacc_warmstart
-        probe.ctrl[:] = self._vector("tau", tau)
-        mujoco.mj_forward(self._model, probe)
+        found = self._accelerate(self._data.qpos, self._data.qvel, as_vector("tau", tau, self.n))
         self._fresh = True
-        return probe.qacc.copy()
+        return found
 
     # ---------------------------------------------------------------- inside
+
+    def _advance(self, h: float) -> None:
+        data = self._data
+        if not self._altered:
+            mujoco.mj_step(self._model, data)
+            return
+        tau = data.ctrl.copy()
+        data.qpos[:], data.qvel[:] = rk4(data.qpos, data.qvel, h, lambda q, v: self._accelerate(q, v, tau))
+        data.time += h
+
+    def _accelerate(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """q̈ at q and v under tau and the push, from the probe."""
+        model, data, probe = self._model, self._data, self._probe
+        probe.qpos[:], probe.qvel[:], probe.ctrl[:] = q, v, tau
+        probe.xfrc_applied[:], probe.qacc_warmstart[:] = data.xfrc_applied, data.qacc_warmstart
+        self._place(probe)
+        mujoco.mj_forwardSkip(model, probe, mujoco.mjtStage.mjSTAGE_POS, 1)
+        return probe.qacc.copy()
+
+    def _place(self, data: mujoco.MjData) -> None:
+        """Kinematics and M(q). An altered diagonal is an armature made for this very q."""
+        mujoco.mj_fwdPosition(self._model, data)
+        if self._altered:
+            M = np.zeros((self.n, self.n))
+            mujoco.mj_fullM(self._model, data, M)
+            self._model.dof_armature[:] = self._armature + (self._diagonal - 1.0) * M.diagonal()
+            mujoco.mj_fwdPosition(self._model, data)
+            self._model.dof_armature[:] = self._armature
 
     def _look(self) -> mujoco.MjData:
         if not self._fresh:
             self._probe.qpos[:], self._probe.qvel[:] = self._data.qpos, self._data.qvel
-            mujoco.mj_fwdPosition(self._model, self._probe)
+            self._place(self._probe)
             mujoco.mj_fwdVelocity(self._model, self._probe)
             self._fresh = True
         return self._probe
 
-    def _clip(self, tau: np.ndarray) -> np.ndarray:
-        return np.minimum(np.maximum(tau, self._tau_lower), self._tau_upper)
-
-    def _vector(self, name: str, value: np.ndarray) -> np.ndarray:
-        array = np.array(value, dtype=float)
-        if array.shape != (self.n,) or not np.isfinite(array).all():
-            raise ValueError(f"{name} must be {self.n} finite numbers, not {array}")
-        return array
-
     def _site(self, frame: str) -> int:
         index = self.robot.frame_id(frame)
-        return self._model.site(_site_name(index)).id
-
-
-def _site_name(frame_index: int) -> str:
-    return f"frame{frame_index}"
+        return self._model.site(f"frame{index}").id
 
 
 def _compile(robot: Robot, settings: PlantSettings) -> mujoco.MjModel:
@@ -258,19 +270,15 @@ def _compile(robot: Robot, settings: PlantSettings) -> mujoco.MjModel:
     bodies = [spec.worldbody]
     for joint in range(1, truth.njoints):
         body = bodies[truth.parents[joint]].add_body(
-            name=f"body{joint}", **_pose(truth.jointPlacements[joint])
+            name=f"body{joint}", **pose(truth.jointPlacements[joint])
         )
         bodies.append(body)
-        inertia = truth.inertias[joint]
-        I = inertia.inertia
-        body.mass, body.ipos = inertia.mass, inertia.lever
-        body.fullinertia = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        body.mass, body.ipos, body.fullinertia = inertial(truth.inertias[joint])
         body.explicitinertial = True
         prismatic, axis = joint_axis(truth, joint)
-        kind = mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE
         body.add_joint(
             name=f"joint{joint}",
-            type=kind,
+            type=mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE,
             axis=axis,
             limited=mujoco.mjtLimited.mjLIMITED_FALSE,
             armature=truth.armature[joint - 1],
@@ -279,20 +287,14 @@ def _compile(robot: Robot, settings: PlantSettings) -> mujoco.MjModel:
             solref_friction=_STICTION_SOLREF,
             solimp_friction=_STICTION_SOLIMP,
         )
-        motor = spec.add_actuator(
+        spec.add_actuator(
             name=f"motor{joint}", target=f"joint{joint}", trntype=mujoco.mjtTrn.mjTRN_JOINT
-        )
-        motor.set_to_motor()
+        ).set_to_motor()
     for index, frame in enumerate(truth.frames):
         if frame.type == pin.FrameType.BODY:
-            bodies[frame.parentJoint].add_site(name=_site_name(index), **_pose(frame.placement))
+            bodies[frame.parentJoint].add_site(name=f"frame{index}", **pose(frame.placement))
     model = spec.compile()
     order = [model.joint(i).name for i in range(model.njnt)]
     if order != [f"joint{i}" for i in range(1, truth.njoints)]:
         raise RuntimeError(f"MuJoCo reordered the joints of '{robot.name}': {order}")
     return model
-
-
-def _pose(placement: pin.SE3) -> dict[str, np.ndarray]:
-    x, y, z, w = pin.Quaternion(placement.rotation).normalized().coeffs()
-    return {"pos": placement.translation, "quat": np.array([w, x, y, z])}

@@ -10,18 +10,21 @@ import numpy as np
 
 from robots.errors import InputError
 
-_PER_JOINT = ("friction", "damping", "armature", "inertia_scale")
+_PER_JOINT = ("friction", "damping", "armature", "mass_scale", "inertia_scale", "diagonal_scale")
 _MAX = {
     "payload_kg": 1e3,
     "friction": 1e4,
     "damping": 1e4,
     "armature": 1e4,
+    "mass_scale": 1e3,
     "inertia_scale": 1e3,
+    "diagonal_scale": 10.0,
     "encoder_resolution_deg": 45.0,
     "torque_lag_ms": 1e3,
     "delay_ms": 1e3,
 }
-_MIN_INERTIA_SCALE = 1e-3  # below, a link is practically massless and the simulation meaningless
+# Below, a link is practically massless, or M(q) all but surely indefinite, and the simulation meaningless.
+_MIN = {"mass_scale": 1e-3, "inertia_scale": 1e-3, "diagonal_scale": 0.1}
 
 
 @dataclass(frozen=True)
@@ -32,8 +35,12 @@ class PlantSettings:
     friction: N·m, Coulomb friction per joint (one number or one per joint; N for prismatic joints). MuJoCo
         models it as a soft constraint, so a stuck joint creeps (about 1e-5 rad/s).
     damping: N·m·s/rad, viscous friction. armature: kg·m², reflected rotor inertia, added to M_ii.
-    inertia_scale: factor on the whole spatial inertia (mass and rotational inertia; the centre of mass
-        stays) of the body each joint moves; the payload is not scaled.
+    mass_scale: factor on the mass of the body each joint moves. inertia_scale: factor on its rotational
+        inertia about its centre of mass, which stays. Both by the same factor: a body of another density.
+        The payload is not scaled.
+    diagonal_scale: factor on the diagonal entries of M(q) in the dynamics, whatever q, off-diagonal entries,
+        C and g left as they are: the literal reading of the HIMPC paper's Table V. No mechanism behaves like
+        this: energy is not kept, and below 1 M(q) may lose definiteness (the run then flies apart).
     encoder_resolution_deg: degrees; with a value above 0 the measured position of revolute joints is
         rounded to multiples of it and the measured velocity is their backward difference.
     torque_lag_ms: time constant of a first-order lag of the motors. delay_ms: the command acts this much
@@ -47,7 +54,9 @@ class PlantSettings:
     friction: float | tuple[float, ...] = 0.0
     damping: float | tuple[float, ...] = 0.0
     armature: float | tuple[float, ...] = 0.0
+    mass_scale: float | tuple[float, ...] = 1.0
     inertia_scale: float | tuple[float, ...] = 1.0
+    diagonal_scale: float | tuple[float, ...] = 1.0
     encoder_resolution_deg: float = 0.0
     torque_lag_ms: float = 0.0
     delay_ms: float = 0.0
@@ -92,7 +101,7 @@ def _number(name: str, value: object) -> float:
         number = float(value)  # pyright: ignore[reportArgumentType]
     except (TypeError, ValueError):
         raise InputError(f"plant.{name} is {value!r}; give a number.") from None
-    low = _MIN_INERTIA_SCALE if name == "inertia_scale" else 0.0
+    low = _MIN.get(name, 0.0)
     if not math.isfinite(number) or number < low or number > _MAX[name]:
         raise InputError(f"plant.{name} is {number}; give a finite number from {low:g} to {_MAX[name]:g}.")
     return number

@@ -101,3 +101,11 @@ def quantise(q: np.ndarray, resolution: np.ndarray) -> np.ndarray:
     """q rounded to the nearest multiple of `resolution`, element by element; 0 leaves it as it is."""
     safe = np.where(resolution > 0.0, resolution, 1.0)
     return np.where(resolution > 0.0, np.round(q / safe) * safe, q)
+
+
+def as_vector(name: str, value: np.ndarray, n: int) -> np.ndarray:
+    """A copy of n finite numbers. Raises ValueError, naming what it is, for anything else."""
+    array = np.array(value, dtype=float)
+    if array.shape != (n,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {n} finite numbers, not {array}")
+    return array

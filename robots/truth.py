@@ -10,16 +10,18 @@ from robots.settings import PlantSettings
 
 
 def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
-    """A copy of the robot's model with scaled inertias, payload, armature and gravity of the plant.
+    """A copy of the robot's model with the plant's masses, inertias, payload, armature and gravity.
 
-    Each joint's spatial inertia is scaled first; then the payload, a point mass at the tip, is added to the
+    Each joint's body is scaled first; then the payload, a point mass at the tip, is added to the
     body that carries the tip. Raises InputError for a per-joint list of the wrong length.
     """
     model: pin.Model = robot.model.copy()
-    scales = settings.per_joint("inertia_scale", robot.n)
-    for joint, scale in enumerate(scales, start=1):
+    scales = zip(
+        settings.per_joint("mass_scale", robot.n), settings.per_joint("inertia_scale", robot.n), strict=True
+    )
+    for joint, (mass, inertia) in enumerate(scales, start=1):
         nominal = robot.model.inertias[joint]
-        model.inertias[joint] = pin.Inertia(nominal.mass * scale, nominal.lever, nominal.inertia * scale)
+        model.inertias[joint] = pin.Inertia(nominal.mass * mass, nominal.lever, nominal.inertia * inertia)
     if settings.payload_kg > 0.0:
         frame = robot.model.frames[robot.frame_id(robot.tip)]
         payload = pin.Inertia(settings.payload_kg, np.zeros(3), np.zeros((3, 3)))
@@ -39,3 +41,21 @@ def joint_axis(model: pin.Model, joint: int) -> tuple[bool, np.ndarray]:
     motion = np.asarray(data.S, dtype=float).reshape(6)
     prismatic = bool(np.abs(motion[:3]).max() > 0.5)
     return prismatic, motion[:3] if prismatic else motion[3:]
+
+
+def encoder_resolution(robot: Robot, settings: PlantSettings) -> np.ndarray:
+    """(n,) rad, the resolution of each joint's sensor; 0 is ideal, as prismatic joints always are."""
+    revolute = [not joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
+    return np.where(revolute, np.radians(settings.encoder_resolution_deg), 0.0)
+
+
+def pose(placement: pin.SE3) -> dict[str, np.ndarray]:
+    """Position (3,) m and unit quaternion (w, x, y, z), named as MuJoCo's specification names them."""
+    x, y, z, w = pin.Quaternion(placement.rotation).normalized().coeffs()
+    return {"pos": placement.translation, "quat": np.array([w, x, y, z])}
+
+
+def inertial(inertia: pin.Inertia) -> tuple[float, np.ndarray, list[float]]:
+    """Mass (kg), centre of mass (3,) m, and Ixx, Iyy, Izz, Ixy, Ixz, Iyz (kg·m²) about it."""
+    I = inertia.inertia
+    return inertia.mass, inertia.lever, [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]

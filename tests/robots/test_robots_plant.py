@@ -34,7 +34,7 @@ def independently_changed(
 CASES = {
     "nominal": (PlantSettings(), (0.0, 1.0, 0.0, True)),
     "payload": (PlantSettings(payload_kg=2.5), (2.5, 1.0, 0.0, True)),
-    "lighter": (PlantSettings(inertia_scale=0.8, armature=0.05), (0.0, 0.8, 0.05, True)),
+    "lighter": (PlantSettings(mass_scale=0.8, inertia_scale=0.8, armature=0.05), (0.0, 0.8, 0.05, True)),
     "weightless": (PlantSettings(payload_kg=1.0, gravity=False), (1.0, 1.0, 0.0, False)),
 }
 
@@ -47,7 +47,7 @@ def test_mechanics_equal_pinocchio(name: str, case: str) -> None:
     scales = np.full(robot.n, scale)
     if case == "lighter":
         scales = np.linspace(0.7, 1.3, robot.n)
-        settings = dataclasses.replace(settings, inertia_scale=tuple(scales))
+        settings = dataclasses.replace(settings, mass_scale=tuple(scales), inertia_scale=tuple(scales))
     model = independently_changed(robot, payload, scales, armature, gravity)
     data = model.createData()
     plant = Plant(robot, settings)

@@ -207,7 +207,7 @@ def test_bad_settings_name_their_field(values: dict[str, object], field: str) ->
         PlantSettings(**values)  # pyright: ignore[reportArgumentType]
 
 
-@pytest.mark.parametrize("field", ["friction", "damping", "armature", "inertia_scale"])
+@pytest.mark.parametrize("field", ["friction", "damping", "armature", "mass_scale", "inertia_scale"])
 def test_a_list_of_the_wrong_length_is_refused(field: str) -> None:
     short = dataclasses.replace(PlantSettings(), **{field: (0.1, 0.1)})
     with pytest.raises(InputError, match=f"{field} has 2 values"):

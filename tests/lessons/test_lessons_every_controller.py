@@ -1,0 +1,37 @@
+"""Every registered controller holds every fixed-base robot of the catalog."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from himpc import CONTROLLERS
+from lessons.run import run
+from lessons.scenes import SCENES, load_scene
+from lessons.settings import changed
+from lessons.summary import Recording
+from robots import CATALOG, load_robot
+
+SECONDS = 2.0
+ROBOTS = [name for name in CATALOG if f"{name}-hold" in SCENES]
+
+
+def record(robot: str, controller: str) -> Recording:
+    scene = load_scene(f"{robot}-hold")
+    return run(replace(scene, settings=changed(scene.settings, "controller", controller)), SECONDS, seed=1)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_every_controller_holds_every_robot(controller: str, robot: str) -> None:
+    """2 s of the hold scene: finite, at its place, and the same to the bit when run again."""
+    first, again = record(robot, controller), record(robot, controller)
+    assert first.session.settings.controller == controller
+    assert len(first.rows) == round(SECONDS / first.session.settings.T_s)
+    for name in ("q", "v", "tau", "tau_demand"):
+        assert np.isfinite(first[name]).all()
+        np.testing.assert_array_equal(first[name], again[name])
+    assert not first.session.notices
+    assert np.abs(first["q"] - load_robot(robot).home).max() < 1e-2

@@ -1,0 +1,185 @@
+"""The controller is switched while the robot moves: no bump, and control goes on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from himpc import CONTROLLERS
+from lessons.events import MoveTarget, Reset, Set
+from lessons.handover import HANDOVER_SECONDS, Handover
+from lessons.scene import Scene
+from lessons.scenes import load_scene
+from lessons.session import Session
+
+Array = NDArray[np.float64]
+
+SCENE = load_scene("iiwa14-hold")
+TICKS = round(HANDOVER_SECONDS / SCENE.settings.T_s)
+
+
+def tip(session: Session) -> Array:
+    return session.plant.frame_pose(session.robot.tip)[1].copy()
+
+
+def at_rest(controller: str, scene: Scene = SCENE) -> Session:
+    session = Session(scene)
+    session.post(Set("controller", controller))
+    for _ in range(TICKS + 50):
+        session.tick()
+    return session
+
+
+def switch(session: Session, name: str, start: Array) -> None:
+    """Hands over: no tick moves a torque by 5 % of its limit, nor the tip as far as 1 mm from start."""
+    session.post(Set("controller", name))
+    before = session.plant.tau
+    for _ in range(TICKS + 20):
+        session.tick()
+        now = session.plant.tau
+        assert np.abs((now - before) / session.robot.tau_limit).max() < 0.05
+        assert np.linalg.norm(tip(session) - start) < 1e-3
+        before = now
+    assert session.settings.controller == name
+    assert not session.notices
+
+
+@pytest.mark.parametrize("old", list(CONTROLLERS)[:-1])
+def test_a_switch_at_rest_is_bumpless(old: str) -> None:
+    """From this controller to each that is registered after it, and back: in all, every ordered pair."""
+    session = at_rest(old)
+    start = tip(session)
+    for new in list(CONTROLLERS)[list(CONTROLLERS).index(old) + 1 :]:
+        switch(session, new, start)
+        switch(session, old, start)
+
+
+@pytest.mark.parametrize("new", CONTROLLERS)
+def test_control_goes_on_after_a_switch(new: str) -> None:
+    """The controller that took over follows a target as it should. The posture is off: the weighted
+    controller would stop half-way for it."""
+    session = at_rest("hqp" if new == "himpc" else "himpc")
+    start = tip(session)
+    switch(session, new, start)
+    session.post(Set("levels.posture.enabled", False))
+    goal = start + np.array([0.0, 0.02, 0.01])
+    session.post(MoveTarget("position", tuple(goal)))
+    for _ in range(1000):
+        session.tick()
+    assert np.linalg.norm(tip(session) - goal) < 2e-3
+    assert session.diverged_at is None
+
+
+@pytest.mark.parametrize(("old", "new"), [("himpc", "hqp"), ("hqp", "himpc"), ("weighted", "osf")])
+def test_a_switch_in_motion_is_smooth(old: str, new: str) -> None:
+    """The target moves at up to 0.3 m/s while the controllers change: no tick jolts, and the hand arrives."""
+    session = at_rest(old)
+    goal = tip(session) + np.array([0.05, 0.15, -0.05])
+    session.post(MoveTarget("position", tuple(goal)))
+    for _ in range(250):
+        session.tick()
+    assert session.plan is not None
+    assert np.linalg.norm(session.plant.v) > 0.1
+    session.post(Set("controller", new))
+    before = session.plant.tau
+    for _ in range(1500):
+        session.tick()
+        now = session.plant.tau
+        assert np.abs((now - before) / session.robot.tau_limit).max() < 0.05
+        before = now
+    assert np.linalg.norm(tip(session) - goal) < 2e-3
+
+
+def test_the_new_controller_ends_up_alone() -> None:
+    """After the hand-over the session runs the very controller that was asked for."""
+    session = at_rest("himpc")
+    session.post(Set("controller", "hqp"))
+    session.tick()
+    assert isinstance(session.controller, Handover)
+    for _ in range(TICKS + 1):
+        session.tick()
+    assert type(session.controller).__name__ == "HQP"
+
+
+def test_the_torque_goes_from_one_controller_to_the_other() -> None:
+    """The blend starts at the old torque, ends at the new one and lies between them at every tick."""
+    session = at_rest("himpc")
+    session.post(Set("plant.payload_kg", 3.0))  # the nominal model does not know: torques differ
+    for _ in range(300):
+        session.tick()
+    session.post(Set("controller", "hqp"))
+    handed, demands = [], []
+    for _ in range(TICKS):
+        held = session.plant.tau
+        session.tick()
+        assert session.plan is not None
+        handed.append(session.plan.tau - held)
+        demands.append(session.plan.levels[-1].U[0])  # what the new controller would do at once
+    assert np.abs(handed[0]).max() < 1e-3 * np.abs(demands[0]).max()
+    np.testing.assert_allclose(handed[-1], demands[-1], atol=1e-2)
+
+
+def test_settings_reach_both_controllers_during_a_hand_over() -> None:
+    """A longer horizon, another period or a level switched off in the middle neither breaks nor shakes it."""
+    session = at_rest("himpc")
+    start = tip(session)
+    session.post(Set("controller", "hiqp"))
+    changes = [Set("horizon", 8), Set("T_s", 0.002), Set("levels.posture.enabled", False), Set("T_s", 0.001)]
+    for change in changes:
+        for _ in range(20):
+            session.tick()
+        assert isinstance(session.controller, Handover)
+        session.post(change)
+    for _ in range(TICKS):
+        session.tick()
+    assert not session.notices
+    assert session.controller.settings.T_s == 0.001
+    assert np.linalg.norm(tip(session) - start) < 1e-3
+
+
+def test_changes_of_mind_and_a_reset() -> None:
+    """Three switches within a hand-over still move smoothly; a reset ends it at once."""
+    session = at_rest("himpc")
+    start, before = tip(session), session.plant.tau
+    for name in ("hqp", "hiqp", "himpc"):
+        session.post(Set("controller", name))
+        for _ in range(30):
+            session.tick()
+            now = session.plant.tau
+            assert np.abs((now - before) / session.robot.tau_limit).max() < 0.05
+            before = now
+    assert np.linalg.norm(tip(session) - start) < 1e-3
+    session.post(Reset())
+    session.tick()
+    session.tick()
+    assert not isinstance(session.controller, Handover)
+
+
+def test_an_unknown_controller_changes_nothing() -> None:
+    session = at_rest("himpc")
+    session.post(Set("controller", "hmpc"))
+    session.tick()
+    assert "did you mean 'himpc'" in session.notices[0]
+    assert session.settings.controller == "himpc"
+
+
+def test_a_payload_is_picked_up_and_put_down_without_a_jump() -> None:
+    """The state does not jump when the mass changes; the controller, which is not told, holds on."""
+    session = at_rest("himpc")
+    start = tip(session)
+    for kilograms in (2.0, 0.0):
+        q, v, tau, t = session.plant.q, session.plant.v, session.plant.tau, session.plant.t
+        session.post(Set("plant.payload_kg", kilograms))
+        session.drain()
+        assert session.plant.settings.payload_kg == kilograms
+        for now, then in zip((session.plant.q, session.plant.v, session.plant.tau), (q, v, tau), strict=True):
+            np.testing.assert_array_equal(now, then)
+        assert session.plant.t == t
+        heights = []
+        for _ in range(1500):
+            session.tick()
+            heights.append(tip(session)[2] - start[2])
+        assert 1e-5 < np.abs(heights).max() < 0.02
+        assert np.linalg.norm(tip(session) - start) < 1e-4
+    assert session.diverged_at is None
