@@ -81,7 +81,7 @@ class Stage:
         with tabs.add_tab("Control"):
             self._controller = ControllerPanel(gui, self._bindings, settings, ready.robot)
         with tabs.add_tab("Plant"):
-            PlantPanel(gui, self._bindings, settings)
+            PlantPanel(gui, self._bindings, settings, ready.robot)
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):

@@ -11,9 +11,10 @@ from himpc.controllers import CONTROLLERS, Settings
 from himpc.limits import Limits
 from himpc.references import Reference
 from himpc.stack import Level, Stack
-from lessons.values import typed, weight
+from lessons.values import number, typed, weight
 from robots import InputError, NominalSettings, PlantSettings, Robot
 from robots.errors import unknown_name
+from robots.settings import PER_JOINT
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,16 @@ def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
     Paths: a field ("horizon", "M_bar", …); "Q" or "R" for all levels (one number, or one per level);
     "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p, K_v
     (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY"; the fields of
-    the scene's options.
+    the scene's options. Where a value holds one number per joint ("M_bar", "plant.inertia_scale", …), a place
+    1 … n behind it means that joint's alone: "M_bar.3".
 
     Raises:
         InputError: unknown path (naming the nearest), or a value of the wrong type or range.
     """
     head, _, rest = path.partition(".")
+    whole, _, place = path.rpartition(".")
+    if place.isdigit() and whole in _per_joint(settings):
+        return changed(settings, whole, _one_joint(settings, path, whole, int(place), value))
     if head in _EVERY_LEVEL and not rest:
         return _every_level(settings, head, value)
     if head == "levels":
@@ -133,6 +138,29 @@ def paths(settings: SceneSettings) -> list[str]:
         ),
         *(f"{part}.{f.name}" for part in _PARTS for f in fields(getattr(settings, part))),
     ]
+
+
+def _per_joint(settings: SceneSettings) -> list[str]:
+    """Paths whose value may be one number per joint."""
+    parts = [
+        f"{part}.{f.name}"
+        for part in ("nominal", "plant")
+        for f in fields(getattr(settings, part))
+        if f.name in PER_JOINT
+    ]
+    return ["M_bar", *parts]
+
+
+def _one_joint(settings: SceneSettings, path: str, whole: str, place: int, value: Any) -> tuple[float, ...]:
+    """The value at `whole` as a list with one entry replaced."""
+    n = len(settings.M_bar)
+    if not 1 <= place <= n:
+        raise InputError(f"{path}: there is no joint {place}; give a place from 1 to {n}")
+    part, _, key = whole.rpartition(".")
+    now = getattr(getattr(settings, part) if part else settings, key)
+    values = list(now) if isinstance(now, tuple) else [float(now)] * n
+    values[place - 1] = number(path, value)
+    return tuple(values)
 
 
 def _plain_fields() -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from robots.errors import InputError
 
-_PER_JOINT = ("friction", "damping", "armature", "mass_scale", "inertia_scale", "diagonal_scale")
+PER_JOINT = ("friction", "damping", "armature", "mass_scale", "inertia_scale", "diagonal_scale")
 _MAX = {
     "payload_kg": 1e3,
     "friction": 1e4,
@@ -70,7 +70,7 @@ class PlantSettings:
                 if not isinstance(value, (bool, np.bool_)):
                     raise InputError(f"plant.{field.name} is {value!r}; give true or false.")
                 object.__setattr__(self, field.name, bool(value))
-            elif field.name in _PER_JOINT and isinstance(value, (Sequence, np.ndarray)):
+            elif field.name in PER_JOINT and isinstance(value, (Sequence, np.ndarray)):
                 if isinstance(value, str):
                     raise InputError(
                         f"plant.{field.name} is '{value}'; give a number or one number per joint."

@@ -84,16 +84,9 @@ class ControllerPanel:
                     bindings.bind(
                         number,
                         lambda s, joint=joint: float(s.M_bar[joint]),
-                        lambda value, joint=joint: Set("M_bar", self._diagonal(joint, float(value))),
+                        lambda value, joint=joint: Set(f"M_bar.{joint + 1}", float(value)),
                     )
-        self._diagonal_now = tuple(float(value) for value in settings.M_bar)
         bindings.bind(scale, lambda s: float(s.M_bar_scale), lambda value: Set("M_bar_scale", float(value)))
-
-    def _diagonal(self, joint: int, value: float) -> tuple[float, ...]:
-        diagonal = self._diagonal_now
-        # Remembered at once: a second joint may be edited before the session answers.
-        self._diagonal_now = (*diagonal[:joint], value, *diagonal[joint + 1 :])
-        return self._diagonal_now
 
     def _limits(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
         limits = settings.limits
@@ -157,7 +150,6 @@ class ControllerPanel:
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller
             self._what.content = block(esc(CONTROLLERS[self._shown]))
-        self._diagonal_now = tuple(float(value) for value in now.settings.M_bar)
         norm, radius = now.number("gauge_norm"), now.number("gauge_radius")
         self._gauge.content = block(
             f"spectral radius of I − M⁻¹M̄: <b>{radius:.3f}</b>{_verdict(radius)}"
