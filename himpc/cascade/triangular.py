@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgeqrf, dorgqr, dposv, dpotrs  # pyright: ignore[reportAttributeAccessIssue]
+from scipy.linalg.lapack import dgeqrf, dgesv, dgetrs, dorgqr, dposv, dpotrs  # pyright: ignore[reportAttributeAccessIssue]
 
 from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, Point
 from himpc.cascade.null_space import CLEARLY_REGULAR
@@ -24,9 +24,15 @@ _TOLERANCE = 1e-9
 """N·m: a row violated by less counts as met."""
 _ACCURACY = 1e-8
 """N·m: how far a point may be from the optimum; normal equations can lose more, the other routes do not."""
+_ROUNDS = 2
+"""The normal equations lose digits on long horizons; one step of refinement brings them back."""
 _NOTHING = np.empty(0)
 _WORK = 64
 """LAPACK's work space, enough for any small matrix; without it each call asks first."""
+
+
+_Solved = tuple[Array, Array | None, float, str, float]
+"""Q^½ e, multipliers, norm of the gradient, status and microseconds of a level."""
 
 
 def solve_triangular(
@@ -69,7 +75,7 @@ def solve_triangular(
 
     last = len(problems) - 1
     y = np.zeros((last + 1, N, n))
-    points: list[tuple[Array, ActiveRows, float, str, float]] = []
+    points: list[_Solved] = []
     start = 0
     for place, problem in enumerate(problems):
         if place:
@@ -88,7 +94,7 @@ def solve_triangular(
         now = perf_counter_ns()
         points.append((*found, "optimal" if end > start else "empty", (now - started) / 1e3))
         started, start = now, end
-    return _within(points, Q, y, rows) if points else []
+    return _within(points, warm, Q, y, rows) if points else []
 
 
 @lru_cache(maxsize=64)
@@ -136,7 +142,7 @@ def _level(
     Q: Array,
     rows: Rows,
     active: ActiveRows,
-) -> tuple[Array, ActiveRows, float] | None:
+) -> tuple[Array, Array | None, float] | None:
     """Solves for coordinates start … n of one level and writes them into y, (N, n).
 
     Args:
@@ -149,8 +155,8 @@ def _level(
         active: rows to take as equalities.
 
     Returns:
-        Q^½ e, the active rows with their multipliers, and the norm of the gradient; None if the active rows
-        do not hold an optimum, or not an accurate one.
+        Q^½ e, the multipliers of the active rows if there are any, and the norm of the gradient; None if the
+        active rows do not hold an optimum, or not an accurate one.
     """
     N, m, _ = problem.B.shape
     R = problem.common_R or 0.0
@@ -160,99 +166,34 @@ def _level(
     if start:
         error += effect.reshape(N * m, N * end) @ y[:, :end].reshape(-1)
     if own == 0:
-        return error, NO_ROWS, 0.0
+        return error, None, 0.0
     G = (effect[:, :, start:] if start else effect).reshape(N * m, N * own)
     H = G.T @ G
     H.reshape(-1)[:: N * own + 1] += R
-    bound = _bound(active, y, start, own, Q, rows) if len(active) else None
-    if bound is None:
-        factor, solved, _ = dposv(H, G.T @ -error, overwrite_b=1)
-        gradient = R * solved
+    if len(active):
+        found = _bound_optimum(G, error, H, R, _equalities(active, y, start, own, Q, rows))
     else:
-        right = np.empty((1 + active.row.size, N * own))
-        right[0], right[1:] = G.T @ error, bound.A_own
-        factor, across, _ = dposv(H, right.T, overwrite_b=1)
-        solved = -across[:, 0]
-        bound = bound.solve(across[:, 1:], solved, R)
-        if bound is None:
-            return None
-        gradient = R * solved + bound.multipliers @ bound.A_own
-    error += G @ solved
-    gradient += G.T @ error
-    tolerance = min(_ACCURACY * R, KKT_TOLERANCE)
-    kkt = math.sqrt(gradient @ gradient)
-    if not kkt <= tolerance:
-        # The normal equations lose digits on long horizons; one step of refinement brings them back.
-        change = -dpotrs(factor, gradient)[0]
-        if bound is not None:
-            bound = bound.refined(change, R)
-        solved += change
-        error += G @ change
-        gradient = R * solved + G.T @ error
-        if bound is not None:
-            gradient += bound.multipliers @ bound.A_own
-        kkt = math.sqrt(gradient @ gradient)
-        if not kkt <= tolerance:
-            return None
-    y[:, start:end] = solved.reshape(N, own)
-    if bound is None:
-        return error, NO_ROWS, kkt
-    missed = bound.missed(solved, bound.rest)
-    if not (float((bound.multipliers * active.multiplier).min()) > 0.0 and missed @ missed < _TOLERANCE**2):
+        found = _free_optimum(G, error, H, R)
+    if found is None:
         return None
-    y[:, end:] = bound.rest.reshape(N, -1)
-    return error, ActiveRows(active.row, active.joint, bound.multipliers, missed), kkt
+    solved, multipliers, rest, error, gradient = found
+    y[:, start:end] = solved.reshape(N, own)
+    if multipliers is not None:
+        if not float((multipliers * active.multiplier).min()) > 0.0:
+            return None
+        y[:, end:] = rest.reshape(N, -1)
+    return error, multipliers, gradient
 
 
-class _Bound(NamedTuple):
-    """Rows taken as equalities: A_own y_own + A_rest y_rest = target, (k, ·), and what they ask for.
-
-    Attributes:
-        pulled: H⁻¹ A_ownᵀ.
-        schur: Cholesky factor of A_own H⁻¹ A_ownᵀ + A_rest A_restᵀ/R.
-        multipliers: (k,).
-        rest: the coordinates beyond the level's own.
-        lost: what the equalities are still missed by.
-    """
+class _Equalities(NamedTuple):
+    """A_own y_own + A_rest y_rest = target for k rows, in the coordinates that a level may change."""
 
     A_own: Array
     A_rest: Array
     target: Array
-    pulled: Array
-    schur: Array
-    multipliers: Array
-    rest: Array
-    lost: Array
-
-    def missed(self, own: Array, rest: Array) -> Array:
-        """By how much the equalities are missed, (k,)."""
-        missed = self.A_own @ own - self.target
-        return missed + self.A_rest @ rest if rest.size else missed
-
-    def solve(self, pulled: Array, own: Array, R: float) -> _Bound | None:
-        """Moves `own`, the optimum without rows, onto them; None if they are dependent."""
-        S = self.A_own @ pulled
-        if self.A_rest.size:
-            S += self.A_rest @ (self.A_rest.T / R)
-        schur, multipliers, info = dposv(S, self.A_own @ own - self.target)
-        if info != 0:
-            return None
-        own -= pulled @ multipliers
-        rest = multipliers @ self.A_rest / -R
-        return self._replace(
-            pulled=pulled, schur=schur, multipliers=multipliers, rest=rest, lost=self.missed(own, rest)
-        )
-
-    def refined(self, change: Array, R: float) -> _Bound:
-        """The same after `change` of the own coordinates, which is corrected so that the rows are met."""
-        more = dpotrs(self.schur, self.A_own @ change + self.lost)[0]
-        change -= self.pulled @ more
-        multipliers = self.multipliers + more
-        return self._replace(multipliers=multipliers, rest=multipliers @ self.A_rest / -R)
 
 
-def _bound(active: ActiveRows, y: Array, start: int, own: int, Q: Array, rows: Rows) -> _Bound:
-    """The rows in the coordinates that a level may change."""
+def _equalities(active: ActiveRows, y: Array, start: int, own: int, Q: Array, rows: Rows) -> _Equalities:
     row, joint, count = active.row, active.joint, active.row.size
     L = rows.L[row]
     A = L[:, :, None] * Q[:, joint, start:].transpose(1, 0, 2)
@@ -260,23 +201,67 @@ def _bound(active: ActiveRows, y: Array, start: int, own: int, Q: Array, rows: R
     if start:
         above = np.matmul(Q[:, :, :start], y[:, :start, None])[:, :, 0]
         target -= (L * above.T[joint]).sum(axis=1)
-    A_own, A_rest = A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1)
-    return _Bound(A_own, A_rest, target, *(_NOTHING,) * 5)
+    return _Equalities(A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1), target)
+
+
+_Optimum = tuple[Array, Array | None, Array, Array, float]
+"""Own coordinates, multipliers λ, the coordinates beyond, Q^½ e, norm of the gradient."""
+
+
+def _free_optimum(G: Array, error: Array, H: Array, R: float) -> _Optimum | None:
+    """min ½R‖y‖² + ½‖error + G y‖², H = GᵀG + R; None if it is not accurate."""
+    factor, own, _ = dposv(H.T, G.T @ -error, overwrite_a=1, overwrite_b=1)
+    for _ in range(_ROUNDS):
+        after = error + G @ own
+        slope = R * own + G.T @ after
+        gradient = math.sqrt(slope @ slope)
+        if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
+            return own, None, _NOTHING, after, gradient
+        own = own - dpotrs(factor, slope)[0]
+    return None
+
+
+def _bound_optimum(G: Array, error: Array, H: Array, R: float, equalities: _Equalities) -> _Optimum | None:
+    """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None also if the rows are dependent."""
+    A_own, A_rest, target = equalities
+    d, corner = len(H), A_rest @ (A_rest.T / -R)
+    K = np.empty((d + target.size, d + target.size))
+    K[:d, :d], K[d:, :d], K[:d, d:], K[d:, d:] = H, A_own, A_own.T, corner
+    right = np.concatenate((G.T @ -error, target))
+    factor, pivots, x, info = dgesv(K.T, right, overwrite_a=1, overwrite_b=1)
+    if info != 0:
+        return None
+    for _ in range(_ROUNDS):
+        own, multipliers = x[:d], x[d:]
+        after = error + G @ own
+        slope = R * own + G.T @ after + multipliers @ A_own
+        gradient = math.sqrt(slope @ slope)
+        if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
+            return own, multipliers, multipliers @ A_rest / -R, after, gradient
+        lost = A_own @ own + corner @ multipliers - target
+        x = x - dgetrs(factor, pivots, np.concatenate((slope, lost)))[0]
+    return None
 
 
 def _within(
-    points: Sequence[tuple[Array, ActiveRows, float, str, float]], Q: Array, y: Array, rows: Rows
+    points: Sequence[_Solved], warm: Sequence[ActiveRows], Q: Array, y: Array, rows: Rows
 ) -> list[Point]:
-    """The points up to the first whose increments Q y violate a row."""
-    good = len(points)
-    U = np.matmul(Q, y[:good, :, :, None])[..., 0]
+    """The points up to the first whose increments Q y violate a row or leave room at an active one."""
+    U = np.matmul(Q, y[: len(points), :, :, None])[..., 0]
     value = rows.L @ U
     room = np.minimum(rows.upper - value, value - rows.lower)
-    if not float(room.min()) >= -_TOLERANCE:
-        # A comparison with NaN is false, so what is not a number is no point either.
-        met = room.reshape(good, -1).min(axis=1) >= -_TOLERANCE
-        good = good if met.all() else int(met.argmin())
-    return [
-        Point(U[place], active, kkt, status, error, time_us=time_us)
-        for place, (error, active, kkt, status, time_us) in enumerate(points[:good])
-    ]
+    # A comparison with NaN is false, so what is not a number is no point either.
+    sound = float(room.min()) >= -_TOLERANCE
+    found = []
+    for place, (error, multipliers, kkt, status, time_us) in enumerate(points):
+        if not sound and not float(room[place].min()) >= -_TOLERANCE:
+            break
+        active = NO_ROWS
+        if multipliers is not None:
+            active = warm[place]
+            slack = room[place, active.row, active.joint]
+            if not float(slack.max()) <= _TOLERANCE:
+                break
+            active = ActiveRows(active.row, active.joint, multipliers, slack)
+        found.append(Point(U[place], active, kkt, status, error, time_us=time_us))
+    return found
