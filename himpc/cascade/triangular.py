@@ -222,7 +222,7 @@ def _free_optimum(G: Array, error: Array, H: Array, R: float) -> _Optimum | None
 
 
 def _bound_optimum(G: Array, error: Array, H: Array, R: float, equalities: _Equalities) -> _Optimum | None:
-    """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None also if the rows are dependent."""
+    """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None too for dependent rows."""
     A_own, A_rest, target = equalities
     d, corner = len(H), A_rest @ (A_rest.T / -R)
     K = np.empty((d + target.size, d + target.size))
