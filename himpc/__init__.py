@@ -1,6 +1,7 @@
 """How a robot is controlled: tasks, limits, prediction, the cascade of QPs, controllers."""
 
 from himpc.controllers import CONTROLLERS, HIMPC, Settings
+from himpc.htmpc import HTMPC, HTMPCSettings
 from himpc.limits import Limits
 from himpc.plan import Plan
 from himpc.stack import Level, Stack
@@ -9,9 +10,11 @@ from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Postur
 __all__ = [
     "CONTROLLERS",
     "HIMPC",
+    "HTMPC",
     "Damping",
     "FrameOrientation",
     "FramePosition",
+    "HTMPCSettings",
     "Joints",
     "Level",
     "Limits",

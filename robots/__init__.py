@@ -8,6 +8,7 @@ from robots.nominal import NominalModel, NominalSettings
 from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
+from robots.servo import VelocityPlant, VelocityPlantSettings
 from robots.settings import PlantSettings
 from robots.signals import PlantState
 from robots.urdf import check_urdf
@@ -23,6 +24,8 @@ __all__ = [
     "PlantSettings",
     "PlantState",
     "Robot",
+    "VelocityPlant",
+    "VelocityPlantSettings",
     "check_urdf",
     "convergence_gauge",
     "load_robot",

@@ -59,5 +59,23 @@ CATALOG: dict[str, CatalogEntry] = {
             a_max=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),  # Franka Control Interface documentation
             M_bar=(0.0275, 0.3, 0.0138, 0.0764, 0.0089, 0.0173, 0.0036),  # suggest_M_bar, two or three digits
         ),
+        CatalogEntry(
+            name="ridgeback-ur10",
+            title="Clearpath Ridgeback with a UR10, nine joints (HTMPC paper, section V)",
+            tip="tool",
+            home_deg=(0.0, 0.0, 0.0, 90.0, -45.0, 90.0, -45.0, 90.0, 75.06),  # project design notes
+            a_max=(
+                2.5,
+                2.5,
+                1.0,
+                2.16,
+                2.16,
+                3.15,
+                3.2,
+                3.2,
+                3.2,
+            ),  # project design notes; base m/s², m/s², rad/s²
+            M_bar=(130.0, 130.0, 7.9, 0.228, 0.66, 0.152, 0.0078, 0.0037, 0.0003),  # suggest_M_bar
+        ),
     )
 }

@@ -16,11 +16,15 @@ ORDER = ("robots", "himpc", "lessons", "app", "tests")
 DOORS = {
     "mujoco": ("robots/plant.py",),
     "placo": ("robots/reach.py",),
+    "coal": ("robots/collision.py",),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
+    "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
     "tyro": ("app/",),
     "rich": ("app/",),
+    "matplotlib": ("lessons/plots/",),
+    "distributed": ("lessons/parallel.py",),
 }
 
 

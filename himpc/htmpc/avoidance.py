@@ -1,0 +1,55 @@
+"""Collision avoidance (7c) along the prediction: rows, slacks and penalties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.prediction import integrator
+from himpc.htmpc.rows import Rows
+from robots.collision import Clearances, CollisionModel
+
+Array = NDArray[np.float64]
+
+PENALTY = 1e3
+"""Price of one metre inside the margin at one knot: more than any tracking gain."""
+_LOOK = 0.35
+"""m beyond the margin: farther pairs get no row. More than a knot's motion changes in one step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Avoidance:
+    """sd(x_k) ≥ δ_safe.
+
+    Attributes:
+        model: distances and gradients.
+        margin: δ_safe, m.
+    """
+
+    model: CollisionModel
+    margin: float
+
+    def near(self, q: Array, gradients: bool = True) -> Clearances:
+        """Pairs near enough to matter at configurations q (K, n)."""
+        return self.model.clearances(q, self.margin + _LOOK, gradients)
+
+    def rows(self, near: Clearances, N: int, dt: float) -> Rows:
+        """The linearised constraint on the change d of the inputs, one row per pair and knot."""
+        T_q = integrator(N, dt).T_q
+        A = (T_q[near.knot][:, :, None] * near.gradient[:, None, :]).reshape(len(near.knot), -1)
+        room = self.margin - near.distance
+        free = np.full(len(room), np.inf)
+        return Rows(A, room, free, np.full(len(room), 7), near.knot + 1, np.arange(len(room)))
+
+    def depths(self, near: Clearances, N: int) -> Array:
+        """By how much each knot is inside the margin at worst, (N,) m, ≥ 0."""
+        depth = np.zeros(N)
+        np.maximum.at(depth, near.knot, self.margin - near.distance)
+        return depth
+
+
+def clearance(near: Clearances | None) -> float:
+    """The smallest distance, m; infinite if no pair is near."""
+    return np.inf if near is None else float(near.distance.min(initial=np.inf))

@@ -1,0 +1,86 @@
+"""The costs: tracking (8), effort (10), and the relaxed log barrier that softens (7c) and (7d)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.prediction import Start, integrator
+from himpc.htmpc.rows import Rows
+from himpc.htmpc.settings import Efforts
+
+Array = NDArray[np.float64]
+
+MU = 1e-3
+"""Weight of the barrier (the HTMPC authors' published value)."""
+ZETA = 5e-3
+"""Distance from a bound at which the logarithm gives way to a parabola (the authors' value)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effort:
+    """J_eff of (10), of the inputs U or of their deviation from a reference plan.
+
+    Attributes:
+        weights: S, R, W.
+        N: knots. dt: s.
+    """
+
+    weights: Efforts
+    N: int
+    dt: float
+
+    @cached_property
+    def hessian(self) -> Array:
+        """(N·n, N·n), constant."""
+        T_v, _, D, _ = integrator(self.N, self.dt)
+        w = self.weights
+        H = np.kron(T_v.T @ T_v, np.diag(w.S)) + np.kron(np.eye(self.N), np.diag(w.R))
+        return H + np.kron(D.T @ D, np.diag(w.W))
+
+    def absolute(self, start: Start, U: Array) -> tuple[float, Array]:
+        """Value and gradient (N·n,) of (10)."""
+        T_v, _, D, _ = integrator(self.N, self.dt)
+        w = self.weights
+        V = start.v + T_v @ U
+        change = D @ U
+        change[0] -= start.u
+        value = 0.5 * float((w.S * V**2).sum() + (w.R * U**2).sum() + (w.W * change**2).sum())
+        return value, (T_v.T @ (w.S * V) + w.R * U + D.T @ (w.W * change)).ravel()
+
+    def relative(self, U: Array, plan: Array) -> tuple[float, Array]:
+        """Value and gradient of the same weights on the deviation from a plan (N, n): the proximal effort."""
+        gap = (U - plan).ravel()
+        slope = self.hessian @ gap
+        return 0.5 * float(gap @ slope), slope
+
+
+def barrier(rows: Rows, u: Array) -> tuple[float, Array, Array]:
+    """The relaxed log barrier of all bounds: value, gradient (k,), Hessian (k, k) with respect to u.
+
+    B(h) = −μ ln h for h ≥ ζ, and the parabola that continues it twice differentiably below.
+    """
+    value = rows.A @ u
+    above = np.isfinite(rows.upper)
+    below = np.isfinite(rows.lower)
+    h = np.concatenate([(rows.upper - value)[above], (value - rows.lower)[below]])
+    far = h >= ZETA
+    z = (h - 2.0 * ZETA) / ZETA
+    B = np.where(far, -np.log(np.maximum(h, ZETA)), 0.5 * (z**2 - 1.0) - np.log(ZETA))
+    first = np.where(far, -1.0 / np.maximum(h, ZETA), z / ZETA)
+    second = np.where(far, 1.0 / np.maximum(h, ZETA) ** 2, 1.0 / ZETA**2)
+    A = np.vstack([-rows.A[above], rows.A[below]])
+    return MU * float(B.sum()), MU * (A.T @ first), MU * (A.T @ (second[:, None] * A))
+
+
+def barrier_value(rows: Rows, u: Array) -> float:
+    """The value of `barrier` alone."""
+    value = rows.A @ u
+    h = np.concatenate([rows.upper - value, value - rows.lower])
+    h = h[np.isfinite(h)]
+    z = (h - 2.0 * ZETA) / ZETA
+    B = np.where(h >= ZETA, -np.log(np.maximum(h, ZETA)), 0.5 * (z**2 - 1.0) - np.log(ZETA))
+    return MU * float(B.sum())

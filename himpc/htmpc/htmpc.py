@@ -1,0 +1,203 @@
+"""HTMPC: hierarchical-task MPC, section IV of the paper."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from time import perf_counter_ns
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration, joint_indices
+from himpc.htmpc.avoidance import Avoidance, clearance
+from himpc.htmpc.cost import Effort
+from himpc.htmpc.evidence import evidence
+from himpc.htmpc.kinematics import Knots, desired_values, task_frames
+from himpc.htmpc.plan import LevelEvidence, VelocityPlan
+from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
+from himpc.htmpc.problem import Problem, Tick
+from himpc.htmpc.rows import held, limit_rows
+from himpc.htmpc.settings import HTMPCSettings, bounds, efforts
+from himpc.htmpc.sqp import Solved, solve_level
+from himpc.htmpc.tracking import Guard, check_dimensions, tracking
+from himpc.references import Preview
+from himpc.stack import Stack
+from robots import Robot
+from robots.collision import CollisionModel
+
+Array = NDArray[np.float64]
+
+_MEMORY = 200
+"""Plans remembered: a delay of 1 s at 200 Hz."""
+
+
+class HTMPC:
+    """Plans velocities by Algorithm 2: one STMPC (9) per level, from the highest priority down.
+
+    It reads geometry and limits of the robot. One `step` per control period; what it remembers is its last
+    plan. `configure` changes settings and keeps that plan, so the commanded motion goes on without a jump.
+    """
+
+    def __init__(self, robot: Robot, settings: HTMPCSettings) -> None:
+        """Raises InputError if the settings do not fit the robot."""
+        self.robot = robot
+        self._data = robot.model.createData()
+        self.configure(settings)
+        self.reset()
+
+    @property
+    def settings(self) -> HTMPCSettings:
+        """The settings in use."""
+        return self._settings
+
+    def reset(self) -> None:
+        """Forgets the plan: the robot is taken to move on as measured, with no acceleration."""
+        self._past: deque[Motion] = deque(maxlen=_MEMORY)
+
+    def configure(self, settings: HTMPCSettings) -> None:
+        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        robot = self.robot
+        home = Configuration(robot, self._data, robot.home, robot.home)
+        tasks = tuple(task for level in settings.stack for task in level.tasks)
+        for task in tasks:
+            task.jacobian(home)
+        # Levels that are off are prepared too: a wrong weight must be refused now, not once it is on.
+        every = [(level, tracking(robot, level, settings)) for level in settings.stack]
+        active = self._chosen(tuple(level for level in settings.stack if level.enabled))
+        check_dimensions(robot, active)
+        weights, limits = efforts(robot, settings), bounds(robot, settings.limits)
+        collision = CollisionModel(robot, settings.obstacles, settings.self_collision)
+        self._hold = self._held(active, settings)
+        self._levels = tuple(form for level, form in every if level in active)
+        self._bounds = limits
+        self._effort = Effort(weights, settings.horizon, settings.dt)
+        self._avoidance = None if collision.empty else Avoidance(collision, settings.margin_m)
+        self._tasks, self._frames = tasks, task_frames(tasks)
+        self._settings = settings
+
+    def _chosen(self, enabled: Stack) -> Stack:
+        """The levels to solve, of those that are on."""
+        return enabled
+
+    def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:
+        """Columns of the joints that stay at rest."""
+        return np.array(joint_indices(self.robot, settings.hold) if settings.hold else [], np.int64)
+
+    def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
+        """One control period: measured state in, motion and evidence out.
+
+        Args:
+            q, v: measured joint positions and velocities, (n,).
+            previews: the reference of every task by its name, sampled at this tick (later by `delay_s`) with
+                T_s = Δt and N.
+
+        Returns:
+            the plan; finite whatever the state: from one that is not finite the robot brakes along its last
+            plan.
+        """
+        started = perf_counter_ns()
+        tick = self._tick(self._start(q, v), previews)
+        with np.errstate(all="ignore"):
+            solved = self._solve(tick)
+        at = solved[-1].at if solved else tick.iterate(tick.brake)
+        levels = tuple(
+            evidence(level, one, at, self.robot.joint_names)
+            for level, one in zip(self._levels, solved, strict=True)
+        )
+        U = at.U if np.isfinite(at.U).all() else tick.brake
+        motion = Motion(tick.start, self._permitted(tick.start, U), self._settings.dt)
+        self._past.append(motion)
+        return self._decided(tick, motion, levels, clearance(at.distances), started)
+
+    def _start(self, q: Array, v: Array) -> Start:
+        """The state from which to plan, predicted forward by the delay, and the input acting before."""
+        period, past = self._settings.period, self._past
+        usable = bool(np.isfinite(q).all() and np.isfinite(v).all())
+        if not past:
+            still = np.zeros(self.robot.n)
+            return Start(np.array(q, float), np.array(v, float), still) if usable else self._rest()
+        acted = (past[-1].velocity(period) - past[-1].start.v) / period
+        if not usable:
+            return Start(past[-1].position(period), past[-1].velocity(period), acted)
+        delay = self._settings.delay_s
+        if delay == 0.0:
+            return Start(np.array(q, float), np.array(v, float), acted)
+        # What has been commanded but has not acted yet will happen whatever is decided now.
+        return Start(q + underway(past, period, delay), past[-1].velocity(period), acted)
+
+    def _rest(self) -> Start:
+        still = np.zeros(self.robot.n)
+        return Start(self.robot.home, still, still)
+
+    def _tick(self, start: Start, previews: Mapping[str, Preview]) -> Tick:
+        settings, limits = self._settings, self._bounds
+        N, dt, period = settings.horizon, settings.dt, settings.period
+        past, hold = self._past, self._hold
+        rows = limit_rows(start, N, dt, period, limits)
+        plan = shifted(past[-1], period, N, dt, limits) if past else braking(start, N, dt, period, limits)
+        if hold.size:
+            brake = braking(start, N, dt, period, limits)
+            plan[:, hold] = brake[:, hold]
+            rows = held(rows, brake, hold)
+        return Tick(
+            robot=self.robot,
+            data=self._data,
+            settings=settings,
+            start=start,
+            frames=self._frames,
+            desired={task.name: desired_values(task, previews[task.name], N) for task in self._tasks},
+            effort=self._effort,
+            rows=rows,
+            bounds=limits,
+            plan=plan,
+            avoidance=self._avoidance,
+        )
+
+    def _solve(self, tick: Tick) -> list[Solved]:
+        """Algorithm 2."""
+        at = tick.iterate(tick.plan)
+        solved: list[Solved] = []
+        guards: list[Guard] = []
+        for level in self._levels:
+            last = level is self._levels[-1]
+            absolute = last or self._settings.formulation == "paper"
+            found = solve_level(Problem(tick, level, tuple(guards), absolute), at)
+            at = found.at
+            guards.append(Guard(level, at.errors(level)))
+            solved.append(found)
+        return solved
+
+    def _permitted(self, start: Start, U: Array) -> Array:
+        """With softened bounds the first input may leave them: what is commanded does not."""
+        if self._settings.formulation != "paper":
+            return U
+        limits, period = self._bounds, self._settings.period
+        first = np.clip(U[0], -limits.a, limits.a)
+        first = np.clip(first, (-limits.v - start.v) / period, (limits.v - start.v) / period)
+        return np.vstack([first, U[1:]])
+
+    def _decided(
+        self, tick: Tick, motion: Motion, levels: tuple[LevelEvidence, ...], ahead: float, started: int
+    ) -> VelocityPlan:
+        settings, start, U = self._settings, tick.start, motion.U
+        q = np.vstack([start.q, positions(start, U, settings.dt)])
+        now = Knots(self.robot, self._data, q[:1], self._frames)
+        values = {task.name: now.value(task) for task in self._tasks}
+        errors = {
+            task.name: task.error(values[task.name], tick.desired[task.name][0]) for task in self._tasks
+        }
+        here = None if self._avoidance is None else self._avoidance.near(q[:1], gradients=False)
+        return VelocityPlan(
+            command=motion.velocity(settings.period),
+            motion=motion,
+            q=q,
+            v=np.vstack([start.v, velocities(start, U, settings.dt)]),
+            u=U,
+            levels=levels,
+            errors=errors,
+            values=values,
+            bounds=self._bounds,
+            clearance=min(ahead, clearance(here)),
+            step_us=(perf_counter_ns() - started) / 1e3,
+        )

@@ -1,0 +1,133 @@
+"""The system and task model of section IV-A: G(q) of (4), and the tasks' errors (6) along a prediction."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.references import Preview
+from himpc.rotation import exp3
+from himpc.tasks import FramePosition, Task
+from himpc.tasks.frame import FrameTask
+from robots import InputError, Robot
+
+Array = NDArray[np.float64]
+Base = Literal["holonomic", "unicycle"]
+UNICYCLE = (
+    "base is 'unicycle': its G(q) depends on the heading, and the condensed prediction needs G = I; "
+    "describe a holonomic base by two prismatic joints and one revolute joint instead"
+)
+BASES: tuple[Base, ...] = ("holonomic", "unicycle")
+
+
+def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:
+    """G(q) of (4), q̇ = G(q) v, (n, n).
+
+    The joints of our robots are coordinates of their own: a holonomic base is two prismatic joints along
+    world axes and a revolute one, its velocities are world velocities, and G is the identity, as for an arm.
+
+    Raises:
+        InputError: a unicycle base, whose forward speed moves it along its heading.
+    """
+    if base == "unicycle":
+        raise InputError(UNICYCLE)
+    return np.eye(robot.n)
+
+
+@lru_cache(maxsize=64)
+def base_joints(robot: Robot) -> tuple[int, ...]:
+    """Columns of the joints that make up a mobile base: the unbounded ones at the root of the tree."""
+    count = 0
+    for joint in range(1, robot.n + 1):
+        chained = robot.model.parents[joint] == joint - 1
+        if not chained or np.isfinite(robot.q_lower[joint - 1]) or np.isfinite(robot.q_upper[joint - 1]):
+            break
+        count = joint
+    return tuple(range(count)) if count >= 3 else ()
+
+
+class Knots:
+    """Frames and Jacobians at all knots of a prediction, knot 1 first."""
+
+    def __init__(self, robot: Robot, data: pin.Data, q: Array, frames: tuple[str, ...]) -> None:
+        """q: (K, n) configurations. frames: names of the frames that tasks will ask for."""
+        self._robot, self._data, self._q, self._frames = robot, data, q, frames
+        self._path = Path(robot, data, q)
+
+    def errors(self, task: Task, desired: list[Array]) -> Array:
+        """e = x − r of (6) at every knot, (K, m)."""
+        if isinstance(task, FramePosition):
+            at = np.array([placed.translation for placed in self._placements[task.frame]])
+            return at[:, task.components] - np.array(desired)
+        pairs = zip(self._knots, desired, strict=True)
+        return np.array([task.error(task.value(knot), goal) for knot, goal in pairs])
+
+    def value(self, task: Task) -> Array:
+        """x at the first knot."""
+        return task.value(self._knots[0])
+
+    def jacobian(self, task: Task) -> Array:
+        """J of a task at every knot, (K, m, n)."""
+        return task.jacobian(self._path)
+
+    @cached_property
+    def _placements(self) -> dict[str, list[pin.SE3]]:
+        model, data = self._robot.model, self._data
+        frames = [(name, self._robot.frame_id(name or self._robot.tip)) for name in self._frames]
+        found: dict[str, list[pin.SE3]] = {name: [] for name in self._frames}
+        for q in self._q:
+            pin.forwardKinematics(model, data, q)
+            for name, index in frames:
+                found[name].append(pin.updateFramePlacement(model, data, index).copy())
+        return found
+
+    @cached_property
+    def _knots(self) -> list[Knot]:
+        names, placements = self._placements.keys(), zip(*self._placements.values(), strict=True)
+        each = placements if names else ((),) * len(self._q)
+        pairs = zip(self._q, each, strict=True)
+        return [
+            Knot(self._robot, self._data, q, dict(zip(names, placed, strict=True))) for q, placed in pairs
+        ]
+
+
+class Path(Configuration):
+    """All knots as one configuration; only Jacobians are asked of it."""
+
+    def __init__(self, robot: Robot, data: pin.Data, q: Array) -> None:
+        super().__init__(robot, data, q[0], q[0], q[1:])
+
+
+class Knot(Configuration):
+    """One knot; only positions are asked of it."""
+
+    def __init__(self, robot: Robot, data: pin.Data, q: Array, placements: dict[str, pin.SE3]) -> None:
+        super().__init__(robot, data, q, q)
+        self._placements = placements
+
+
+def task_frames(tasks: tuple[Task, ...]) -> tuple[str, ...]:
+    """Names of the frames that the tasks look at, each once."""
+    return tuple(dict.fromkeys(task.frame for task in tasks if isinstance(task, FrameTask)))
+
+
+def desired_values(task: Task, preview: Preview, N: int) -> list[Array]:
+    """r of (6) at knots 0 … N.
+
+    Raises:
+        ValueError: the preview has not N + 1 knots.
+    """
+    if len(preview.displacement) != N + 1:
+        raise ValueError(
+            f"the preview of task '{task.name}' has {len(preview.displacement)} knots, not {N + 1}"
+        )
+    if preview.value.ndim == 1:
+        return list(preview.value + preview.displacement)
+    turn = np.zeros((N + 1, 3))
+    turn[:, task.components if isinstance(task, FrameTask) else slice(0, 3)] = preview.displacement
+    return [exp3(each) @ preview.value for each in turn]

@@ -1,0 +1,94 @@
+"""What one step of a velocity-level controller decided, with its evidence."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.prediction import Motion
+from himpc.htmpc.settings import Bounds
+from himpc.plan import Binding
+
+Array = NDArray[np.float64]
+
+
+class LevelEvidence(NamedTuple):
+    """How one level was solved.
+
+    Attributes:
+        name: of the level.
+        status: of the solver at the last QP.
+        rung: "solve", or what was needed instead: "widened" (limits moved out to contain full braking) or
+            "keep" (no verified point: the inputs stay as the level above left them; on the first level the
+            robot brakes).
+        kkt_residual: largest scaled KKT residual of the applied QP solutions.
+        best: e* at knots 1 … N, (N, m); the level's tasks stacked.
+        final: the same errors once all levels are solved.
+        cost: J of (8) at e*, without knot 0.
+        steps: accepted step sizes, one per iteration; 0 if none was acceptable.
+        iterations: QPs solved, first attempts only.
+        unsolved: how many of them had no verified point.
+        time_us: wall time.
+        binding: constraints with a multiplier at the last QP.
+    """
+
+    name: str
+    status: str
+    rung: str
+    kkt_residual: float
+    best: Array
+    final: Array
+    cost: float
+    steps: tuple[float, ...]
+    iterations: int
+    unsolved: int
+    time_us: float
+    binding: tuple[Binding, ...]
+
+
+class VelocityPlan(NamedTuple):
+    """The motion decided, and per level what was found.
+
+    Attributes:
+        command: v at the end of this control period, (n,), if the command is held; `motion.velocity(s)` gives
+            it at any time s after this step.
+        motion: the plan as a function of time.
+        q, v: predicted positions and velocities at knots 0 … N, (N+1, n).
+        u: accelerations, (N, n).
+        levels: one per active level, highest priority first.
+        errors: e now, (m,), per task name.
+        values: x now, per task name.
+        bounds: the bounds in force.
+        clearance: m, the smallest signed distance to an obstacle along the plan; infinite if none is near.
+        step_us: wall time from state to plan, microseconds, kinematics included.
+    """
+
+    command: Array
+    motion: Motion
+    q: Array
+    v: Array
+    u: Array
+    levels: tuple[LevelEvidence, ...]
+    errors: dict[str, Array]
+    values: dict[str, Array]
+    bounds: Bounds
+    clearance: float
+    step_us: float
+
+    @property
+    def unsolved(self) -> int:
+        """How many QPs had no verified point at the first attempt."""
+        return sum(level.unsolved for level in self.levels)
+
+    @property
+    def leak(self) -> float | None:
+        """max(|e_p| − |e_p*|) over levels above the last, coordinates and knots; None with fewer than two."""
+        above = self.levels[:-1]
+        return max((float((np.abs(p.final) - np.abs(p.best)).max()) for p in above), default=None)
+
+    @property
+    def kkt_residual(self) -> float:
+        """The largest scaled KKT residual over the points that were applied."""
+        return max((level.kkt_residual for level in self.levels), default=0.0)

@@ -1,0 +1,163 @@
+"""The double integrator (4) with G = I, condensed: velocities and positions at the knots from the inputs.
+
+The input is constant between knots, so the prediction is exact:
+v_k = v_0 + Δt Σ_{s<k} u_s and q_k = q_0 + kΔt v_0 + Δt² Σ_{s<k} (k − s − ½) u_s.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.settings import Bounds
+
+Array = NDArray[np.float64]
+
+
+_NO_JERK_BOUND = 1e9
+"""Stands in for an infinite jerk where it is multiplied by a speed that may be zero."""
+
+
+class Integrator(NamedTuple):
+    """Matrices of one (N, Δt), the same for every joint.
+
+    Attributes:
+        T_v: (N, N), velocities at knots 1 … N from the inputs.
+        T_q: (N, N), positions at knots 1 … N from the inputs.
+        D: (N, N), Δu from the inputs; the first row lacks −u_{−1}.
+        t: (N,) s, times of knots 1 … N.
+    """
+
+    T_v: Array
+    T_q: Array
+    D: Array
+    t: Array
+
+
+@lru_cache(maxsize=32)
+def integrator(N: int, dt: float) -> Integrator:
+    """The condensed double integrator of N steps of dt seconds."""
+    k, s = np.arange(1, N + 1)[:, None], np.arange(N)[None, :]
+    before = s < k
+    T_v = np.where(before, dt, 0.0)
+    T_q = np.where(before, dt * dt * (k - s - 0.5), 0.0)
+    found = Integrator(
+        T_v, T_q, np.eye(N) - np.eye(N, k=-1), np.asarray(dt * np.arange(1, N + 1), np.float64)
+    )
+    for matrix in found:
+        matrix.setflags(write=False)
+    return found
+
+
+class Start(NamedTuple):
+    """Where a prediction begins: q_0, v_0 and the input that acted before, (n,) each."""
+
+    q: Array
+    v: Array
+    u: Array
+
+
+def velocities(start: Start, U: Array, dt: float) -> Array:
+    """v at knots 1 … N, (N, n), for inputs U (N, n)."""
+    return start.v + integrator(len(U), dt).T_v @ U
+
+
+def positions(start: Start, U: Array, dt: float) -> Array:
+    """q at knots 1 … N, (N, n), for inputs U (N, n)."""
+    matrices = integrator(len(U), dt)
+    return start.q + matrices.t[:, None] * start.v + matrices.T_q @ U
+
+
+def braking(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> Array:
+    """Inputs (N, n) that bring every joint to rest as fast as its bounds allow, and back inside its range.
+
+    A joint beyond a position bound is sent back at up to a fifth of its speed limit. When input and jerk
+    bounds exclude each other (a limit was tightened) the jerk bound holds.
+    """
+    U = np.empty((N, len(start.v)))
+    q, v, u = start
+    for k in range(N):
+        excess = np.maximum(q - bounds.q_upper, 0.0) - np.maximum(bounds.q_lower - q, 0.0)
+        speed = np.minimum(0.2 * bounds.v, 1.0)
+        back = np.clip(-excess / (5 * dt), -speed, speed)
+        step = bounds.j * (min(period, dt) if k == 0 else dt)
+        # A jerk bound needs time to end the braking: with u = √(2j|v|) speed and input reach zero together.
+        gap = back - v
+        jerk = np.minimum(bounds.j, _NO_JERK_BOUND)
+        most = np.minimum(bounds.a, 0.7 * np.sqrt(2.0 * jerk * np.abs(gap)))
+        wanted = np.clip(gap / dt, -most, most)
+        u = np.clip(wanted, u - step, u + step)
+        q, v = q + dt * v + 0.5 * dt * dt * u, v + dt * u
+        U[k] = u
+    return U
+
+
+class Motion(NamedTuple):
+    """A plan as a function of time: velocities linear between knots that lie dt apart.
+
+    Attributes:
+        start: its first knot.
+        U: (N, n) inputs.
+        dt: s.
+    """
+
+    start: Start
+    U: Array
+    dt: float
+
+    def velocity(self, s: float) -> Array:
+        """v at s ≥ 0 seconds after the start, (n,); beyond the last knot it stays."""
+        k = min(math.floor(s / self.dt + 1e-9), len(self.U))
+        v = self.start.v + self.dt * self.U[:k].sum(axis=0)
+        return v + (s - k * self.dt) * self.U[k] if k < len(self.U) else v
+
+    def position(self, s: float) -> Array:
+        """q at 0 ≤ s ≤ N·dt seconds after the start, (n,)."""
+        whole = min(math.floor(s / self.dt + 1e-9), len(self.U))
+        rest = s - whole * self.dt
+        q = self.start.q + whole * self.dt * self.start.v
+        q = q + self.dt**2 * ((whole - np.arange(whole) - 0.5) @ self.U[:whole])
+        v = self.velocity(whole * self.dt)
+        u = self.U[whole] if whole < len(self.U) else np.zeros_like(v)
+        return q + rest * v + 0.5 * rest * rest * u
+
+
+def shifted(before: Motion, s: float, N: int, dt: float, bounds: Bounds) -> Array:
+    """The inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N times dt.
+
+    Each is the mean of the old input over the new interval, so the velocities at the new knots are the old
+    plan's at those times, whatever the control rate and even if N or dt has changed. Beyond its end the old
+    plan brakes: one that coasts makes hard limits infeasible for good.
+    """
+    reach = s + N * dt
+    missing = max(0, math.ceil((reach - len(before.U) * before.dt) / before.dt - 1e-9))
+    V = np.vstack([before.start.v, velocities(before.start, before.U, before.dt)])
+    if missing:
+        end = Start(before.position(len(before.U) * before.dt), V[-1], before.U[-1])
+        tail = braking(end, missing, before.dt, before.dt, bounds)
+        V = np.vstack([V, velocities(end, tail, before.dt)])
+    old = before.dt * np.arange(len(V))
+    new = s + dt * np.arange(N + 1)
+    sampled = np.array([np.interp(new, old, column) for column in V.T]).T
+    return np.diff(sampled, axis=0) / dt
+
+
+def underway(past: Sequence[Motion], period: float, delay: float) -> Array:
+    """∫ v ds over the last `delay` seconds of commands, (n,); each plan was followed for one period.
+
+    Before the first remembered plan the robot is taken to have moved as that plan began.
+    """
+    total = np.zeros_like(past[-1].start.q)
+    left = delay
+    for motion in reversed(past):
+        if left <= 0.0:
+            return total
+        part = min(left, period)
+        total += motion.position(period) - motion.position(period - part)
+        left -= part
+    return total + max(left, 0.0) * past[0].start.v

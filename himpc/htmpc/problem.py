@@ -1,0 +1,220 @@
+"""STMPC (9) for one level: its cost, its Gauss-Newton model and its constraints at an iterate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from himpc.htmpc.avoidance import PENALTY, Avoidance
+from himpc.htmpc.cost import Effort, barrier, barrier_value
+from himpc.htmpc.kinematics import Knots
+from himpc.htmpc.prediction import Start, braking, positions
+from himpc.htmpc.rows import Rows, joined
+from himpc.htmpc.settings import Bounds, HTMPCSettings
+from himpc.htmpc.tracking import Guard, Tracking
+from robots import Robot
+from robots.collision import Clearances
+
+Array = NDArray[np.float64]
+
+PROXIMAL = 0.03
+"""Share of the effort weights that the proximal form has. It only damps: with the full weights a level keeps
+errors of centimetres late in its horizon, which (12) then grants to the levels below."""
+_RIDGE = 1e-8
+"""Keeps the Hessian positive definite when effort weights are set to zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """What all levels of one step share.
+
+    Attributes:
+        robot, data: for kinematics.
+        settings: in use.
+        start: where the prediction begins.
+        frames: names of the frames that tasks look at.
+        desired: r per task name at knots 0 … N.
+        effort: J_eff.
+        rows: (7d) on the inputs.
+        bounds: in force.
+        plan: the shifted previous plan, (N, n).
+        avoidance: (7c), None if there is nothing to avoid.
+    """
+
+    robot: Robot
+    data: pin.Data
+    settings: HTMPCSettings
+    start: Start
+    frames: tuple[str, ...]
+    desired: dict[str, list[Array]]
+    effort: Effort
+    rows: Rows
+    bounds: Bounds
+    plan: Array
+    avoidance: Avoidance | None
+
+    @cached_property
+    def brake(self) -> Array:
+        """Inputs that stop the robot, (N, n); what is left when bounds contradict each other."""
+        settings = self.settings
+        return braking(self.start, settings.horizon, settings.dt, settings.period, self.bounds)
+
+    def iterate(self, U: Array) -> Iterate:
+        """Inputs (N, n) with what follows from them."""
+        return Iterate(self, U)
+
+
+class Iterate:
+    """Inputs with the kinematics and distances that follow, each computed once and only when needed."""
+
+    def __init__(self, tick: Tick, U: Array) -> None:
+        self.tick = tick
+        self.U = U
+        self.q = positions(tick.start, U, tick.settings.dt)
+        self.knots = Knots(tick.robot, tick.data, self.q, tick.frames)
+        self._errors: dict[str, Array] = {}
+        self._jacobians: dict[str, Array] = {}
+
+    def errors(self, level: Tracking) -> Array:
+        """e at knots 1 … N, (N, m)."""
+        if level.name not in self._errors:
+            self._errors[level.name] = level.errors(self.knots, self.tick.desired)
+        return self._errors[level.name]
+
+    def jacobian(self, level: Tracking) -> Array:
+        """∂e/∂u, (N, m, N·n)."""
+        if level.name not in self._jacobians:
+            self._jacobians[level.name] = level.jacobian(self.knots, self.tick.settings.dt)
+        return self._jacobians[level.name]
+
+    @cached_property
+    def near(self) -> Clearances | None:
+        """Distances with gradients; None if there is nothing to avoid."""
+        avoidance = self.tick.avoidance
+        return avoidance.near(self.q) if avoidance is not None else None
+
+    @cached_property
+    def distances(self) -> Clearances | None:
+        """Distances, with gradients only if they are known already; None if there is nothing to avoid."""
+        avoidance = self.tick.avoidance
+        if avoidance is None or "near" in self.__dict__:
+            return self.near
+        return avoidance.near(self.q, gradients=False)
+
+    @cached_property
+    def depths(self) -> Array:
+        """By how much each knot is inside the safety margin, (N,) m."""
+        avoidance, distances = self.tick.avoidance, self.distances
+        if avoidance is None or distances is None:
+            return np.zeros(len(self.U))
+        return avoidance.depths(distances, len(self.U))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One level.
+
+    Attributes:
+        tick: shared data.
+        level: the level to optimise.
+        guards: what the levels above have reached, highest first.
+        absolute: whether the effort is (10) itself, or its proximal form.
+    """
+
+    tick: Tick
+    level: Tracking
+    guards: tuple[Guard, ...]
+    absolute: bool
+
+    @property
+    def softened(self) -> bool:
+        """Whether states and inputs are softened by barriers, as the paper says."""
+        return self.tick.settings.formulation == "paper"
+
+    @property
+    def forced(self) -> bool:
+        """Whether slacks belong to the unknowns: only the first level may buy them."""
+        return not self.guards and not self.softened
+
+    @property
+    def corrects(self) -> bool:
+        """Whether a step that (13) refuses may be bent back before it is shortened: not in the paper."""
+        return bool(self.guards) and not self.softened
+
+    def merit(self, at: Iterate) -> float:
+        """J_l + J_eff, with barriers or penalties for (7c) and (7d)."""
+        tick = self.tick
+        value = self.level.cost(at.errors(self.level)) + self._effort(at.U)[0]
+        if self.softened:
+            return value + barrier_value(self._soft_rows(at), at.U.ravel())
+        return value + PENALTY * float(at.depths.sum()) if tick.avoidance is not None else value
+
+    def model(self, at: Iterate) -> tuple[Array, Array]:
+        """Hessian (k, k), Gauss-Newton for the errors, and gradient (k,) with respect to the inputs."""
+        e, E = at.errors(self.level), at.jacobian(self.level)
+        k = E.shape[-1]
+        rows = E.reshape(-1, k)
+        weighted = rows * self.level.Q.reshape(-1, 1)
+        H = (1.0 if self.absolute else PROXIMAL) * self.tick.effort.hessian + weighted.T @ rows
+        g = weighted.T @ e.ravel() + self._effort(at.U)[1]
+        if self.softened:
+            _, slope, curvature = barrier(self._soft_rows(at), at.U.ravel())
+            H, g = H + curvature, g + slope
+        H[np.diag_indices(k)] += _RIDGE
+        return H, g
+
+    def rows(self, at: Iterate, slopes: Iterate | None = None) -> Rows:
+        """The QP's rows for the change d of the inputs, without those that are softened.
+
+        With `slopes` they lead back: the guards' rows are strict, and have the Jacobians of that iterate.
+        """
+        per_coordinate = self.tick.settings.lexicographic == "per_coordinate"
+        parts: list[Rows] = []
+        for guard in self.guards:
+            e, E = at.errors(guard.tracking), (slopes or at).jacobian(guard.tracking)
+            parts.append(guard.rows(e, E, per_coordinate, strict=slopes is not None))
+        if not self.softened:
+            parts.insert(0, self.tick.rows.about(at.U.ravel()))
+            if at.near is not None and len(at.near.knot) and self.guards:
+                # Below the first level the depth reached is kept: the rows contain d = 0.
+                rows = self._avoidance_rows(at)
+                parts.append(rows.widened(np.zeros(at.U.size)))
+        return joined(*parts) if parts else self.tick.rows.take(np.zeros(len(self.tick.rows.A), bool))
+
+    def slack_rows(self, at: Iterate) -> Rows | None:
+        """(7c) for the first level, whose violation it buys; None if nothing is near."""
+        if not self.forced or at.near is None or not len(at.near.knot):
+            return None
+        return self._avoidance_rows(at)
+
+    def allowed(self, at: Iterate, share: float = 1.0) -> bool:
+        """(13): whether no level above has got worse by more than (a share of) its tolerance."""
+        settings = self.tick.settings
+        per_coordinate = settings.lexicographic == "per_coordinate"
+        return all(
+            guard.excess(at.errors(guard.tracking), per_coordinate, share * settings.delta_m) <= 0.0
+            for guard in self.guards
+        )
+
+    def _effort(self, U: Array) -> tuple[float, Array]:
+        effort = self.tick.effort
+        if self.absolute:
+            return effort.absolute(self.tick.start, U)
+        value, slope = effort.relative(U, self.tick.plan)
+        return PROXIMAL * value, PROXIMAL * slope
+
+    def _avoidance_rows(self, at: Iterate) -> Rows:
+        avoidance, settings = self.tick.avoidance, self.tick.settings
+        assert avoidance is not None
+        assert at.near is not None
+        return avoidance.rows(at.near, len(at.U), settings.dt)
+
+    def _soft_rows(self, at: Iterate) -> Rows:
+        if at.near is None or not len(at.near.knot):
+            return self.tick.rows
+        rows = self._avoidance_rows(at)
+        return joined(self.tick.rows, rows._replace(lower=rows.lower + rows.A @ at.U.ravel()))

@@ -1,0 +1,205 @@
+"""Everything about a hierarchical-task MPC that may change while the robot moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.kinematics import BASES, UNICYCLE, Base, base_joints
+from himpc.qp import SOLVERS, Solver, is_installed
+from himpc.stack import Stack, Weight, check_names
+from robots import InputError, Robot
+from robots.collision import Obstacle
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+Formulation = Literal["proximal", "paper"]
+Lexicographic = Literal["per_coordinate", "cost"]
+
+FORMULATIONS: tuple[Formulation, ...] = ("proximal", "paper")
+LEXICOGRAPHIC: tuple[Lexicographic, ...] = ("per_coordinate", "cost")
+MAX_HORIZON = 40
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """The feasible sets 𝒳 and 𝒰 of (7d), and the jerk bound of section V-C.
+
+    Attributes:
+        position, velocity, acceleration, jerk: which bounds are imposed.
+        velocity_scale, acceleration_scale, jerk_scale: factors on the robot's limits, > 0.
+        jerk_limit: per joint, rad/s³ (m/s³); None: 10 for the base's joints, 80 for all others.
+    """
+
+    position: bool = True
+    velocity: bool = True
+    acceleration: bool = True
+    jerk: bool = True
+    velocity_scale: float = 1.0
+    acceleration_scale: float = 1.0
+    jerk_scale: float = 1.0
+    jerk_limit: Weight | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("velocity_scale", "acceleration_scale", "jerk_scale"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"limits.{name} is {value}: give a finite number above 0, e.g. 1")
+
+
+@dataclass(frozen=True)
+class HTMPCSettings:
+    """Settings of HTMPC and of its single-task and no-preview relatives.
+
+    Attributes:
+        stack: levels, highest priority first; a level's Q weighs its stage costs in (8). Its R and horizon,
+            and its tasks' gains, are not used.
+        horizon: N, knots.
+        dt: Δt between knots, s.
+        rate_hz: control rate, 1/s; the plan is shifted by its period from step to step.
+        terminal: P = terminal · Q in (8).
+        velocity_effort: S of (10) on the velocities (positions cost nothing).
+        input_effort: R of (10); None: 0.1 for the base's joints, 0.02 for all others.
+        change_effort: W of (10) on Δu; None: 0.1 for the base's joints, 0 for all others.
+        formulation: "proximal" (upper levels pay for leaving the shifted previous plan, hard rows) or "paper"
+            (every level pays the absolute effort (10), states and inputs softened by relaxed log barriers).
+        lexicographic: constraint (12), "per_coordinate", or (11), "cost".
+        delta_m: δ of (13), by how much a level's error may exceed its best at a knot, m (or rad); for (11) it
+            becomes the cost of that error at every knot.
+        max_iter: MAX_ITER, QPs per level.
+        limits: bounds.
+        obstacles: what the robot keeps clear of, (7c).
+        margin_m: δ_safe of (7c), m.
+        self_collision: keep the arm clear of the base.
+        delay_s: how much later a command acts; the measured state is predicted forward by it. Sample the
+            references that much later too.
+        hold: joints that stay at rest, by name.
+        base: how the base moves; see `kinematics.G`.
+        gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last one serves all
+            further levels.
+        rho: of HTIDKC only, ρ: weight of ‖q̇‖² in every level.
+        solver: which of himpc.qp.SOLVERS.
+    """
+
+    stack: Stack
+    horizon: int = 10
+    dt: float = 0.1
+    rate_hz: float = 10.0
+    terminal: float = 10.0
+    velocity_effort: Weight = 0.1
+    input_effort: Weight | None = None
+    change_effort: Weight | None = None
+    formulation: Formulation = "proximal"
+    lexicographic: Lexicographic = "per_coordinate"
+    delta_m: float = 0.01
+    max_iter: int = 1
+    limits: MotionLimits = field(default_factory=MotionLimits)
+    obstacles: tuple[Obstacle, ...] = ()
+    margin_m: float = 0.05
+    self_collision: bool = False
+    delay_s: float = 0.0
+    hold: tuple[str, ...] = ()
+    base: Base = "holonomic"
+    gains: tuple[float, ...] = (0.5, 0.3)
+    rho: float = 0.01
+    solver: Solver = "daqp"
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.horizon <= MAX_HORIZON:
+            raise InputError(f"horizon is {self.horizon}: give a whole number from 1 to {MAX_HORIZON}")
+        if not 1 <= self.max_iter <= 200:
+            raise InputError(f"max_iter is {self.max_iter}: give a whole number from 1 to 200")
+        for name, low, high, hint in (
+            ("dt", 0.005, 1.0, "0.1 s"),
+            ("rate_hz", 1.0, 200.0, "10"),
+            ("terminal", 0.0, 1e6, "10"),
+            ("delta_m", 0.0, 1.0, "0.01"),
+            ("margin_m", 0.0, 1.0, "0.05"),
+            ("delay_s", 0.0, 1.0, "0"),
+            ("rho", 1e-8, 1e3, "0.01"),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise InputError(f"{name} is {value}: give a number from {low:g} to {high:g}, e.g. {hint}")
+        if not self.gains or not all(0.0 <= gain <= self.rate_hz for gain in self.gains):
+            raise InputError(f"gains are {list(self.gains)}: give numbers from 0 to rate_hz, e.g. 0.5, 0.3")
+        for name, choices in (
+            ("formulation", FORMULATIONS),
+            ("lexicographic", LEXICOGRAPHIC),
+            ("base", BASES),
+            ("solver", SOLVERS),
+        ):
+            if getattr(self, name) not in choices:
+                raise unknown_name(name, str(getattr(self, name)), choices)
+        if not is_installed(self.solver):
+            raise InputError(f"solver '{self.solver}' comes with CasADi: pip install casadi, or take daqp")
+        if self.base == "unicycle":
+            raise InputError(UNICYCLE)
+        check_names(self.stack)
+
+    @property
+    def period(self) -> float:
+        """Control period, s."""
+        return 1.0 / self.rate_hz
+
+
+@dataclass(frozen=True, eq=False)
+class Efforts:
+    """Diagonals of S (velocities), R and W of (10), (n,) each."""
+
+    S: Array
+    R: Array
+    W: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """The bounds in force, (n,) each; infinite where nothing is imposed."""
+
+    q_lower: Array
+    q_upper: Array
+    v: Array
+    a: Array
+    j: Array
+
+
+def efforts(robot: Robot, settings: HTMPCSettings) -> Efforts:
+    """Effort weights per joint. Raises InputError for a list of the wrong length or negative entries."""
+    base = base_joints(robot)
+    return Efforts(
+        _weights(robot, "velocity_effort", settings.velocity_effort, base, 0.0, 0.0),
+        _weights(robot, "input_effort", settings.input_effort, base, 0.1, 0.02),
+        _weights(robot, "change_effort", settings.change_effort, base, 0.1, 0.0),
+    )
+
+
+def bounds(robot: Robot, limits: MotionLimits) -> Bounds:
+    """The robot's limits with switches and scales applied. Raises InputError for a wrong jerk list."""
+    free = np.full(robot.n, np.inf)
+    jerk = _weights(robot, "limits.jerk_limit", limits.jerk_limit, base_joints(robot), 10.0, 80.0)
+    return Bounds(
+        q_lower=robot.q_lower if limits.position else -free,
+        q_upper=robot.q_upper if limits.position else free,
+        v=robot.v_limit * limits.velocity_scale if limits.velocity else free,
+        a=robot.a_max * limits.acceleration_scale if limits.acceleration else free,
+        j=jerk * limits.jerk_scale if limits.jerk else free,
+    )
+
+
+def _weights(
+    robot: Robot, name: str, value: Weight | None, base: tuple[int, ...], of_base: float, of_arm: float
+) -> Array:
+    if value is None:
+        weights = np.full(robot.n, of_arm)
+        weights[list(base)] = of_base
+        return weights
+    weights = np.asarray(value, float)
+    if weights.ndim and weights.shape != (robot.n,):
+        raise InputError(f"{name} has {weights.size} entries: '{robot.name}' has {robot.n} joints")
+    if not (np.isfinite(weights).all() and (weights >= 0).all()):
+        raise InputError(f"{name} is {value}: give finite numbers, at least 0")
+    return np.broadcast_to(weights, (robot.n,))

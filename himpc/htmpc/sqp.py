@@ -1,0 +1,175 @@
+"""SQPSolve of Algorithm 2: Gauss-Newton QPs on STMPC (9), each followed by the tolerant line search (13)."""
+
+from __future__ import annotations
+
+from time import perf_counter_ns
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.avoidance import PENALTY
+from himpc.htmpc.problem import Iterate, Problem
+from himpc.htmpc.rows import KINDS, Rows, joined
+from himpc.htmpc.working_set import solve_by_working_set
+from himpc.qp import QPSolution
+
+Array = NDArray[np.float64]
+
+SHRINK = 0.5
+"""β of the backtracking line search (the HTMPC authors' value)."""
+DECREASE = 0.05
+"""Share of the promised decrease that a step must bring (the authors' value)."""
+BACKTRACKS = 10
+UNCORRECTED = 0.2
+"""Share of δ that a step may take without being led back."""
+CORRECTIONS = 4
+"""So many of the longest steps are led back before they are shortened; see `_led_back`."""
+
+_STILL = 1e-9
+_LEXICOGRAPHIC = KINDS.index("lexicographic")
+_FEASIBLE = 1e-7
+_ROUNDING = 1e-12
+
+
+class Solved(NamedTuple):
+    """The outcome of one level.
+
+    Attributes:
+        at: the inputs found, with their kinematics.
+        status, rung, kkt_residual, steps, unsolved, time_us: see `LevelEvidence`.
+        rows, multipliers: of the last QP.
+    """
+
+    at: Iterate
+    status: str
+    rung: str
+    kkt_residual: float
+    steps: tuple[float, ...]
+    unsolved: int
+    time_us: float
+    rows: Rows
+    multipliers: Array
+
+
+class _Direction(NamedTuple):
+    d: Array
+    """(N, n)"""
+    slope: float
+    """Derivative of the merit along d."""
+    solution: QPSolution
+    rows: Rows
+    rung: str
+    H: Array
+    g: Array
+
+
+def solve_level(problem: Problem, at: Iterate) -> Solved:
+    """At most MAX_ITER steps from an iterate; it ends early when the inputs stand still."""
+    started = perf_counter_ns()
+    steps: list[float] = []
+    residual, rung, unsolved = 0.0, "solve", 0
+    found = None
+    for _ in range(problem.tick.settings.max_iter):
+        found = _direction(problem, at)
+        unsolved += found.rung != "solve"
+        if found.rung != "solve":
+            rung = found.rung
+        if found.rung == "keep":
+            steps.append(0.0)
+            at = at if problem.guards else problem.tick.iterate(problem.tick.brake)
+            break
+        residual = max(residual, found.solution.kkt_residual)
+        before = at.U
+        alpha, at = _line_search(problem, at, found)
+        steps.append(alpha)
+        if float(np.abs(at.U - before).max()) < _STILL:
+            break
+    assert found is not None
+    return Solved(
+        at,
+        found.solution.status,
+        rung,
+        residual,
+        tuple(steps),
+        unsolved,
+        (perf_counter_ns() - started) / 1e3,
+        found.rows,
+        found.solution.multipliers,
+    )
+
+
+def _direction(problem: Problem, at: Iterate) -> _Direction:
+    """The QP's step; when its rows contradict each other, they are moved out to contain full braking."""
+    tick = problem.tick
+    H, g = problem.model(at)
+    rows, slack = problem.rows(at), problem.slack_rows(at)
+    solution = _solve(problem, H, g, rows, slack)
+    rung = "solve"
+    if not solution.solved:
+        # Below the first level d = 0, on it full braking: these satisfy everything that is left.
+        safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
+        rung = "widened"
+        solution = _solve(problem, H, g, rows.widened(safe), slack)
+    every = rows if slack is None else joined(rows, slack)
+    if not solution.solved:
+        return _Direction(np.zeros_like(at.U), 0.0, solution, every, "keep", H, g)
+    size = at.U.size
+    slope = float(g @ solution.x[:size])
+    if slack is not None:
+        slope += PENALTY * (float(solution.x[size:].sum()) - float(at.depths.sum()))
+    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, every, rung, H, g)
+
+
+def _solve(problem: Problem, H: Array, g: Array, rows: Rows, slack: Rows | None) -> QPSolution:
+    """min ½dᵀHd + gᵀd under the rows; with slack rows, plus the price of one slack per knot."""
+    solver = problem.tick.settings.solver
+    if slack is None:
+        first = rows.kind == _LEXICOGRAPHIC
+        return solve_by_working_set(H, g, rows.A, rows.lower, rows.upper, first, solver)
+    k, N = len(g), problem.tick.settings.horizon
+    bought = np.zeros((len(slack.A), N))
+    bought[np.arange(len(slack.A)), slack.knot - 1] = 1.0
+    count = len(rows.A)
+    A = np.zeros((count + len(slack.A) + N, k + N))
+    A[:count, :k] = rows.A
+    A[count:-N, :k], A[count:-N, k:] = slack.A, bought
+    A[-N:, k:] = np.eye(N)
+    extended = np.zeros((k + N, k + N))
+    extended[:k, :k] = H
+    extended[k:, k:] = PENALTY * np.eye(N)
+    lower = np.concatenate([rows.lower, slack.lower, np.zeros(N)])
+    upper = np.concatenate([rows.upper, slack.upper, np.full(N, np.inf)])
+    price = np.concatenate([g, np.full(N, PENALTY)])
+    first = np.arange(len(A)) >= len(A) - N
+    return solve_by_working_set(extended, price, A, lower, upper, first, solver)
+
+
+def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[float, Iterate]:
+    """The largest step 1, β, β², … that (13) allows and that lowers the merit enough; 0 if none does."""
+    tick = problem.tick
+    merit = problem.merit(at)
+    # From outside the bounds the first level has to come back in, whatever that costs.
+    returning = problem.forced and tick.rows.violation(at.U.ravel()) > _FEASIBLE
+    alpha = 1.0
+    for attempt in range(BACKTRACKS + 1):
+        trial = tick.iterate(at.U + alpha * found.d)
+        if returning:
+            return alpha, trial
+        enough = merit + DECREASE * alpha * min(found.slope, 0.0) + _ROUNDING * (1.0 + abs(merit))
+        if problem.corrects and attempt < CORRECTIONS and not problem.allowed(trial, UNCORRECTED):
+            trial = _led_back(problem, at, found, trial)
+        if problem.allowed(trial) and problem.merit(trial) <= enough:
+            return alpha, trial
+        alpha *= SHRINK
+    return 0.0, at
+
+
+def _led_back(problem: Problem, at: Iterate, found: _Direction, trial: Iterate) -> Iterate:
+    """The smallest change (in the Hessian's norm) that undoes what a step took from the levels above.
+
+    The levels' errors are curved: a step along their linear rows leaves (13) by the square of its length, and
+    without this second-order correction only short steps are accepted.
+    """
+    solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), None)
+    return problem.tick.iterate(trial.U + solution.x.reshape(trial.U.shape)) if solution.solved else trial

@@ -1,0 +1,125 @@
+"""Levels as the controller solves them: errors (6), tracking costs (8) and lexicographic constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.kinematics import Knots
+from himpc.htmpc.prediction import integrator
+from himpc.htmpc.rows import Rows
+from himpc.htmpc.settings import HTMPCSettings
+from himpc.stack import Level
+from himpc.tasks import Task
+from robots import InputError, Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """One level, ready to be evaluated.
+
+    Attributes:
+        name: of the level.
+        tasks: of the level.
+        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured: it costs a constant.
+    """
+
+    name: str
+    tasks: tuple[Task, ...]
+    Q: Array
+
+    def errors(self, knots: Knots, desired: dict[str, list[Array]]) -> Array:
+        """e of (6) at knots 1 … N, (N, m)."""
+        return np.hstack([knots.errors(task, desired[task.name][1:]) for task in self.tasks])
+
+    def jacobian(self, knots: Knots, dt: float) -> Array:
+        """∂e_k/∂u at knots 1 … N, (N, m, N·n)."""
+        J = np.concatenate([knots.jacobian(task) for task in self.tasks], axis=1)
+        N, m, n = J.shape
+        T_q = integrator(N, dt).T_q
+        return (J[:, :, None, :] * T_q[:, None, :, None]).reshape(N, m, N * n)
+
+    def cost(self, e: Array) -> float:
+        """J of (8) without its constant first term."""
+        return 0.5 * float((self.Q * e * e).sum())
+
+
+def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
+    """A level with its weights laid out. Raises InputError for weights of the wrong length."""
+    m = sum(len(task.coordinates(robot)) for task in level.tasks)
+    weight = np.asarray(level.Q, float)
+    if weight.ndim and weight.shape != (m,):
+        raise InputError(
+            f"Q of level '{level.name}' has {weight.size} entries: its tasks have {m} coordinates"
+        )
+    Q = np.tile(np.broadcast_to(weight, (m,)), (settings.horizon, 1))
+    Q[-1] *= settings.terminal
+    return Tracking(level.name, level.tasks, Q)
+
+
+def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:
+    """The rule of section III: the tasks' dimensions sum to less than the degrees of freedom.
+
+    Raises:
+        InputError: they do not, so that no freedom is left for the last level.
+    """
+    sizes = {level.name: sum(len(task.coordinates(robot)) for task in level.tasks) for level in levels}
+    total = sum(sizes.values())
+    if len(levels) > 1 and total >= robot.n:
+        listed = " + ".join(f"{size} ('{name}')" for name, size in sizes.items())
+        raise InputError(
+            f"the tasks need {listed} = {total} coordinates and '{robot.name}' has {robot.n} joints: "
+            "their sum must be smaller, so switch a level off or control fewer axes"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """What a level above has reached: the constraint (9c) for the levels below.
+
+    Attributes:
+        tracking: that level.
+        best: e* at knots 1 … N, (N, m).
+    """
+
+    tracking: Tracking
+    best: Array
+
+    def excess(self, e: Array, per_coordinate: bool, delta: float) -> float:
+        """The largest h_i − δ_i of (13); ≤ 0 where a step is allowed.
+
+        (12): h = |e| − |e*| in every coordinate and knot. (11): h = J − J*, with δ_J = ½ Σ w δ².
+        """
+        if per_coordinate:
+            return float((np.abs(e) - np.abs(self.best)).max()) - delta
+        cost = self.tracking.cost
+        return cost(e) - cost(self.best) - 0.5 * float(self.tracking.Q.sum()) * delta**2
+
+    def rows(self, e: Array, E: Array, per_coordinate: bool, strict: bool = False) -> Rows:
+        """(12) or (11) linearised for the change d of the inputs; d = 0 is always inside unless `strict`.
+
+        Args:
+            e: errors at the present iterate, (N, m). E: their Jacobian, (N, m, N·n).
+            per_coordinate: (12) or (11).
+            strict: do not grant what a step has already taken beyond e*.
+        """
+        N, m, k = E.shape
+        if per_coordinate:
+            room = np.abs(self.best) if strict else np.maximum(np.abs(self.best), np.abs(e))
+            return Rows(
+                E.reshape(-1, k),
+                (-room - e).ravel(),
+                (room - e).ravel(),
+                np.full(N * m, 6),
+                np.repeat(np.arange(1, N + 1), m),
+                np.tile(np.arange(m), N),
+            )
+        slope = np.einsum("km,kmj->j", self.tracking.Q * e, E)
+        gap = self.tracking.cost(self.best) - self.tracking.cost(e)
+        gap = gap if strict else max(gap, 0.0)
+        label = np.array([6]), np.array([N]), np.array([0])
+        return Rows(slope[None], np.array([-np.inf]), np.array([gap]), *label)

@@ -1,0 +1,178 @@
+"""The plant as a velocity-controlled platform shows it: commands in rad/s (m/s), tracked by joint servos."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+
+from robots.errors import InputError, unknown_name
+from robots.plant import Plant
+from robots.robot import Robot
+from robots.settings import PlantSettings
+from robots.signals import Motors, PlantState, as_vector
+
+Mode = Literal["ideal", "servo"]
+MODES: tuple[Mode, ...] = ("ideal", "servo")
+
+_STEP = 1e-3  # s, at which servos work
+_RANGES = {
+    "bandwidth": (1.0, 300.0),
+    "lag_ms": (0.0, 1e3),
+    "delay_ms": (0.0, 1e3),
+    "position_noise": (0.0, 1.0),
+    "velocity_noise": (0.0, 10.0),
+}
+
+
+@dataclass(frozen=True)
+class VelocityPlantSettings:
+    """The truth about a velocity-controlled plant. All defaults: ideal kinematics, no noise.
+
+    mode: "ideal": the velocity moves linearly from its present value to the command within each step, so a
+        sampled double integrator is met exactly; "servo": MuJoCo's mechanics under joint velocity servos
+        τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
+    bandwidth: 1/s of the servos. lag_ms: time constant of a first-order lag between command and servo.
+    delay_ms: the command acts this much later.
+    position_noise, velocity_noise: standard deviation of white Gaussian noise on the measured q (rad, m) and
+        v (rad/s, m/s).
+    payload_kg, friction, damping: of the mechanics, "servo" only, as in `PlantSettings`; the servo does not
+        know of friction and damping. saturate: clip at the torque limits.
+
+    Raises InputError, naming the field, for values that cannot be.
+    """
+
+    mode: Mode = "ideal"
+    bandwidth: float = 100.0
+    lag_ms: float = 0.0
+    delay_ms: float = 0.0
+    position_noise: float = 0.0
+    velocity_noise: float = 0.0
+    payload_kg: float = 0.0
+    friction: float | tuple[float, ...] = 0.0
+    damping: float | tuple[float, ...] = 0.0
+    saturate: bool = True
+
+    def __post_init__(self) -> None:
+        if self.mode not in MODES:
+            raise unknown_name("plant.mode", str(self.mode), MODES)
+        for field in fields(self):
+            low, high = _RANGES.get(field.name, (0.0, math.inf))
+            value = getattr(self, field.name)
+            if field.name in _RANGES and not (math.isfinite(value) and low <= value <= high):
+                raise InputError(f"plant.{field.name} is {value}; give a number from {low:g} to {high:g}.")
+        self.mechanics()
+
+    def mechanics(self) -> PlantSettings:
+        """The settings of the mechanics below the servos."""
+        return PlantSettings(
+            payload_kg=self.payload_kg, friction=self.friction, damping=self.damping, saturate=self.saturate
+        )
+
+    @property
+    def latency_ms(self) -> float:
+        """By how much the motion follows a steadily changing command, ms: delay, lag and the servos' own."""
+        own = 1e3 / self.bandwidth if self.mode == "servo" else 0.0
+        return self.delay_ms + self.lag_ms + own
+
+
+class VelocityPlant:
+    """A robot that takes velocity commands. SI units, joints in Pinocchio's order.
+
+    Same settings, seed and calls: same numbers, to the bit.
+    """
+
+    def __init__(self, robot: Robot, settings: VelocityPlantSettings | None = None, seed: int = 0) -> None:
+        """seed: of the measurement noise. Raises InputError for per-joint lists of the wrong length."""
+        self.robot = robot
+        self.seed = seed
+        self.settings = VelocityPlantSettings() if settings is None else settings
+        self._plant = Plant(robot, self.settings.mechanics(), _STEP)
+        self.reset(robot.home)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.robot.n
+
+    @property
+    def t(self) -> float:
+        """Time since the reset, s."""
+        return self._t
+
+    @property
+    def q(self) -> np.ndarray:
+        """(n,) rad or m, the true position."""
+        return self._q.copy()
+
+    @property
+    def v(self) -> np.ndarray:
+        """(n,) rad/s or m/s, the true velocity."""
+        return self._v.copy()
+
+    @property
+    def tau(self) -> np.ndarray | None:
+        """(n,) N·m (N) acting on the joints; None in "ideal" mode, which has no forces."""
+        return self._plant.tau if self.settings.mode == "servo" else None
+
+    def reset(self, q: np.ndarray, v: np.ndarray | None = None) -> None:
+        """Puts the robot at q with velocity v (default 0), as if v had been commanded for long; t = 0.
+
+        Raises ValueError for vectors of the wrong length or with non-finite entries.
+        """
+        self._q = as_vector("q", q, self.n)
+        self._v = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
+        self._t = 0.0
+        self._plant.reset(self._q, self._v)
+        self._commands = Motors(self._v.copy(), 0.0)
+        self._random = np.random.default_rng(self.seed)
+        self._noise = self._random.standard_normal((2, self.n))
+
+    def configure(self, settings: VelocityPlantSettings) -> None:
+        """Changes the plant while it runs: t, q, v and the commands under way stay.
+
+        Raises InputError, and changes nothing, for per-joint lists of the wrong length.
+        """
+        self._plant.configure(settings.mechanics())
+        if self.settings.mode == "ideal" and settings.mode == "servo":
+            self._plant.reset(self._q, self._v)
+        self.settings = settings
+
+    def measure(self) -> PlantState:
+        """The state as the sensors see it. Calling it changes nothing; the noise is new after every step."""
+        settings = self.settings
+        q = self._q + settings.position_noise * self._noise[0]
+        return PlantState(self._t, q, self._v + settings.velocity_noise * self._noise[1])
+
+    def step(self, command: np.ndarray, period: float) -> np.ndarray:
+        """Gives the velocity command (n,) for `period` s; returns the velocity (n,) at its end.
+
+        Raises ValueError for a command that is not n finite numbers: nothing is simulated then.
+        """
+        if not (math.isfinite(period) and period > 0.0):
+            raise ValueError(f"the period is {period} s; it must be positive")
+        settings = self.settings
+        lag, delay = 1e-3 * settings.lag_ms, 1e-3 * settings.delay_ms
+        self._commands.command(as_vector("command", command, self.n), self._t)
+        direct = settings.mode == "ideal" and lag == 0.0 and delay == 0.0
+        count = 1 if direct else max(1, math.ceil(period / _STEP - 1e-9))
+        h = period / count
+        for _ in range(count):
+            wanted = self._commands.advance(self._t, h, delay, lag)
+            if settings.mode == "ideal":
+                self._q = self._q + 0.5 * h * (self._v + wanted)
+                self._v = wanted.copy()
+            else:
+                self._serve(wanted, h)
+            self._t += h
+        self._noise = self._random.standard_normal((2, self.n))
+        return self._v.copy()
+
+    def _serve(self, wanted: np.ndarray, h: float) -> None:
+        """One internal step under the servos' torque."""
+        plant = self._plant
+        push = self.settings.bandwidth * (wanted - self._v)
+        plant.step(plant.mass_matrix() @ push + plant.bias(), h)
+        self._q, self._v = plant.q, plant.v
