@@ -7,11 +7,16 @@ from collections.abc import Callable, Iterable
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lessons.scene import Scene
 from lessons.session import Session
 from lessons.settings import SceneSettings, changed
 from lessons.summary import Recording
 from robots import InputError
+
+Array = NDArray[np.float64]
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
@@ -64,17 +69,33 @@ def run(
     Returns:
         the rows. A run that loses control ends there.
     """
-    seconds = scene.duration if duration is None else duration
-    if not 0 < seconds <= 3600:
-        raise InputError(f"--duration is {seconds} s: give a time above 0 and at most 3600")
+    seconds = checked_duration(scene.duration if duration is None else duration)
     session = Session(scene, seed)
     ticks = max(1, round(seconds / session.settings.T_s))
+    rows, wall_s = repeated(session.tick, ticks, lambda: session.diverged_at is not None, progress)
+    return Recording(session, rows, wall_s)
+
+
+def checked_duration(seconds: float) -> float:
+    """The same number. Raises InputError if nobody can wait that long."""
+    if not 0 < seconds <= 3600:
+        raise InputError(f"--duration is {seconds} s: give a time above 0 and at most 3600")
+    return seconds
+
+
+def repeated(
+    tick: Callable[[], Array],
+    ticks: int,
+    ended: Callable[[], bool],
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[Array], float]:
+    """Copies of the rows of so many ticks, fewer if the run ends by itself, and the wall time in s."""
     rows = []
     started = perf_counter()
     for k in range(ticks):
-        rows.append(session.tick().copy())
-        if session.diverged_at is not None:
+        rows.append(tick().copy())
+        if ended():
             break
         if progress is not None and k % 200 == 0:
             progress(k / ticks)
-    return Recording(session, rows, perf_counter() - started)
+    return rows, perf_counter() - started

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from himpc.telemetry import RUNGS, Layout
 from lessons.events import as_data
 from lessons.session import Session
+from lessons.values import finite, peak
 
 Array = NDArray[np.float64]
 
@@ -78,10 +79,10 @@ def summary(recording: Recording) -> dict[str, Any]:
                 "max": float(recording["iterations"].max()),
             },
             "fallbacks": _fallbacks(recording),
-            "max_kkt_residual": max(_peak(recording[f"kkt/{name}"]) or 0.0 for name in layout.levels),
+            "max_kkt_residual": max(peak(recording[f"kkt/{name}"]) or 0.0 for name in layout.levels),
         },
-        "priority_leak_max": _peak(recording["priority_leak"]),
-        "dynamic_leak_max": _peak(recording["dynamic_leak"]),
+        "priority_leak_max": peak(recording["priority_leak"]),
+        "dynamic_leak_max": peak(recording["dynamic_leak"]),
         "bound_active_share": float((recording["at_bound"] > 0).any(axis=1).mean()) if len(step_ms) else 0.0,
         "step_ms": {
             "median": float(np.median(step_ms)),
@@ -90,7 +91,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         },
         "real_time_factor": recording.duration / recording.wall_s,
     }
-    return _finite(data)
+    return finite(data)
 
 
 def _errors(recording: Recording, task: str, unit: float) -> dict[str, list[float]]:
@@ -135,12 +136,12 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
         return {
             "torque": {
                 # While a limit is being tightened the two sides may differ.
-                "max_ratio": _peak(_share(recording["tau_demand"], recording)),
-                "applied_max_ratio": _peak(_share(recording["tau"], recording)),
+                "max_ratio": peak(_share(recording["tau_demand"], recording)),
+                "applied_max_ratio": peak(_share(recording["tau"], recording)),
             },
-            "velocity": {"max_ratio": _peak(np.abs(v) / _bounded(recording["v_limit"]))},
-            "position": {"max_ratio": _peak(np.abs(q - middle) / half)},
-            "acceleration": {"max_ratio": _peak(np.abs(acceleration) / recording.session.robot.a_max)},
+            "velocity": {"max_ratio": peak(np.abs(v) / _bounded(recording["v_limit"]))},
+            "position": {"max_ratio": peak(np.abs(q - middle) / half)},
+            "acceleration": {"max_ratio": peak(np.abs(acceleration) / recording.session.robot.a_max)},
             # The catalog's torque-controlled arms have no jerk limit.
             "jerk": {"max_ratio": None},
         }
@@ -164,19 +165,6 @@ def _fallbacks(recording: Recording) -> dict[str, int]:
             if code > 0:
                 counts[RUNGS[int(code)]] += 1
     return dict(counts)
-
-
-def _peak(values: Array) -> float | None:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if finite.size else None
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import replace
 from typing import Annotated, Any
 
 import tyro
 
 from app.commands.output import print_table, write_json
+from app.commands.progress import progress_bar
 from robots import InputError
 
 
@@ -16,7 +15,7 @@ def run(
     scene: tyro.conf.Positional[str],
     urdf: str | None = None,
     tip: str | None = None,
-    controller: str = "himpc",
+    controller: str | None = None,
     duration: float | None = None,
     seed: int = 0,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
@@ -29,34 +28,22 @@ def run(
         scene: name of a scene; see himpc-lab scenes.
         urdf: URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
-        controller: which controller; see himpc-lab controllers.
+        controller: which controller instead of the scene's own; see himpc-lab controllers.
         duration: simulated seconds; the scene's own by default.
         seed: seed of the run.
         set: change a setting, e.g. --set horizon=10 --set plant.payload_kg=2 --set levels.2.enabled=false.
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
-    from lessons.run import run as run_scene
-    from lessons.run import with_assignments
-    from lessons.scenes import load_scene
-    from lessons.settings import changed
-    from lessons.summary import arrays, summary
+    from lessons.kinds import arrays_of, find_scene, prepared, run_scene, summary_of
 
-    loaded = load_scene(scene, urdf, tip)
-    settings = with_assignments(changed(loaded.settings, "controller", controller), set)
-    loaded = replace(loaded, settings=settings)
-    if json is None and sys.stderr.isatty():
-        from rich.progress import Progress
-
-        with Progress(transient=True) as bar:
-            task = bar.add_task(f"{scene} …", total=1.0)
-            recording = run_scene(loaded, duration, seed, lambda share: bar.update(task, completed=share))
-    else:
-        recording = run_scene(loaded, duration, seed)
-    result = summary(recording)
+    loaded = prepared(find_scene(scene, urdf, tip), controller, set)
+    with progress_bar(f"{scene} …", json is None) as progress:
+        recording = run_scene(loaded, duration, seed, progress)
+    result = summary_of(recording)
     if npz is not None:
-        how = {"scene": scene, "urdf": urdf, "tip": tip, "controller": controller, "seed": seed}
-        _save(npz, arrays(recording, {**how, "duration": recording.duration, "set": list(set)}))
+        how = {"scene": scene, "urdf": urdf, "tip": tip, "controller": result["controller"], "seed": seed}
+        _save(npz, arrays_of(recording, {**how, "duration": recording.duration, "set": list(set)}))
     if json is not None:
         write_json(result, json)
     else:
@@ -89,18 +76,42 @@ def _show(result: dict[str, Any]) -> None:
     fallbacks = ", ".join(f"{rung} {count}" for rung, count in solver["fallbacks"].items()) or "none"
     pairs = {
         "largest share of its limit": ", ".join(
-            f"{kind} {_figure(limits[kind]['max_ratio'])}" for kind in ("torque", "velocity", "position")
+            f"{kind} {_figure(limits[kind]['max_ratio'])}"
+            for kind in limits
+            if limits[kind]["max_ratio"] is not None
         ),
         "QPs": f"{solver['solves']} ({solver['backend']}, {solver['route']}), unsolved {solver['unsolved']}, "
         f"fallbacks {fallbacks}, largest KKT residual {_figure(solver['max_kkt_residual'])}",
-        "leak into higher levels": f"controller's {_figure(result['priority_leak_max'])}, "
-        f"plant's {_figure(result['dynamic_leak_max'])} m/s² or rad/s²",
+        "leak into higher levels": _leak(result),
+        **_mission(result),
         "control step": f"median {step['median']:.2f} ms, p99 {step['p99']:.2f} ms",
         "speed": f"{result['real_time_factor']:.1f} × real time",
     }
     width = max(map(len, pairs))
     for name, value in pairs.items():
         print(f"{name:{width}}  {value}")
+
+
+def _leak(result: dict[str, Any]) -> str:
+    own = _figure(result["priority_leak_max"])
+    if "line_search" in result:
+        return f"{own} m"
+    return f"controller's {own}, plant's {_figure(result['dynamic_leak_max'])} m/s² or rad/s²"
+
+
+def _mission(result: dict[str, Any]) -> dict[str, str]:
+    """What velocity-level scenes add."""
+    found = {
+        part["name"]: f"base error {_figure(part['normalised_base_error'])} of that at its start on average, "
+        f"{_figure(part['final_base_error'])} at its end; hand {_figure(part['ee_error_mm']['mean'])} mm "
+        f"on average, {_figure(part['ee_error_mm']['max'])} mm at most"
+        for part in result.get("parts", ())
+    }
+    if result.get("base_path_m") is not None:
+        found["way of the base"] = f"{result['base_path_m']:.2f} m"
+    if result.get("completed"):
+        found["mission"] = f"completed after {result['completion_time_s']:.1f} s"
+    return found
 
 
 def _figure(value: float | None) -> str:

@@ -12,5 +12,6 @@ def scenes(json: str | None = None) -> int:
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.scenes import SCENES
+    from lessons.scenes.mobile import MOBILE_SCENES
 
-    return print_list("Scenes", "scene", SCENES, json)
+    return print_list("Scenes", "scene", SCENES | MOBILE_SCENES, json)

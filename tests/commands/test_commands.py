@@ -128,7 +128,9 @@ def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
     assert set(result["limits"]) == {"torque", "velocity", "position", "acceleration", "jerk"}
     assert set(result["limits"]["torque"]) == {"max_ratio", "applied_max_ratio"}
     solver = result["solver"]
-    assert set(solver) == {"backend", "route", "solves", "unsolved", "fallbacks", "max_kkt_residual"}
+    assert set(solver) == {
+        *("backend", "route", "solves", "unsolved", "fallbacks", "max_kkt_residual", "iterations"),
+    }
     assert (solver["backend"], solver["route"], solver["solves"]) == ("daqp", "structured", 150)
     assert set(result["step_ms"]) == {"median", "p99", "max"}
 

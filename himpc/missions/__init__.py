@@ -1,0 +1,19 @@
+"""Task sequences for hierarchical-task control: missions as data, and the manager that walks through them."""
+
+from himpc.missions.manager import Active, Progress, advanced, insert, move, release, remove, reorder
+from himpc.missions.mission import Follow, Go, Mission, MissionTask
+
+__all__ = [
+    "Active",
+    "Follow",
+    "Go",
+    "Mission",
+    "MissionTask",
+    "Progress",
+    "advanced",
+    "insert",
+    "move",
+    "release",
+    "remove",
+    "reorder",
+]

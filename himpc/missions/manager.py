@@ -1,0 +1,203 @@
+"""The task manager of the HTMPC paper's section IV: which tasks the controller is given, as pure functions.
+
+At any time the controller sees the window [𝒯_{l₀}, …, 𝒯_{l₀+L−1}]; when 𝒯_{l₀} is completed l₀ grows by
+one. A task is planned at the moment it enters the window, from where its point is then; a task that is moved
+is planned again at the next call of `advanced`, one that is inserted when the window reaches it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.missions.mission import Go, Mission, MissionTask, Point, check_mission, find
+from himpc.references import Reference
+from robots import InputError
+
+Array = NDArray[np.float64]
+
+_CLOCK = 1e-9
+"""s: rounding that a sum of control periods may carry."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Active:
+    """A task in the window.
+
+    Attributes:
+        task: the task.
+        reference: its planned motion.
+        counts_from: when its goal begins to count, s.
+        reached: since when it has been at its goal as the first task, s; None: it is not there.
+    """
+
+    task: MissionTask
+    reference: Reference
+    counts_from: float
+    reached: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Progress:
+    """How far a mission has come.
+
+    Attributes:
+        mission: all tasks, done ones included.
+        place: l₀, the index of the first task in the window; the number of tasks when all are done.
+        window: the tasks given to the controller, highest priority first.
+        released: names of tasks whose hold has been released.
+        completed: (name, time in s) of every completed task, in order.
+    """
+
+    mission: Mission
+    place: int = 0
+    window: tuple[Active, ...] = ()
+    released: frozenset[str] = frozenset()
+    completed: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        check_mission(self.mission)
+
+    @property
+    def done(self) -> bool:
+        """Whether every task is completed."""
+        return self.place == len(self.mission)
+
+
+def advanced(
+    progress: Progress, L: int, t: float, points: Mapping[str, Array], speeds: Mapping[str, float]
+) -> Progress:
+    """The progress at time t: completed tasks leave the window, later ones enter it and are planned.
+
+    When the mission is done its last window stays: the robot stays where it ended.
+
+    Args:
+        progress: so far.
+        L: tasks in the window, ≥ 1.
+        t: s.
+        points: where each role's point is, (m,) m.
+        speeds: how fast it moves, m/s.
+    """
+    while not progress.done:
+        window = _window(progress, L, t, points)
+        first = _watched(window[0], t, points, speeds)
+        window = (first, *window[1:])
+        if not _completed(first, progress.released, t):
+            return replace(progress, window=window)
+        progress = replace(
+            progress,
+            place=progress.place + 1,
+            window=window,
+            completed=(*progress.completed, (first.task.name, t)),
+        )
+    return progress
+
+
+def _window(progress: Progress, L: int, t: float, points: Mapping[str, Array]) -> tuple[Active, ...]:
+    known = {active.task: active for active in progress.window}
+    return tuple(
+        known.get(task) or Active(task, *task.motion.planned(points[task.role], t))
+        for task in progress.mission[progress.place : progress.place + max(L, 1)]
+    )
+
+
+def _watched(first: Active, t: float, points: Mapping[str, Array], speeds: Mapping[str, float]) -> Active:
+    task = first.task
+    goal = np.array(task.motion.goal) if isinstance(task.motion, Go) else _now(first.reference, t)
+    there = (
+        t >= first.counts_from - _CLOCK
+        and float(np.linalg.norm(points[task.role] - goal)) <= task.tolerance
+        and speeds[task.role] <= task.rest
+    )
+    if not there:
+        return replace(first, reached=None)
+    return first if first.reached is not None else replace(first, reached=t)
+
+
+def _now(reference: Reference, t: float) -> Array:
+    return reference.preview(t, 1.0, 0).value
+
+
+def _completed(first: Active, released: frozenset[str], t: float) -> bool:
+    if first.reached is None:
+        return False
+    if first.task.hold is None:
+        return first.task.name in released
+    return t - first.reached >= first.task.hold - _CLOCK
+
+
+def release(progress: Progress, name: str) -> Progress:
+    """Ends the hold of a task; one that is not at its goal yet will not wait there.
+
+    Raises:
+        InputError: no such task, or it does not wait for a release.
+    """
+    task = progress.mission[find(progress.mission, name)]
+    if task.hold is not None:
+        raise InputError(f"task '{name}' waits {task.hold:g} s by itself: release one with hold null")
+    return replace(progress, released=progress.released | {name})
+
+
+def move(progress: Progress, name: str, goal: Point) -> Progress:
+    """Puts a task's goal elsewhere (m); points on the way are dropped, law and speed stay.
+
+    Raises:
+        InputError: no such task, it is completed, it follows a given trajectory, or the goal does not fit.
+    """
+    place = _ahead(progress, name)
+    task = progress.mission[place]
+    if not isinstance(task.motion, Go):
+        raise InputError(f"task '{name}' follows a given trajectory: it cannot be moved")
+    if len(goal) != len(task.motion.goal):
+        raise InputError(f"the goal of task '{name}' needs {len(task.motion.goal)} numbers, not {len(goal)}")
+    moved = replace(task, motion=replace(task.motion, goal=goal, via=()))
+    return replace(progress, mission=_spliced(progress.mission, place, place + 1, moved))
+
+
+def insert(progress: Progress, task: MissionTask, before: str | None = None) -> Progress:
+    """Puts a new task before another one, or at the end.
+
+    Raises:
+        InputError: the other task is unknown or completed, or the name is taken.
+    """
+    place = len(progress.mission) if before is None else _ahead(progress, before)
+    return replace(progress, mission=_spliced(progress.mission, place, place, task))
+
+
+def reorder(progress: Progress, name: str, to: int) -> Progress:
+    """Puts a task at another place among those that are not completed, 0 being the first; plans are kept.
+
+    Raises:
+        InputError: no such task, it is completed, or there is no such place.
+    """
+    place = _ahead(progress, name)
+    left = len(progress.mission) - progress.place
+    if not 0 <= to < left:
+        raise InputError(f"task '{name}' cannot go to place {to}: there are places 0 to {left - 1}")
+    mission = list(progress.mission)
+    mission.insert(progress.place + to, mission.pop(place))
+    return replace(progress, mission=tuple(mission))
+
+
+def remove(progress: Progress, name: str) -> Progress:
+    """Takes a task out.
+
+    Raises:
+        InputError: no such task, it is completed, or it is the only one.
+    """
+    place = _ahead(progress, name)
+    return replace(progress, mission=_spliced(progress.mission, place, place + 1))
+
+
+def _ahead(progress: Progress, name: str) -> int:
+    place = find(progress.mission, name)
+    if place < progress.place:
+        raise InputError(f"task '{name}' is completed: choose one that is still ahead")
+    return place
+
+
+def _spliced(mission: Mission, start: int, end: int, *tasks: MissionTask) -> Mission:
+    return (*mission[:start], *tasks, *mission[end:])

@@ -1,0 +1,119 @@
+"""A mission: the ordered tasks 𝒯₁, 𝒯₂, … that the HTMPC paper's motion planner hands to its task manager."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.references import Hold, Law, Path, Reference, Started
+from robots import InputError
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+Point = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Go:
+    """Towards a goal: a waypoint (x_d is the goal at once) or, with a cruise speed, a planned path.
+
+    Attributes:
+        goal: m, world.
+        cruise: m/s; None: a waypoint.
+        law: time law of the path.
+        via: points of the path on the way, m; they need a cruise speed.
+    """
+
+    goal: Point
+    cruise: float | None = None
+    law: Law = "quintic"
+    via: tuple[Point, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(x) for point in (self.goal, *self.via) for x in point):
+            raise InputError(f"goal {list(self.goal)} or a point on the way to it is not finite")
+        if any(len(point) != len(self.goal) for point in self.via):
+            raise InputError(f"every point on the way to {list(self.goal)} needs {len(self.goal)} numbers")
+        if self.via and self.cruise is None:
+            raise InputError("points on the way need a cruise speed: give one, e.g. 0.5 m/s")
+
+    def planned(self, start: Array, t: float) -> tuple[Reference, float]:
+        """The reference from a start (m,) at time t (s), and the time from which the goal counts, s."""
+        if self.cruise is None:
+            return Hold(np.array(self.goal)), t
+        path = Path(np.array([start, *self.via, self.goal], float), self.cruise, self.law, t)
+        return path, t + path.duration if self.via else t
+
+
+@dataclass(frozen=True, eq=False)
+class Follow:
+    """A given trajectory.
+
+    Attributes:
+        reference: its own time begins when the task enters the window.
+        duration: s after which its last point counts as the goal; infinite: it never ends.
+    """
+
+    reference: Reference
+    duration: float = math.inf
+
+    def planned(self, start: Array, t: float) -> tuple[Reference, float]:
+        """The reference from time t (s) on, and the time at which it ends, s."""
+        return Started(self.reference, t), t + self.duration
+
+
+@dataclass(frozen=True, eq=False)
+class MissionTask:
+    """One tracking task 𝒯_l.
+
+    It is completed when its point has stayed within `tolerance` of the goal, no faster than `rest`, for
+    `hold` seconds while the task was the first one in the window.
+
+    Attributes:
+        name: stable identity; events refer to it.
+        role: which point of the robot it moves, e.g. "ee" or "base".
+        motion: where to.
+        tolerance: m.
+        hold: s; None: for as long as it takes until the task is released by an event.
+        rest: m/s; infinite: it may be passed at any speed.
+    """
+
+    name: str
+    role: str
+    motion: Go | Follow
+    tolerance: float = 0.02
+    hold: float | None = 0.0
+    rest: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Raises InputError for a tolerance, hold or rest that cannot be."""
+        if not (math.isfinite(self.tolerance) and self.tolerance > 0):
+            raise InputError(f"tolerance of task '{self.name}' is {self.tolerance} m: give a number above 0")
+        if self.hold is not None and not (math.isfinite(self.hold) and self.hold >= 0):
+            raise InputError(f"hold of task '{self.name}' is {self.hold} s: give 0 or more, or null")
+        if not self.rest > 0:
+            raise InputError(f"rest of task '{self.name}' is {self.rest} m/s: give a number above 0")
+
+
+Mission = tuple[MissionTask, ...]
+
+
+def check_mission(mission: Mission) -> None:
+    """Raises InputError for a mission without tasks or with two tasks of one name."""
+    if not mission:
+        raise InputError("a mission needs at least one task")
+    names = [task.name for task in mission]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"task name '{name}' stands twice in the mission: rename one of them")
+
+
+def find(mission: Mission, name: str) -> int:
+    """The place of a task. Raises InputError, naming the nearest one, if there is none of that name."""
+    names = [task.name for task in mission]
+    if name not in names:
+        raise unknown_name("task of the mission called", name, names)
+    return names.index(name)

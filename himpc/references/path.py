@@ -1,0 +1,85 @@
+"""What the EE and base planners produce: straight or quintic motion through points at a cruise speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+
+from himpc.references.preview import Array, Preview, sampled, times
+from himpc.references.waypoints import Waypoints
+from robots import InputError
+from robots.errors import unknown_name
+
+Law = Literal["straight", "quintic"]
+LAWS: tuple[Law, ...] = get_args(Law)
+
+_PEAK = 1.875
+"""Largest rate of 10σ³ − 15σ⁴ + 6σ⁵: a quintic segment's mean speed is its peak over this."""
+_SAME = 1e-9
+"""m: points closer than this are one point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """x_d runs along the straight lines between points, at most at the cruise speed.
+
+    `straight` moves at the cruise speed all the way, corners included: the velocity jumps at the start, at
+    corners and at the end. `quintic` is at rest at every point, reaches the cruise speed in the middle of
+    each line, and has a continuous acceleration. Before `start` and after the end x_d stands still.
+
+    Attributes:
+        points: (P, m) m, P ≥ 1; the first one is where it starts.
+        cruise: largest speed, m/s.
+        law: "straight" or "quintic".
+        start: when the motion starts, s.
+    """
+
+    points: Array
+    cruise: float
+    law: Law = "quintic"
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raises InputError for a speed, a law or points that cannot be."""
+        if not (np.isfinite(self.cruise) and self.cruise > 0):
+            raise InputError(f"cruise speed is {self.cruise} m/s: give a finite number above 0, e.g. 0.5")
+        if self.law not in LAWS:
+            raise unknown_name("law of a path", self.law, LAWS)
+        if self.points.ndim != 2 or not len(self.points) or not np.isfinite(self.points).all():
+            raise InputError("a path needs at least one point of finite coordinates")
+
+    @property
+    def duration(self) -> float:
+        """Seconds from start to end."""
+        return float(self._arrivals[-1])
+
+    @cached_property
+    def _corners(self) -> Array:
+        apart = np.linalg.norm(np.diff(self.points, axis=0), axis=1) > _SAME
+        return self.points[np.append(True, apart)]
+
+    @cached_property
+    def _arrivals(self) -> Array:
+        """Seconds after the start at which each corner is reached."""
+        lengths = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)
+        slower = _PEAK if self.law == "quintic" else 1.0
+        return np.append(0.0, np.cumsum(lengths)) * slower / self.cruise
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        since = t - self.start
+        if self.law == "quintic" or len(self._corners) == 1:
+            return Waypoints(self._corners, self._arrivals).preview(since, T_s, N)
+        clock = times(since, T_s, N)
+        position = np.array([np.interp(clock, self._arrivals, axis) for axis in self._corners.T]).T
+        line = np.clip(np.searchsorted(self._arrivals, clock, side="right") - 1, 0, len(self._corners) - 2)
+        moving = (clock >= 0) & (clock < self.duration)
+        slopes = np.diff(self._corners, axis=0) / np.diff(self._arrivals)[:, None]
+        return sampled(position, slopes[line] * moving[:, None], np.zeros_like(position))
+
+
+def segment(start: Array, goal: Array, cruise: float, law: Law = "quintic", at: float = 0.0) -> Path:
+    """The path from one point to another; `at`: when it starts, s."""
+    return Path(np.array([start, goal], float), cruise, law, at)

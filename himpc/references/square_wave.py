@@ -1,0 +1,36 @@
+"""A square wave: the test signal of the HTMPC paper's section V."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from himpc.references.preview import Array, Preview, sampled, times
+
+_EARLY = 1e-9
+"""s: a switch counts as reached this much early, so that adding up periods cannot miss it by a rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class SquareWave:
+    """x_d is the peak for half a period, then the valley for half a period, and so on; ẋ_d = ẍ_d = 0.
+
+    Attributes:
+        peak, valley: (m,) m.
+        half_period: s.
+        waves: after this many periods x_d stays in the valley; None: it goes on for ever.
+    """
+
+    peak: Array
+    valley: Array
+    half_period: float = 8.0
+    waves: int | None = None
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        half = np.floor((times(t, T_s, N) + _EARLY) / self.half_period)
+        down = half % 2 == 1
+        if self.waves is not None:
+            down |= half >= 2 * self.waves
+        position = np.where(down[:, None], self.valley, self.peak)
+        return sampled(position, np.zeros_like(position), np.zeros_like(position))

@@ -1,0 +1,93 @@
+"""Torque-level and velocity-level scenes behind one set of functions: the scene's kind chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+from himpc.controllers import CONTROLLERS
+from lessons.mobile.run import mobile_run
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.settings import VELOCITY_CONTROLLERS
+from lessons.mobile.settings import changed as changed_mobile
+from lessons.mobile.settings import paths as mobile_paths
+from lessons.mobile.summary import MobileRecording, mobile_arrays, mobile_summary
+from lessons.run import parse_assignment, run, with_assignments
+from lessons.scene import Scene
+from lessons.scenes import load_scene
+from lessons.scenes.mobile import MOBILE_SCENES, mobile_scene
+from lessons.settings import changed, paths
+from lessons.summary import Recording, arrays, summary
+from robots import InputError
+
+AnyScene = Scene | MobileScene
+AnyRecording = Recording | MobileRecording
+
+
+def find_scene(name: str, urdf: str | None = None, tip: str | None = None) -> AnyScene:
+    """A scene of either kind by its name. Raises InputError like `load_scene`."""
+    if name not in MOBILE_SCENES:
+        return load_scene(name, urdf, tip)
+    if urdf is not None or tip is not None:
+        raise InputError(f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf and --tip")
+    return mobile_scene(name)
+
+
+def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:
+    """The scene with another controller (None: its own) and every "PATH=VALUE", in order.
+
+    Raises:
+        InputError: unknown controller or one of the other kind, unknown path, or a value that does not fit.
+    """
+    if isinstance(scene, Scene):
+        if controller in VELOCITY_CONTROLLERS:
+            raise InputError(
+                f"controller '{controller}' commands velocities and scene '{scene.name}' takes torques: "
+                "choose one of the scenes ridgeback-ur10-…, iiwa14-htmpc or panda-htmpc"
+            )
+        settings = scene.settings if controller is None else changed(scene.settings, "controller", controller)
+        return replace(scene, settings=with_assignments(settings, assignments))
+    if controller in CONTROLLERS:
+        raise InputError(
+            f"controller '{controller}' commands torques and scene '{scene.name}' takes velocities: "
+            f"choose one of {', '.join(VELOCITY_CONTROLLERS)}"
+        )
+    mobile = scene.settings
+    for path, value in _assigned(controller, assignments):
+        mobile = changed_mobile(mobile, path, value)
+    return replace(scene, settings=mobile)
+
+
+def paths_of(scene: AnyScene) -> list[str]:
+    """Every path that `prepared` takes for a scene."""
+    return paths(scene.settings) if isinstance(scene, Scene) else mobile_paths(scene.settings)
+
+
+def _assigned(controller: str | None, assignments: Iterable[str]) -> list[tuple[str, Any]]:
+    chosen = [] if controller is None else [("controller", controller)]
+    return [*chosen, *map(parse_assignment, assignments)]
+
+
+def run_scene(
+    scene: AnyScene,
+    duration: float | None = None,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> AnyRecording:
+    """Runs a scene headless; see `lessons.run.run` and `lessons.mobile.run.mobile_run`."""
+    if isinstance(scene, Scene):
+        return run(scene, duration, seed, progress)
+    return mobile_run(scene, duration, seed, progress)
+
+
+def summary_of(recording: AnyRecording) -> dict[str, Any]:
+    """The object of `himpc-lab run --json`."""
+    return summary(recording) if isinstance(recording, Recording) else mobile_summary(recording)
+
+
+def arrays_of(recording: AnyRecording, how: dict[str, Any]) -> dict[str, Any]:
+    """The arrays of `himpc-lab run --npz`; see `lessons.summary.arrays`."""
+    if isinstance(recording, Recording):
+        return arrays(recording, how)
+    return mobile_arrays(recording, how)

@@ -1,0 +1,1 @@
+"""Velocity-level scenes: missions for a mobile manipulator, their headless session and its summary."""

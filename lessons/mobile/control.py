@@ -1,0 +1,45 @@
+"""The velocity-level controllers behind one interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, HTMPCSettings, VelocityPlan
+from himpc.references import Preview
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+
+class VelocityController(Protocol):
+    """What a velocity-level session needs of a controller."""
+
+    @property
+    def settings(self) -> HTMPCSettings:
+        """The settings in use."""
+        ...
+
+    def configure(self, settings: HTMPCSettings) -> None:
+        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        ...
+
+    def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
+        """One control period; never raises for a state, and the motion is finite."""
+        ...
+
+
+_MAKERS: dict[str, Callable[[Robot, HTMPCSettings], VelocityController]] = {
+    "htmpc": HTMPC,
+    "htmpc_wpt": HTMPC_WPT,
+    "stmpc": STMPC,
+    "htidkc": HTIDKC,
+}
+
+
+def make_velocity_controller(name: str, robot: Robot, settings: HTMPCSettings) -> VelocityController:
+    """A controller by its name. Raises InputError for settings that do not fit the robot."""
+    return _MAKERS[name](robot, settings)

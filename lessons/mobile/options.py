@@ -1,0 +1,245 @@
+"""What the velocity-level scenes ask of the robot: each scene's choices, and the mission they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.missions import Follow, Go, Mission, MissionTask
+from himpc.references import Hold, SquareWave
+from robots import InputError
+from robots.collision import Ball, Box, Floor, Obstacle
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+Home = Mapping[str, Array]
+Architecture = Literal["hierarchical", "single_task", "decoupled"]
+ARCHITECTURES: tuple[Architecture, ...] = ("hierarchical", "single_task", "decoupled")
+"""How a sequence is carried out: two tasks at a time (L = 2); one at a time by the whole body (L = 1); or one
+at a time by a part of it: the base drives with the arm at rest, then the arm moves and the base may turn. In
+the last one nothing plans for the arm: folded against its limits it may not get to a goal behind it."""
+
+
+@dataclass(frozen=True)
+class MobileOptions:
+    """The choices of a scene; each field is a path of its own (`--set peak=[-2,1]`)."""
+
+    parts: ClassVar[tuple[str, ...]] = ()
+    """Names of equally long parts of the run that are judged apart."""
+
+    @property
+    def part_s(self) -> float:
+        """Length of each part, s."""
+        return 0.0
+
+    def mission(self, home: Home) -> Mission:
+        """The tasks. Args: home: where each role's point is at the start, (m,) m."""
+        raise NotImplementedError
+
+    @property
+    def L(self) -> int:
+        """Tasks in the window."""
+        return 2
+
+    @property
+    def decoupled(self) -> bool:
+        """Whether the arm stands still while the base has its task, and the other way round."""
+        return False
+
+
+@dataclass(frozen=True)
+class ArchitectureOptions(MobileOptions):
+    """Scenes that compare architectures.
+
+    Attributes:
+        architecture: one of ARCHITECTURES.
+    """
+
+    architecture: Architecture = "hierarchical"
+
+    def __post_init__(self) -> None:
+        """Raises InputError for choices that cannot be."""
+        if self.architecture not in ARCHITECTURES:
+            raise unknown_name("architecture", self.architecture, ARCHITECTURES)
+
+    @property
+    def L(self) -> int:
+        return 2 if self.architecture == "hierarchical" else 1
+
+    @property
+    def decoupled(self) -> bool:
+        return self.architecture == "decoupled"
+
+
+@dataclass(frozen=True)
+class Stay(MobileOptions):
+    """Both targets stay where they are until somebody drags them."""
+
+    def mission(self, home: Home) -> Mission:
+        return tuple(MissionTask(role, role, _staying(point), hold=None) for role, point in home.items())
+
+
+def _staying(point: Array) -> Go | Follow:
+    return Go(tuple(point.tolist())) if point.ndim == 1 else Follow(Hold(point))
+
+
+@dataclass(frozen=True)
+class SquareOptions(MobileOptions):
+    """Section V-A: the EE holds its home position while the base is sent to a peak and back.
+
+    Attributes:
+        peak: m, world; the default lies 2.2 m from the EE's home.
+        half_period: s, length of each part.
+    """
+
+    peak: tuple[float, ...] = (0.4, -1.75)
+    half_period: float = 8.0
+
+    parts: ClassVar[tuple[str, ...]] = ("peak", "valley")
+
+    def __post_init__(self) -> None:
+        if len(self.peak) != 2:
+            raise InputError(f"peak has {len(self.peak)} numbers: give x and y, e.g. [-2, 1]")
+        if not self.half_period > 0:
+            raise InputError(f"half_period is {self.half_period} s: give a number above 0")
+
+    @property
+    def part_s(self) -> float:
+        return self.half_period
+
+    def mission(self, home: Home) -> Mission:
+        wave = SquareWave(np.array(self.peak), home["base"], self.half_period, waves=1)
+        return (
+            MissionTask("ee", "ee", Follow(Hold(home["ee"]))),
+            MissionTask("base", "base", Follow(wave)),
+        )
+
+
+def random_peaks(seed: int, count: int, ee_home: Array) -> list[tuple[float, float]]:
+    """Peaks out of reach, m: 1.83 + U(0.25, 0.5) m from the EE's home, less than 3 m from the origin."""
+    rng = np.random.default_rng(seed)
+    peaks: list[tuple[float, float]] = []
+    while len(peaks) < count:
+        radius, angle = 1.83 + rng.uniform(0.25, 0.5), rng.uniform(-np.pi, np.pi)
+        x, y = ee_home[:2] + radius * np.array([np.cos(angle), np.sin(angle)])
+        if np.hypot(x, y) < 3.0:
+            peaks.append((float(x), float(y)))
+    return peaks
+
+
+CRUISE = 0.5
+"""m/s, of the planned base and EE paths."""
+
+
+@dataclass(frozen=True)
+class WaypointOptions(ArchitectureOptions):
+    """Fig. 8: two EE waypoints; in between the base goes past the first one.
+
+    The hierarchical architecture sends the base straight to its place for the second waypoint. The
+    single-task one sends it first to a place at a predefined distance from the first waypoint.
+
+    Attributes:
+        height: m, of the first EE waypoint.
+        hold_s: s at each EE waypoint.
+    """
+
+    height: float = 0.8
+    hold_s: float = 1.0
+
+    def mission(self, home: Home) -> Mission:
+        first, second = (2.4, 2.2, self.height), (6.0, 0.5, 0.8)
+        base = Go((4.8, 0.0), CRUISE)
+        ee_1 = MissionTask("ee 1", "ee", Go(first, CRUISE), 0.02, self.hold_s)
+        ee_2 = MissionTask("ee 2", "ee", Go(second, CRUISE), 0.02, self.hold_s)
+        if self.architecture != "hierarchical":
+            beside = MissionTask("base 1", "base", Go((2.0, 1.4), CRUISE), 0.05, rest=0.02)
+            return (beside, ee_1, MissionTask("base 2", "base", base, 0.05, rest=0.02), ee_2)
+        # With nothing below it the last EE task would take the base along.
+        stay = MissionTask("stay", "base", base, 0.8)
+        return (ee_1, MissionTask("base 2", "base", base, 0.8), ee_2, stay)
+
+
+SEATS: tuple[tuple[tuple[float, float, float], tuple[float, float]], ...] = (
+    ((2.5, 1.0, 0.8), (1.75, 0.703)),
+    ((0.0, 2.0, 0.8), (0.0, 1.2)),
+    ((-2.5, 1.0, 0.8), (-1.75, 0.703)),
+    ((-2.5, -1.0, 0.8), (-1.75, -0.703)),
+    ((0.0, -2.0, 0.8), (0.0, -1.2)),
+    ((2.5, -1.0, 0.8), (1.75, -0.703)),
+)
+"""(hand of the person, place of the base), m, anticlockwise from (2.5, 1)."""
+
+
+@dataclass(frozen=True)
+class DeliveryOptions(ArchitectureOptions):
+    """Section V-D: something is delivered to three people, for some rounds.
+
+    Attributes:
+        seats: which of SEATS the people sit on, in the order of the visits.
+        rounds: how often everybody is visited.
+        hold_s: s the EE stays at a person's hand; null: until the person takes the ball (event Release).
+        cruise: m/s of the planned base paths.
+    """
+
+    seats: tuple[float, ...] = (0, 2, 5)
+    rounds: int = 4
+    hold_s: float | None = 1.0
+    cruise: float = CRUISE
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.seats or any(seat not in range(len(SEATS)) for seat in self.seats):
+            raise InputError(f"seats are {list(self.seats)}: give whole numbers from 0 to {len(SEATS) - 1}")
+        if self.rounds < 1:
+            raise InputError(f"rounds is {self.rounds}: give 1 or more")
+
+    def mission(self, home: Home) -> Mission:
+        tasks: list[MissionTask] = []
+        for visit, seat in enumerate([int(seat) for seat in self.seats] * self.rounds, start=1):
+            hand, place = SEATS[seat]
+            motion = Go(place, self.cruise)
+            if self.architecture != "hierarchical":
+                tasks.append(MissionTask(f"base {visit}", "base", motion, 0.05, rest=0.02))
+            else:
+                tasks.append(MissionTask(f"base {visit}", "base", motion, 0.8))
+            tasks.append(MissionTask(f"ee {visit}", "ee", Go(hand), 0.02, self.hold_s))
+        return tuple(tasks)
+
+
+@dataclass(frozen=True)
+class HandoverOptions(DeliveryOptions):
+    """The start of a delivery round in which every ball waits until it is taken (event Release)."""
+
+    seats: tuple[float, ...] = (1, 3)
+    rounds: int = 1
+    hold_s: float | None = None
+
+
+CLUTTER: tuple[Obstacle, ...] = (
+    Floor(),
+    Box("table", (2.0, 0.95, 0.4), (1.2, 0.5, 0.8)),
+    Ball("bin", (1.6, -1.0, 0.3), 0.3),
+    Ball("lamp", (3.4, 0.55, 1.3), 0.2),
+)
+"""Obstacles on both sides of the way."""
+
+
+@dataclass(frozen=True)
+class ClutteredOptions(MobileOptions):
+    """The base is sent past obstacles; the EE goes first to a place beside the way.
+
+    Attributes:
+        goal: m, where the base is sent.
+    """
+
+    goal: tuple[float, ...] = (4.0, 0.0)
+
+    def mission(self, home: Home) -> Mission:
+        return (
+            MissionTask("ee", "ee", Go((4.9, 0.2, 0.9)), hold=3.0),
+            MissionTask("base", "base", Go(self.goal), 0.02),
+        )

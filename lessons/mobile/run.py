@@ -1,0 +1,38 @@
+"""Running a velocity-level scene headless."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.session import MobileSession
+from lessons.mobile.summary import MobileRecording
+from lessons.run import checked_duration, repeated
+
+
+def mobile_run(
+    scene: MobileScene,
+    duration: float | None = None,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> MobileRecording:
+    """Runs a scene from its start to the end of its mission, or for at most its duration.
+
+    Args:
+        scene: what to run.
+        duration: simulated seconds at most; None: the scene's own.
+        seed: seed of the run.
+        progress: called now and then with the share that is done.
+
+    Returns:
+        the rows. A run that loses control ends there.
+    """
+    seconds = checked_duration(scene.duration if duration is None else duration)
+    session = MobileSession(scene, seed)
+    ticks = max(1, round(seconds / session.settings.htmpc.period))
+
+    def ended() -> bool:
+        return session.diverged_at is not None or session.progress.done
+
+    rows, wall_s = repeated(session.tick, ticks, ended, progress)
+    return MobileRecording.of(session, rows, wall_s)

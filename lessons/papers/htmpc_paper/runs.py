@@ -1,0 +1,82 @@
+"""The runs of the HTMPC paper's section V as jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lessons.jobs import Job, Run
+from lessons.kinds import find_scene, prepared
+from lessons.mobile.options import random_peaks
+from lessons.mobile.run import mobile_run
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.summary import mobile_summary
+
+Array = NDArray[np.float64]
+
+SOURCE = "HTMPC paper, section V"
+SQUARE = "ridgeback-ur10-square"
+PEAKS_SEED = 0
+EE_HOME = np.array([1.490, 0.174])
+"""m: about it the peaks lie."""
+METHODS = {"htmpc": "HTMPC", "htmpc_wpt": "HTMPC_WPT", "htidkc": "HTIDKC"}
+_KEPT = ("t", "q", "v", "tau", "step_us")
+
+
+@dataclass(frozen=True)
+class MobileJob(Job):
+    """A run of a velocity-level scene."""
+
+    controller: str = "htmpc"
+
+    def prepared(self) -> MobileScene:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The scene with controller and assignments. Raises InputError for what cannot be."""
+        scene = prepared(find_scene(self.scene), self.controller, self.set)
+        assert isinstance(scene, MobileScene)
+        return scene
+
+    def do(self) -> Run:
+        """The run. Raises InputError for what cannot be."""
+        recording = mobile_run(self.prepared(), self.duration, self.seed)
+        fields = recording.session.layout.fields
+        kept = [*_KEPT, *(name for name in fields if name.startswith(("x/", "x_d/", "error/", "step/")))]
+        arrays = {name: np.ascontiguousarray(recording[name]) for name in kept}
+        return Run(self, mobile_summary(recording), arrays)
+
+
+def peaks(quick: bool) -> list[tuple[float, float]]:
+    """The peak targets of the random square waves, 25, or 4 in the quick version."""
+    return random_peaks(PEAKS_SEED, 4 if quick else 25, EE_HOME)
+
+
+def square(controller: str, peak: tuple[float, float], *assignments: str) -> MobileJob:
+    """One square wave."""
+    return MobileJob(SQUARE, controller, (f"peak=[{peak[0]:.9f},{peak[1]:.9f}]", *assignments))
+
+
+def example(controller: str, *assignments: str) -> MobileJob:
+    """The square wave with the scene's own peak; the paper does not print the coordinates of its example."""
+    return MobileJob(SQUARE, controller, assignments)
+
+
+def part(runs: Sequence[Run], place: int, key: str = "normalised_base_error") -> Array:
+    """A figure of one part of each run; NaN where there is none."""
+    return np.array([run.figure("parts", place, key) for run in runs])
+
+
+def hand_mm(run: Run) -> tuple[float, float, float]:
+    """Mean, standard deviation and maximum of the EE error over the whole run, mm; NaN if it failed."""
+    if not len(run.t):
+        return float("nan"), float("nan"), float("nan")
+    error = 1e3 * np.linalg.norm(run["error/ee"], axis=1)
+    return float(error.mean()), float(error.std()), float(error.max())
+
+
+def normalised(run: Run) -> Array:
+    """The base error over time, over its value at the start of each part."""
+    error = np.linalg.norm(run["error/base"], axis=1)
+    half = len(error) // 2
+    return np.concatenate([error[:half] / error[0], error[half:] / error[half]]) if half else error

@@ -1,0 +1,226 @@
+"""Figs. 3, 4, 6 and 7: random square waves, HTMPC against HTMPC_WPT and HTIDKC."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from scipy.stats import gaussian_kde
+
+from lessons.jobs import Job, Results, Run
+from lessons.papers.htmpc_paper.runs import (
+    EE_HOME,
+    METHODS,
+    SOURCE,
+    Array,
+    example,
+    hand_mm,
+    normalised,
+    part,
+    peaks,
+    square,
+)
+from lessons.papers.item import Check, Item, Row, Section, Table, at_least, at_most
+from lessons.papers.printed import printed
+from lessons.papers.words import number
+from lessons.plots.panels import Curve, Panel, Picture
+
+BASE_GAINS = (0.3, 0.6, 0.65, 0.7, 0.75)
+"""1/s: base gains of HTIDKC that are tried to match HTMPC on Part 1; the authors' is the first."""
+COLLINEAR = math.radians(15.0)
+"""Peak, valley and EE lie on a line if the directions from the EE differ by less than this from 0 or 180°."""
+
+
+def _idkc(peak: tuple[float, float], gain: float) -> Job:
+    return square("htidkc", peak, f"gains=[0.5,{gain}]")
+
+
+def _jobs(quick: bool) -> tuple[Job, ...]:
+    found = [square(controller, peak) for controller in METHODS for peak in peaks(quick)]
+    return (
+        *found,
+        *(square("htmpc", peak, "formulation=paper") for peak in peaks(quick)),
+        *(_idkc(peak, gain) for gain in BASE_GAINS for peak in peaks(quick)),
+    )
+
+
+def _runs(results: Results, quick: bool) -> dict[str, list[Run]]:
+    """Runs by method, among them the HTIDKC that matches HTMPC best on Part 1."""
+    found = {
+        words: [results[square(controller, peak)] for peak in peaks(quick)]
+        for controller, words in METHODS.items()
+    }
+    found["HTMPC, A"] = [results[square("htmpc", peak, "formulation=paper")] for peak in peaks(quick)]
+    swept = {gain: [results[_idkc(peak, gain)] for peak in peaks(quick)] for gain in BASE_GAINS}
+    wanted = part(found["HTMPC"], 0).mean()
+    gap = {gain: abs(part(runs, 0).mean() - wanted) for gain, runs in swept.items()}
+    best = min(gap, key=lambda gain: gap[gain] if math.isfinite(gap[gain]) else math.inf)
+    found[f"HTIDKC, base gain {best:g}"] = swept[best]
+    return found
+
+
+def _fig_3(results: Results, quick: bool) -> Section:
+    run = results[example("htmpc")]
+    targets = np.array(peaks(quick))
+    home = Curve(EE_HOME[:1], EE_HOME[1:], "EE", "reference", "dots")
+    curves = [Curve(targets[:, 0], targets[:, 1], "peak targets", "0", "dots"), home]
+    if len(run.t):
+        base = run["x/base"]
+        curves.append(Curve(base[:, 0], base[:, 1], "base path of the example", "htmpc"))
+    caption = "Peak targets of the random square waves, all out of reach, and one base path."
+    panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
+    return Section(pictures=(Picture("htmpc-fig-3", caption, (panel,)),))
+
+
+def _fig_4(results: Results, quick: bool) -> Section:
+    runs = {words: results[example(controller)] for controller, words in METHODS.items()}
+    base = tuple(Curve(run.t, normalised(run), words, run.job.controller) for words, run in runs.items())
+    hand = tuple(
+        Curve(run.t, 1e3 * np.linalg.norm(run["error/ee"], axis=1), words, run.job.controller)
+        for words, run in runs.items()
+        if len(run.t)
+    )
+    panels = (Panel("base error (1)", base, bounds=(0.05,)), Panel("EE error (mm)", hand))
+    rows = tuple(
+        Row(f"{words}: mean EE error", "mm", None, hand_mm(run)[0], "the paper shows curves only")
+        for words, run in runs.items()
+    )
+    caption = "The example: base error over its value at the start of each part, and EE error."
+    return Section(rows=rows, pictures=(Picture("htmpc-fig-4", caption, panels),))
+
+
+def _fig_6(results: Results, quick: bool) -> Section:
+    runs = _runs(results, quick)
+    errors = {words: (part(found, 0), part(found, 1)) for words, found in runs.items()}
+    ours, sooner = errors["HTMPC"], errors["HTMPC_WPT"]
+    authors = errors["HTIDKC"][1].mean()
+    matched = next(words for words in errors if words.startswith("HTIDKC, base gain"))
+    gain = 1.0 - ours[1].mean() / errors[matched][1].mean()
+    rows = [
+        Row(
+            f"Part 2: HTMPC better than {matched} (Part 1 alike)",
+            "1",
+            printed("htmpc_text")["improvement"],
+            gain,
+            "the default formulation C is not the paper's; A is in the table",
+        )
+    ]
+    lines = tuple(_line(words, runs[words], errors[words], authors) for words in runs)
+    gap = sooner[1] - ours[1]
+    margin = 1.96 * gap.std(ddof=1) / math.sqrt(len(gap))
+    final = part(runs["HTMPC"], 1, "final_base_error")
+    hands = np.array([hand_mm(run) for run in runs["HTMPC"]])
+    checks = (
+        at_most("HTMPC: mean Part 1 error", ours[0].mean(), 0.42),
+        at_most("HTMPC: mean Part 2 error", ours[1].mean(), 0.12),
+        at_most("HTMPC: largest base error at 16 s", final.max(), 0.05),
+        at_most("HTMPC: mean EE error (mm)", hands[:, 0].mean(), 1.0),
+        at_most("HTMPC: largest EE error (mm)", hands[:, 2].max(), 10.0),
+        at_least("Part 2: better than HTIDKC with the authors' gains", 1 - ours[1].mean() / authors, 0.6),
+        at_least(f"Part 2: better than {matched}", gain, 0.42),
+        at_most("Part 1 apart from the matched HTIDKC's", _apart(ours[0], errors[matched][0]), 0.02),
+        at_least("Formulation A, Part 2: better", 1 - errors["HTMPC, A"][1].mean() / authors, 0.25),
+        Check(
+            "Part 2: HTMPC_WPT − HTMPC, lower end of the 95 % interval > 0",
+            gap.mean() - margin,
+            bool(gap.mean() - margin > 0),
+        ),
+    )
+    columns = (
+        "method",
+        "Part 1",
+        "Part 2",
+        "Part 2, collinear only",
+        "EE mean (mm)",
+        "EE max (mm)",
+        "better",
+    )
+    panels = tuple(
+        _strip(f"Part {k + 1}", {words: each[k] for words, each in errors.items()}) for k in (0, 1)
+    )
+    notes = (
+        "Base error over its value at the start of each part, mean over the part, one dot per square wave. "
+        '"Better": Part 2 against HTIDKC with the authors\' gains.',
+    )
+    caption = "Fitted density, one dot per square wave, and the mean, in the order of the table's methods."
+    return Section(
+        notes,
+        tuple(rows),
+        (Table("All methods", columns, lines),),
+        checks,
+        (Picture("htmpc-fig-6", caption, panels, 2),),
+    )
+
+
+def _apart(a: Array, b: Array) -> float:
+    return abs(float(a.mean() / b.mean()) - 1.0)
+
+
+def _line(words: str, runs: list[Run], errors: tuple[Array, Array], authors: float) -> tuple[str, ...]:
+    hands = np.array([hand_mm(run) for run in runs])
+    on_line = np.array([collinear(run.job) for run in runs])
+    subset = errors[1][on_line].mean() if on_line.any() else math.nan
+    means = (errors[0].mean(), errors[1].mean(), subset, hands[:, 0].mean(), hands[:, 2].max())
+    return (words, *(number(float(x)) for x in means), f"{1 - errors[1].mean() / authors:.0%}")
+
+
+def collinear(job: Job) -> bool:
+    """Whether peak, valley (the origin) and the EE's home lie on a line, as in the paper's Fig. 7."""
+    peak = np.array(job.set[0].partition("=")[2].strip("[]").split(","), float)
+    a, b = peak - EE_HOME, -EE_HOME
+    sine = abs(a[0] * b[1] - a[1] * b[0]) / (np.linalg.norm(a) * np.linalg.norm(b))
+    return bool(sine < math.sin(COLLINEAR))
+
+
+def _strip(title: str, values: dict[str, Array]) -> Panel:
+    curves = []
+    for place, (words, each) in enumerate(values.items()):
+        if np.isfinite(each).all() and np.ptp(each) > 0:
+            curves.append(_violin(place, each))
+        curves.append(Curve(np.full(len(each), float(place)), each, words, str(place), "dots"))
+        curves.append(Curve(np.array([place - 0.2, place + 0.2]), np.full(2, each.mean()), "", str(place)))
+    return Panel("base error (1)", tuple(curves), "method", title=title)
+
+
+def _violin(place: int, values: Array) -> Curve:
+    """The outline of the fitted density, from the smallest to the largest value."""
+    y = np.linspace(values.min(), values.max(), 60)
+    density = gaussian_kde(values)(y)
+    half = 0.4 * density / density.max()
+    return Curve(np.append(place - half, (place + half)[::-1]), np.append(y, y[::-1]), "", str(place))
+
+
+def _fig_7(results: Results, quick: bool) -> Section:
+    panels, lines = [], []
+    for words, runs in _runs(results, quick).items():
+        errors = part(runs, 1)
+        targets = np.array(peaks(quick)) - EE_HOME
+        curves = []
+        edges = (0.0, 0.1, 0.2, 0.4, math.inf)
+        for place, (low, high) in enumerate(pairwise(edges)):
+            inside = (errors >= low) & (errors < high)
+            label = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
+            curves.append(Curve(targets[inside, 0], targets[inside, 1], label, str(place), "dots"))
+        panels.append(Panel("y from the EE (m)", tuple(curves), "x (m)", title=words, equal=True))
+        on_line = np.array([collinear(run.job) for run in runs])
+        apart = [errors[chosen].mean() if chosen.any() else math.nan for chosen in (on_line, ~on_line)]
+        lines.append((words, str(int(on_line.sum())), *(number(float(x)) for x in apart)))
+    columns = ("method", "collinear waves", "their Part 2", "Part 2 of the others")
+    caption = "Part 2 base error by the place of the peak target, seen from the EE."
+    return Section(
+        tables=(Table("Peak, valley and EE on a line", columns, tuple(lines)),),
+        pictures=(Picture("htmpc-fig-7", caption, tuple(panels), 2),),
+    )
+
+
+def _examples(quick: bool) -> tuple[Job, ...]:
+    return tuple(example(controller) for controller in METHODS)
+
+
+ITEMS = (
+    Item("htmpc-fig-3", "The random square waves", f"{SOURCE}-A, Fig. 3", _examples, _fig_3),
+    Item("htmpc-fig-4", "The example over time", f"{SOURCE}-A, Fig. 4", _examples, _fig_4),
+    Item("htmpc-fig-6", "Random square waves, all methods", f"{SOURCE}-C, Fig. 6", _jobs, _fig_6),
+    Item("htmpc-fig-7", "Where the errors are", f"{SOURCE}-C, Fig. 7", _jobs, _fig_7),
+)

@@ -1,0 +1,34 @@
+"""Compute times of the control step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lessons.jobs import Job, Results
+from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, MobileJob, example
+from lessons.papers.item import Item, Row, Section
+from lessons.papers.printed import printed
+from lessons.papers.words import trouble
+
+_WHY = "another machine and another solver (the paper: CasADi and Gurobi)"
+
+
+def _cases() -> dict[str, Job]:
+    found: dict[str, Job] = {words: replace(example(c), timed=True) for c, words in METHODS.items()}
+    found["HTMPC with obstacles"] = MobileJob("ridgeback-ur10-cluttered", duration=8.0, timed=True)
+    return found
+
+
+def _report(results: Results, quick: bool) -> Section:
+    text = printed("htmpc_text")
+    paper = {"HTMPC": text["htmpc_step_ms"], "HTIDKC": text["htidkc_step_ms"]}
+    rows = []
+    for words, job in _cases().items():
+        run = results[job]
+        for key, printed_value in (("median", paper.get(words)), ("p99", None)):
+            ours = run.figure("step_ms", key)
+            rows.append(Row(f"{words}: {key} of the step", "ms", printed_value, ours, trouble(run) or _WHY))
+    return Section(rows=tuple(rows))
+
+
+ITEMS = (Item("htmpc-times", "Compute times", SOURCE, lambda quick: tuple(_cases().values()), _report),)

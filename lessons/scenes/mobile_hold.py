@@ -1,0 +1,32 @@
+"""The mobile manipulator at torque level: HIMPC drives the base by forces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from himpc.stack import Level
+from himpc.tasks import FramePosition
+from lessons.scene import Scene
+from lessons.settings import SceneSettings
+from robots import load_robot
+
+
+def ridgeback_hold() -> Scene:
+    """`ridgeback-ur10-hold`: EE position, then the base's place; the rest is damped.
+
+    The base's M̄ is half its mass, so its loop is slower than the arm's: it gets softer gains.
+    """
+    robot = load_robot("ridgeback-ur10")
+    levels = (
+        Level((FramePosition(name="ee", K_p=100.0, K_v=20.0),)),
+        Level((FramePosition(name="base", frame="base", axes="xy", K_p=16.0, K_v=8.0),)),
+    )
+    return Scene(
+        name="ridgeback-ur10-hold",
+        title="Ridgeback and UR10 under HIMPC: drag the targets of hand and base; the hand comes first",
+        robot=robot,
+        settings=SceneSettings(levels=levels, M_bar=tuple(robot.M_bar)),
+        references=lambda robot, stack: {},
+        q_0=robot.home,
+        v_0=np.zeros(robot.n),
+    )

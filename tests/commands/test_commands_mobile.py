@@ -1,0 +1,70 @@
+"""The command line on velocity-level scenes: the contract of the HTMPC keys, and refusals in a sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.__main__ import main
+
+SQUARE = "ridgeback-ur10-square"
+
+
+def test_run_prints_the_contract_of_a_velocity_level_scene(tmp_path: Path) -> None:
+    """Parts, line search, base path and mission beside the usual keys; one row per tick in the npz."""
+    out, rows = tmp_path / "out.json", tmp_path / "rows.npz"
+    assert main(["run", SQUARE, "--duration", "1", "--json", str(out), "--npz", str(rows)]) == 0
+    result = json.loads(out.read_text())
+    assert result["controller"] == "htmpc"
+    assert result["limits"]["torque"] == {"max_ratio": None, "applied_max_ratio": None}
+    assert set(result["limits"]) == {"torque", "velocity", "position", "acceleration", "jerk"}
+    assert [part["name"] for part in result["parts"]] == ["peak", "valley"]
+    assert set(result["parts"][0]["ee_error_mm"]) == {"mean", "std", "max"}
+    assert result["parts"][1]["normalised_base_error"] is None, "the run ended before it"
+    assert set(result["line_search"]) == {"mean_step", "zero_share"}
+    assert result["base_path_m"] >= 0.0
+    assert (result["completed"], result["completion_time_s"]) == (False, None)
+    with np.load(rows) as arrays:
+        assert len(arrays["t"]) == 10
+        settings = json.loads(str(arrays["settings"]))
+    assert (settings["scene"], settings["seed"]) == (SQUARE, 0)
+
+
+def test_run_shows_people_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    """What the hand and the base did, in words."""
+    assert main(["run", SQUARE, "--duration", "1", "--controller", "htmpc_wpt"]) == 0
+    shown = capsys.readouterr().out
+    assert "way of the base" in shown
+    assert "peak" in shown
+
+
+def test_scenes_and_controllers_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenes", "--json", "-"]) == 0
+    assert SQUARE in {each["name"] for each in json.loads(capsys.readouterr().out)}
+    assert main(["controllers", "--json", "-"]) == 0
+    names = {each["name"] for each in json.loads(capsys.readouterr().out)}
+    assert names >= {"himpc", "htmpc", "htmpc_wpt", "stmpc", "htidkc"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--controller", "himpc"], "choose one of htmpc"),
+        (["--controller", "htmcp"], "'htmpc'"),
+        (["--set", "peak=[1]"], "give x and y"),
+        (["--set", "delta=0.1"], "'delta_m'"),
+        (["--set", "input_effort=[1,2]"], "9 joints"),
+        (["--urdf", "panda"], "brings its own robot"),
+    ],
+)
+def test_wrong_input_gets_one_sentence_and_exit_2(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", SQUARE, "--duration", "0.1", *arguments]) == 2
+    shown = capsys.readouterr().err
+    assert says in shown
+    assert "Traceback" not in shown
+    assert shown.count("\n") == 1
