@@ -46,6 +46,8 @@ def solve_triangular(
     what active rows, taken as equalities, push into it. A level's point is kept if the KKT conditions hold:
     gradient, signs of the multipliers, no other row violated. The first level that fails ends the list.
 
+    Small products are written `a.dot(b)`: for these sizes that takes half the time of `a @ b`.
+
     Args:
         problems: the levels, highest priority first.
         B: B_p of all levels but the last, one below the other, (N, m_1 + … + m_{r−1}, n).
@@ -164,11 +166,11 @@ def _level(
     effect = (problem.weighted_C[..., None] * seen).reshape(N * m, N, end)
     error = problem.weighted_free.flatten()
     if start:
-        error += effect.reshape(N * m, N * end) @ y[:, :end].reshape(-1)
+        error += effect.reshape(N * m, N * end).dot(y[:, :end].reshape(-1))
     if own == 0:
         return error, None, 0.0
     G = (effect[:, :, start:] if start else effect).reshape(N * m, N * own)
-    H = G.T @ G
+    H = G.T.dot(G)
     H.reshape(-1)[:: N * own + 1] += R
     if len(active):
         found = _bound_optimum(G, error, H, R, _equalities(active, y, start, own, Q, rows))
@@ -195,12 +197,14 @@ class _Equalities(NamedTuple):
 
 def _equalities(active: ActiveRows, y: Array, start: int, own: int, Q: Array, rows: Rows) -> _Equalities:
     row, joint, count = active.row, active.joint, active.row.size
-    L = rows.L[row]
-    A = L[:, :, None] * Q[:, joint, start:].transpose(1, 0, 2)
-    target = np.where(active.multiplier > 0.0, rows.upper[row, joint], rows.lower[row, joint])
+    L = rows.L.take(row, 0)
+    picked = Q.take(joint, 1).transpose(1, 0, 2)
+    A = L[:, :, None] * picked[:, :, start:]
+    place = row * Q.shape[1] + joint
+    target = np.where(active.multiplier > 0.0, rows.upper.take(place), rows.lower.take(place))
     if start:
-        above = np.matmul(Q[:, :, :start], y[:, :start, None])[:, :, 0]
-        target -= (L * above.T[joint]).sum(axis=1)
+        above = L[:, :, None] * picked[:, :, :start]
+        target -= above.reshape(count, -1).dot(y[:, :start].reshape(-1))
     return _Equalities(A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1), target)
 
 
@@ -210,11 +214,11 @@ _Optimum = tuple[Array, Array | None, Array, Array, float]
 
 def _free_optimum(G: Array, error: Array, H: Array, R: float) -> _Optimum | None:
     """min ½R‖y‖² + ½‖error + G y‖², H = GᵀG + R; None if it is not accurate."""
-    factor, own, _ = dposv(H.T, G.T @ -error, overwrite_a=1, overwrite_b=1)
+    factor, own, _ = dposv(H.T, -error.dot(G), overwrite_a=1, overwrite_b=1)
     for _ in range(_ROUNDS):
-        after = error + G @ own
-        slope = R * own + G.T @ after
-        gradient = math.sqrt(slope @ slope)
+        after = error + G.dot(own)
+        slope = R * own + after.dot(G)
+        gradient = math.sqrt(slope.dot(slope))
         if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
             return own, None, _NOTHING, after, gradient
         own = own - dpotrs(factor, slope)[0]
@@ -224,20 +228,20 @@ def _free_optimum(G: Array, error: Array, H: Array, R: float) -> _Optimum | None
 def _bound_optimum(G: Array, error: Array, H: Array, R: float, equalities: _Equalities) -> _Optimum | None:
     """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None too for dependent rows."""
     A_own, A_rest, target = equalities
-    d, corner = len(H), A_rest @ (A_rest.T / -R)
+    d, corner = len(H), A_rest.dot(A_rest.T / -R)
     K = np.empty((d + target.size, d + target.size))
     K[:d, :d], K[d:, :d], K[:d, d:], K[d:, d:] = H, A_own, A_own.T, corner
-    right = np.concatenate((G.T @ -error, target))
+    right = np.concatenate((-error.dot(G), target))
     factor, pivots, x, info = dgesv(K.T, right, overwrite_a=1, overwrite_b=1)
     if info != 0:
         return None
     for _ in range(_ROUNDS):
         own, multipliers = x[:d], x[d:]
-        after = error + G @ own
-        slope = R * own + G.T @ after + multipliers @ A_own
-        gradient = math.sqrt(slope @ slope)
+        after = error + G.dot(own)
+        slope = R * own + after.dot(G) + multipliers.dot(A_own)
+        gradient = math.sqrt(slope.dot(slope))
         if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
-            return own, multipliers, multipliers @ A_rest / -R, after, gradient
+            return own, multipliers, multipliers.dot(A_rest) / -R, after, gradient
         lost = A_own @ own + corner @ multipliers - target
         x = x - dgetrs(factor, pivots, np.concatenate((slope, lost)))[0]
     return None
