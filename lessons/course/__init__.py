@@ -1,0 +1,38 @@
+"""The course: one file per lesson, its docstring is its card.
+
+A file defines `LESSON`. Files are imported when their lesson is asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from lessons.lesson import Lesson
+from robots.errors import unknown_name
+
+COURSE: tuple[str, ...] = (
+    "a-redundant-arm",
+    "one-task",
+    "no-model-needed",
+    "two-tasks",
+    "swap-the-priorities",
+    "when-tasks-fight",
+    "stretched-out",
+    "torque-has-a-limit",
+    "stopping-takes-distance",
+    "how-far-ahead",
+    "deadlines",
+    "sensors-are-coarse",
+    "the-model-is-wrong",
+    "inside-the-qp",
+    "your-robot",
+)
+"""The lessons by name, in the order in which to take them."""
+
+
+def load_lesson(name: str) -> Lesson:
+    """A lesson by its name. Raises InputError for a name that is none, naming the nearest."""
+    if name not in COURSE:
+        raise unknown_name("lesson", name, COURSE)
+    lesson: Lesson = import_module(f"lessons.course.{name.replace('-', '_')}").LESSON
+    return lesson

@@ -1,0 +1,191 @@
+"""A redundant arm
+
+The hand must not move: what may the elbow still do?
+
+Minutes: 8
+You need: what a Jacobian is
+"""
+
+from __future__ import annotations
+
+from lessons.challenge import Challenge, Score
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.events import MoveTarget
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option, Value
+
+HAND = Signal("error/position", "mm")
+TILT = Signal("error/orientation", "deg")
+JOINT_3 = Signal("q", "deg", column=2)
+# Home is (0, 30, 0, −90, 0, 60, 0)°; joint 3, which carries the elbow around, is asked to turn by 60°.
+TURN_ELBOW = ((0.1, MoveTarget("posture", (0.0, 0.5236, 1.0472, -1.5708, 0.0, 1.0472, 0.0))),)
+
+FOLLOW = Step(
+    title="The hand follows",
+    text=r"""
+         Seven joints $q$, one hand. Its position $x = f(q)$ is where the arm's geometry puts it (2),
+    and the     Jacobian says how fast it moves: $\dot x = J(q)\, \dot q$ with $J = \partial f /
+    \partial q$ (3).     The target moves aside by 15 cm. The controller looks for joint torques that
+    bring the hand there     while the hand keeps its orientation.
+    """,
+    do="Drag the target. Turn it, too.",
+    why=r"""
+         All seven joints take part, although three would be enough to move a point. No joint is *for*
+    anything: the controller only compares where the hand is with where it should be.
+    """,
+    prediction=Choice(
+        "The hand moves aside and stays upright. How many of the seven joints turn by more than 1°?",
+        (
+            Option("one or two", high=2.5),
+            Option("three or four", 2.5, 4.5),
+            Option("five or more", low=4.5),
+        ),
+        Measure(Signal("joints moved")),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "From 1.2 s on the hand is within 1 mm of the target.",
+            Measure(HAND, after=1.2),
+            "at most",
+            1.0,
+            fails_with=("levels.position.enabled=false",),
+            because="nobody asks for the position",
+        ),
+        Claim(
+            "The hand never tilts by more than 3°.",
+            Measure(TILT),
+            "at most",
+            3.0,
+            fails_with=("levels.orientation.enabled=false",),
+            because="nobody asks for the orientation",
+        ),
+    ),
+    events=((0.1, MoveTarget("position", (0.5564, 0.15, 0.3977))),),
+    duration=2.0,
+    plots=(HAND, TILT),
+)
+
+ELBOW = Step(
+    title="Drag the elbow",
+    text=r"""
+         A hand has six coordinates, three for where and three for which way. Seven joints for six
+    coordinates: one motion is left over. It is the null space of $J$, the joint velocities with $J \dot
+    q = 0$. Joint 3 is asked to turn by 60°, as the last of three levels.
+    """,
+    do="Grab the posture's target and turn the elbow around. Then grab the hand's: which one wins?",
+    why=r"""
+         The elbow swings around the line from shoulder to wrist; the hand stays. This is called
+    *self-motion*. It does not go the whole 60°: only the part of the wish that lies in the null space
+    is granted.
+    """,
+    prediction=Choice(
+        "The elbow turns by almost 30°. How far does the hand move on the way?",
+        (
+            Option("less than 5 mm", high=5.0),
+            Option("a few centimetres", 5.0, 60.0),
+            Option("a hand's breadth", low=60.0),
+        ),
+        Measure(HAND),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The hand stays within 5 mm.",
+            Measure(HAND),
+            "at most",
+            5.0,
+            fails_with=("levels.position.enabled=false",),
+            because="the posture then takes the hand along",
+        ),
+        Claim(
+            "Joint 3 turns by more than 20°.",
+            Measure(JOINT_3, "range"),
+            "at least",
+            20.0,
+            fails_with=("levels.posture.enabled=false",),
+            because="nobody asks the elbow to go",
+        ),
+    ),
+    events=TURN_ELBOW,
+    duration=2.0,
+    controls=(Control("levels.position.enabled", "Position on", choices=(False, True)),),
+    plots=(HAND, JOINT_3),
+)
+
+COUNT = Step(
+    title="Count the freedom",
+    text=r"""
+         The hand may now turn as it likes: the orientation level is off. Three coordinates are left for
+    seven joints, $7 - 3 = 4$ free motions instead of one. The same wish for joint 3. The ghost keeps
+    its orientation.
+    """,
+    do="Switch levels on and off and feel how stiff the elbow becomes.",
+    why=r"""
+         Joint 3 gets further, and the hand pays with a tilt nobody objects to. It is still where it
+    was:     every level takes away as many free motions as it has coordinates, and the next one has to
+    do with     the rest.
+    """,
+    prediction=Value(
+        "Without the orientation level: by how many degrees does the hand tilt?",
+        Measure(TILT, "last"),
+        low=0.1,
+        high=180.0,
+        factor=1.7,
+    ),
+    claims=(
+        Claim(
+            "Joint 3 turns at least 15 % further than the ghost's.",
+            Measure(JOINT_3, "range", over_ghost=True),
+            "at least",
+            1.15,
+            fails_with=("levels.orientation.enabled=true",),
+            because="then it is the ghost",
+        ),
+        Claim(
+            "The hand still stays within 6 mm.",
+            Measure(HAND),
+            "at most",
+            6.0,
+            fails_with=("levels.position.enabled=false",),
+            because="the position is the one thing that must stay on",
+        ),
+    ),
+    set=("levels.orientation.enabled=false",),
+    events=TURN_ELBOW,
+    duration=2.0,
+    ghost=Ghost("orientation kept", ("levels.orientation.enabled=true",)),
+    controls=(
+        Control("levels.orientation.enabled", "Orientation on", choices=(False, True)),
+        Control("levels.posture.enabled", "Posture on", choices=(False, True)),
+    ),
+    plots=(HAND, TILT, JOINT_3),
+)
+
+CHALLENGE = Challenge(
+    text="Turn joint 3 by at least 25° while the hand stays within 1 mm.",
+    goals=(
+        Claim("Joint 3 turns by 25°.", Measure(JOINT_3, "range"), "at least", 25.0),
+        Claim("The hand stays within 1 mm.", Measure(HAND), "at most", 1.0),
+    ),
+    knobs=(
+        Control("tasks.position.K_p", "K_P of the position, 1/s²", 10.0, 400.0, log=True),
+        Control("tasks.position.K_v", "K_V of the position, 1/s", 2.0, 60.0),
+        Control("tasks.posture.K_p", "K_P of the posture, 1/s²", 1.0, 400.0, log=True),
+        Control("M_bar_scale", "M̄, factor", 0.1, 10.0, log=True),
+    ),
+    score=Score(Measure(HAND), worst=1.0, best=0.2),
+    solutions=(("M_bar_scale=4",), ("tasks.position.K_p=300", "tasks.position.K_v=35")),
+    events=TURN_ELBOW,
+    duration=2.5,
+)
+
+LESSON = Lesson(
+    name="a-redundant-arm",
+    card=card_of(__doc__),
+    scene="iiwa14-hold",
+    steps=(FOLLOW, ELBOW, COUNT),
+    challenge=CHALLENGE,
+)

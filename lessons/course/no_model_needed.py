@@ -1,0 +1,214 @@
+"""No model needed
+
+The robot lifts a weight nobody told it of: does the hand sag?
+
+Minutes: 12
+You need: lesson "one-task"; mass times acceleration is force
+"""
+
+from __future__ import annotations
+
+from lessons.challenge import Challenge, Score
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.events import MoveTarget, Set
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option, Value
+
+HAND = Signal("error/position", "mm")
+GAUGE = Signal("gauge_radius")
+ASIDE = (0.556, 0.12, 0.448)
+MOVE = ((0.1, MoveTarget("position", ASIDE)),)
+M_BAR = Control("M_bar_scale", "M̄, factor", 0.1, 40.0, log=True)
+
+LOAD = Step(
+    title="Pick up a kilogram",
+    text=r"""
+         At 0.2 s one kilogram hangs at the hand. The controller is not told. It has no masses at all:
+    all it     does not know is collected in one term (6),
+
+        $$\bar M \ddot q + H_q = \tau,$$
+
+        and $H_q$ is taken to be what it was a millisecond ago (8): $H_q \approx \tau_0 - \bar M \ddot
+    q_0$,     from the torque that acted and the acceleration that came of it. So (13) only asks for the
+    *change*:     $\ddot x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of
+    the arm, but     not the load.
+    """,
+    do="Hang on more weight, and take it off again.",
+    why=r"""
+         The hand dips by a few millimetres and comes back, to a hundredth of a millimetre: whatever the
+    load     does to the acceleration is measured, and in the next millisecond it is part of $H_q$. The
+    ghost's     model is exact and one kilogram wrong; its springs hold the rest, so it sags by
+    centimetres and     stays there.
+    """,
+    prediction=Choice(
+        "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
+        (
+            Option("back on its target, within 0.1 mm", high=0.1),
+            Option("some millimetres too low", 0.1, 10.0),
+            Option("centimetres too low", low=10.0),
+        ),
+        Measure(HAND, "last"),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The hand never sags by more than 5 mm.",
+            Measure(HAND),
+            "at most",
+            5.0,
+            fails_with=("controller=hqp",),
+            because="a model that does not know the load leaves it to the springs of (4)",
+        ),
+        Claim(
+            "In the end it is within 0.1 mm of its target.",
+            Measure(HAND, "last"),
+            "at most",
+            0.1,
+            fails_with=("controller=hqp",),
+            because="the load is never noticed, so the sag stays",
+        ),
+    ),
+    events=((0.2, Set("plant.payload_kg", 1.0)),),
+    duration=2.0,
+    ghost=Ghost("hqp: exact model of the arm, without the load", ("controller=hqp",)),
+    controls=(
+        Control("plant.payload_kg", "Payload, kg", 0.0, 5.0),
+        Control("controller", "Controller", choices=("himpc", "hqp", "osf")),
+    ),
+    plots=(HAND,),
+)
+
+SMALL = Step(
+    title="M̄ too small",
+    text=r"""
+         One thing must be chosen, the diagonal $\bar M$. It says how much torque a wanted acceleration
+    costs. Let it be 0.3 times what it was: the controller believes the arm to be that light, and gives
+    three tenths of the torque changes. The target moves aside by 13 cm.
+    """,
+    do="Go down to 0.1, then up to 2, and watch the gauge.",
+    why=r"""
+         The torque is right in the end, but it comes late: every millisecond only a part of the error
+    in     $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$, the share of
+    that     error which is left after each step (Remark 4 asks for its norm to be below 1). Close to 1
+    is safe     and slow.
+    """,
+    prediction=Value(
+        "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",
+        Measure(HAND, over_ghost=True),
+        low=0.1,
+        high=30.0,
+        factor=1.6,
+    ),
+    claims=(
+        Claim(
+            "The largest error is more than three times that of the ghost.",
+            Measure(HAND, over_ghost=True),
+            "at least",
+            3.0,
+            fails_with=("M_bar_scale=1",),
+            because="then it is the ghost",
+        ),
+        Claim(
+            "The gauge stays above 0.99: less than a hundredth of the slowest error goes in a millisecond.",
+            Measure(GAUGE, "mean"),
+            "at least",
+            0.99,
+            fails_with=("M_bar_scale=2",),
+            because="a larger M̄ corrects faster",
+        ),
+    ),
+    set=("M_bar_scale=0.3",),
+    events=MOVE,
+    duration=1.2,
+    ghost=Ghost("M̄ as it was", ("M_bar_scale=1",)),
+    controls=(M_BAR,),
+    plots=(HAND, GAUGE),
+)
+
+LARGE = Step(
+    title="M̄ too large",
+    text=r"""
+         Twice the $\bar M$ halves the error, four times quarters it, six times is better still. Now it
+    is     eight times as large. Remark 4: for each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is
+    multiplied by $1 - \lambda$ in every step.
+    """,
+    do="Reset, go up from 4 in small steps, and read the gauge each time before you let it run.",
+    why=r"""
+         $1 - \lambda$ has passed −1: each correction is more than twice too large, and every
+    millisecond the error comes back half as large again, with the opposite sign. Chatter, full torque,
+    gone. There is a     cliff, and the gauge shows it before the arm does. Start small and go up
+    (Remark 4).
+    """,
+    prediction=Choice(
+        "M̄ × 2, × 4, × 6: always better. What does × 8 do?",
+        (
+            Option("better again, or as good", high=1.5),
+            Option("a little worse", 1.5, 5.0),
+            Option("it loses control", low=5.0),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The gauge is above 1: errors grow from step to step.",
+            Measure(GAUGE, "mean"),
+            "at least",
+            1.0,
+            fails_with=("M_bar_scale=4",),
+            because="there every eigenvalue of the error's map is below 1",
+        ),
+        Claim(
+            "A joint exceeds its speed limit at least threefold.",
+            Measure(Signal("speed share", "%")),
+            "at least",
+            300.0,
+            fails_with=("M_bar_scale=4",),
+            because="with half of it the motion is calm, and more accurate than ever",
+        ),
+    ),
+    set=("M_bar_scale=8",),
+    events=MOVE,
+    duration=0.35,
+    ghost=Ghost("M̄ × 4", ("M_bar_scale=4",)),
+    controls=(M_BAR,),
+    plots=(HAND, GAUGE, Signal("torque share", "%")),
+)
+
+CHALLENGE = Challenge(
+    text=r"""
+         Three kilograms this time, and at 0.8 s the target moves aside by 13 cm. Keep the hand within
+    10 mm     of it all along.
+    """,
+    goals=(
+        Claim("The hand stays within 10 mm.", Measure(HAND), "at most", 10.0),
+        Claim(
+            "The torque does not chatter: changes below 1 N·m RMS.",
+            Measure(Signal("delta_tau", "N·m"), "rms"),
+            "at most",
+            1.0,
+        ),
+    ),
+    knobs=(
+        M_BAR,
+        Control("tasks.position.K_p", "K_P of the position, 1/s²", 10.0, 400.0, log=True),
+        Control("tasks.position.K_v", "K_V of the position, 1/s", 2.0, 60.0),
+    ),
+    score=Score(Measure(HAND), worst=10.0, best=3.0),
+    solutions=(
+        ("M_bar_scale=4",),
+        ("M_bar_scale=3", "tasks.position.K_p=200", "tasks.position.K_v=28"),
+    ),
+    events=((0.2, Set("plant.payload_kg", 3.0)), (0.8, MoveTarget("position", ASIDE))),
+    duration=2.0,
+)
+
+LESSON = Lesson(
+    name="no-model-needed",
+    card=card_of(__doc__),
+    scene="iiwa14-hold",
+    steps=(LOAD, SMALL, LARGE),
+    challenge=CHALLENGE,
+)

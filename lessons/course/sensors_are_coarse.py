@@ -1,0 +1,142 @@
+"""Sensors are coarse
+
+A sensor rounds to five thousandths of a degree: who could notice that?
+
+Minutes: 10
+You need: lesson "no-model-needed"
+"""
+
+from __future__ import annotations
+
+from lessons.challenge import Challenge, Score
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option, Value
+
+HAND = Signal("error/position", "mm")
+ROUGH = Signal("delta_tau", "N·m")
+TORQUE = Signal("torque share", "%")
+PLOTS = (Signal("tau", "N·m", column=0), ROUGH, HAND)
+RESOLUTION = Control("plant.encoder_resolution_deg", "Resolution, °", 0.0, 0.02)
+PERIOD = Control("T_s", "Period, s", 0.0005, 0.01)
+M_BAR = Control("M_bar_scale", "M̄, factor", 0.05, 2.0, log=True)
+COARSE = "plant.encoder_resolution_deg=0.005"
+
+ROUNDING = Step(
+    title="Two differences",
+    text=r"""
+         The encoders round to $\delta = 0.005°$: at the hand that is 0.08 mm. Velocity is the
+    difference of     two positions over $T_s$, acceleration the difference of two velocities over
+    $T_s$. One digit more     or less is an acceleration of $\delta / T_s^2$, and (13) answers with
+    $\bar M\,\delta / T_s^2$.
+    """,
+    do="Make the encoders finer until you cannot see the noise in the torque any more.",
+    why=r"""
+         $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit,
+    of     the 4 N·m there are. The hand hardly moves, its mass is a filter; the gears will not last.
+    The paper     finds the same limit (Table VIII) and calls it chattering.
+    """,
+    prediction=Choice(
+        "Without rounding the motion needs 4 % of the torque limit. With it, the largest demand is …",
+        (
+            Option("still about 4 %", high=8.0),
+            Option("10 to 30 %", 10.0, 30.0),
+            Option("more than half the limit", low=50.0),
+        ),
+        Measure(TORQUE),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The torque changes by more than 1 N·m RMS from one millisecond to the next.",
+            Measure(ROUGH, "rms"),
+            "at least",
+            1.0,
+            fails_with=("plant.encoder_resolution_deg=0",),
+            because="ideal sensors give a smooth torque",
+        ),
+        Claim(
+            "All the same the hand stays within half a millimetre.",
+            Measure(HAND),
+            "at most",
+            0.5,
+            fails_with=("plant.encoder_resolution_deg=0.02",),
+            because="there the noise alone uses up the torque",
+        ),
+    ),
+    set=(COARSE,),
+    duration=0.8,
+    ghost=Ghost("ideal sensors", ("plant.encoder_resolution_deg=0",)),
+    controls=(RESOLUTION,),
+    plots=PLOTS,
+)
+
+SQUARE = Step(
+    title="A square in the way",
+    text=r"""
+         The digit stays as coarse as it is. The period becomes $T_s = 2$ ms instead of 1 ms; the ghost
+    keeps     1 ms. We know that a slower loop follows less well. What does it do to the noise?
+    """,
+    do="Go to 4 ms. Then try M̄ instead: how much of it buys the same?",
+    why=r"""
+         $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
+    the     error only doubles. Faster is not better when sensors are coarse. $\bar M$ enters once: it
+    trades     noise against accuracy one for one.
+    """,
+    prediction=Value(
+        "T_s twice as long: the torque changes become how many times as large?",
+        Measure(ROUGH, "rms", over_ghost=True),
+        low=0.05,
+        high=5.0,
+        factor=1.4,
+    ),
+    claims=(
+        Claim(
+            "The torque changes are at most 0.4 times as large as with 1 ms.",
+            Measure(ROUGH, "rms", over_ghost=True),
+            "at most",
+            0.4,
+            fails_with=("T_s=0.001",),
+            because="then it is the ghost",
+        ),
+        Claim(
+            "The hand still stays within half a millimetre.",
+            Measure(HAND),
+            "at most",
+            0.5,
+            fails_with=("controller=osf",),
+            because="its torque is smoother, and its model is wrong",
+        ),
+    ),
+    set=(COARSE, "T_s=0.002"),
+    duration=0.8,
+    ghost=Ghost("every 1 ms", ("T_s=0.001",)),
+    controls=(PERIOD, M_BAR, RESOLUTION),
+    plots=PLOTS,
+)
+
+CHALLENGE = Challenge(
+    text=r"""
+         Encoders of 0.005°. Bring the torque changes below 0.5 N·m RMS while the hand stays within half
+    a     millimetre of its circle.
+    """,
+    goals=(
+        Claim("Torque changes stay below 0.5 N·m RMS.", Measure(ROUGH, "rms"), "at most", 0.5),
+        Claim("The hand stays within 0.5 mm.", Measure(HAND), "at most", 0.5),
+    ),
+    knobs=(PERIOD, M_BAR, Control("R", "R of both levels", 0.1, 1e6, log=True)),
+    score=Score(Measure(ROUGH, "rms"), worst=0.5, best=0.1),
+    solutions=(("T_s=0.004",), ("T_s=0.002", "M_bar_scale=0.4")),
+    set=(COARSE,),
+    duration=1.2,
+)
+
+LESSON = Lesson(
+    name="sensors-are-coarse",
+    card=card_of(__doc__),
+    scene="planar3-circle",
+    steps=(ROUNDING, SQUARE),
+    challenge=CHALLENGE,
+)

@@ -1,0 +1,202 @@
+"""Stopping takes distance
+
+A controller that looks 5 ms ahead meets the end of a joint's range: is that soon enough?
+
+Minutes: 10
+You need: lesson "torque-has-a-limit"; braking distance
+"""
+
+from __future__ import annotations
+
+from lessons.challenge import Challenge, Score
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.events import MoveTarget
+from lessons.lesson import Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option
+
+RANGE = Signal("position share", "%")
+TORQUE = Signal("torque share", "%")
+SPEED = Signal("v", "deg/s", column=1)
+JOINT_2 = Signal("q", "deg", column=1)
+PLOTS = (JOINT_2, SPEED, TORQUE)
+# Joint 2 ends at 150°; its target lies 22° beyond that.
+BEYOND = ((0.1, MoveTarget("posture", (0.0, 3.0, -1.57))),)
+ONLY_JOINTS = ("levels.position.enabled=false", "levels.orientation.enabled=false")
+MODE = Control("limits.position", "Position limits", choices=("paper", "viability", "off"))
+N = Control("horizon", "N", 1, 40)
+
+PRINTED = Step(
+    title="Five milliseconds",
+    text=r"""
+         Joint 2 may turn to 150°. Its target is put 22° beyond, and it comes at 57°/s. The paper bounds
+    the     predicted positions (32d),
+
+        $$q_{\min} \le q_{k+j+1} \le q_{\max}, \qquad j = 0 \dots N-1,$$
+
+        with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. That is where the
+    controller     first hears of the limit.
+    """,
+    do="Watch the torque of joint 2 at the moment it gets there.",
+    why=r"""
+         To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s², more than the motor
+    can do.     The problem has no solution, a fallback takes over, the torque hits its limit and the
+    joint overruns     its range. The row is true to the letter and comes too late.
+    """,
+    prediction=Choice(
+        "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
+        (
+            Option("gently, it saw the limit coming", high=50.0),
+            Option("firmly", 50.0, 95.0),
+            Option("with all the torque it has", low=95.0),
+        ),
+        Measure(TORQUE),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The joint overruns its range.",
+            Measure(RANGE),
+            "at least",
+            100.1,
+            fails_with=("limits.position=viability",),
+            because="there it starts to brake in time",
+        ),
+        Claim(
+            "More than twenty QPs have no solution.",
+            Measure(Signal("unsolved"), "sum"),
+            "at least",
+            20.0,
+            fails_with=("horizon=20",),
+            because="with 20 ms there is always one",
+        ),
+    ),
+    set=("limits.position=paper",),
+    events=BEYOND,
+    duration=2.2,
+    controls=(MODE, N),
+    plots=PLOTS,
+)
+
+LONGER = Step(
+    title="Look further?",
+    text=r"""
+         The same rows with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and
+    the     distance $v^2/2a$: at 1 rad/s and the 20 rad/s² this arm is rated for, 50 ms and 1.4°.
+    """,
+    do="Raise N to 40. How far must one look to brake gently, and what does a step cost then?",
+    why=r"""
+         The joint stays within its range, just so, with full torque: 20 ms are enough for an emergency
+    stop,     not for a gentle one. A horizon that sees the whole braking distance would have 50 steps.
+    """,
+    claims=(
+        Claim(
+            "The joint stays within its range.",
+            Measure(RANGE),
+            "at most",
+            100.0,
+            fails_with=("horizon=5",),
+            because="5 ms are too short to stop in",
+        ),
+        Claim(
+            "Still it brakes with more than 90 % of its torque.",
+            Measure(TORQUE),
+            "at least",
+            90.0,
+            fails_with=("limits.position=viability",),
+            because="there the braking is spread over the whole distance",
+        ),
+    ),
+    set=("limits.position=paper", "horizon=20"),
+    events=BEYOND,
+    duration=2.2,
+    controls=(MODE, N),
+    plots=PLOTS,
+)
+
+VIABLE = Step(
+    title="A speed from which one can stop",
+    text=r"""
+         Instead of the position, bound the speed by what can still be stopped before the limit, at any
+    distance:
+
+        $$\dot q \le a\left(-T_s + \sqrt{T_s^2 + 2\,(q_{\max} - q)/a}\right)$$
+
+        A state that satisfies it is called viable: there is a future that keeps the limit. Again $N =
+    5$.
+    """,
+    do="Make the joint come as fast as you can.",
+    why=r"""
+         Now the very next step already knows the whole braking distance. The torque hardly shows the
+    stop,     and no QP is without a solution. What a short horizon cannot see must be put into its
+    bounds. It is     this lab's default and a deliberate departure from (32d).
+    """,
+    prediction=Choice(
+        "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",
+        (
+            Option("all there is, as before", low=95.0),
+            Option("about half", 30.0, 95.0),
+            Option("less than a third", high=30.0),
+        ),
+        Measure(TORQUE),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The joint stays within its range.",
+            Measure(RANGE),
+            "at most",
+            100.0,
+            fails_with=("limits.position=paper",),
+            because="5 ms are too short to stop in",
+        ),
+        Claim(
+            "It needs less than 30 % of its torque.",
+            Measure(TORQUE),
+            "at most",
+            30.0,
+            fails_with=("limits.position=paper",),
+            because="the late stop takes all of it",
+        ),
+        Claim(
+            "Every QP has a solution.",
+            Measure(Signal("unsolved"), "sum"),
+            "at most",
+            0.0,
+            fails_with=("limits.position=paper",),
+            because="near the limit the printed rows contradict each other",
+        ),
+    ),
+    events=BEYOND,
+    duration=2.2,
+    controls=(MODE, N, Control("limits.velocity_scale", "Speed limit, factor", 0.1, 3.0)),
+    plots=PLOTS,
+)
+
+CHALLENGE = Challenge(
+    text=r"""
+         With the printed rows only: bring joint 2 to 149° and beyond without overrunning its range, and
+    brake with less than 90 % of the torque.
+    """,
+    goals=(
+        Claim("Joint 2 gets to 149°.", Measure(JOINT_2, "last"), "at least", 149.0),
+        Claim("It stays within its range.", Measure(RANGE), "at most", 100.0),
+        Claim("It needs less than 90 % of its torque.", Measure(TORQUE), "at most", 90.0),
+    ),
+    knobs=(N, Control("limits.velocity_scale", "Speed limit, factor", 0.1, 1.0)),
+    score=Score(Measure(TORQUE), worst=90.0, best=30.0),
+    solutions=(("horizon=30",), ("horizon=30", "limits.velocity_scale=0.5")),
+    set=("limits.position=paper",),
+    events=BEYOND,
+    duration=2.6,
+)
+
+LESSON = Lesson(
+    name="stopping-takes-distance",
+    card=card_of(__doc__),
+    scene="planar3-hold",
+    set=ONLY_JOINTS,
+    steps=(PRINTED, LONGER, VIABLE),
+    challenge=CHALLENGE,
+)

@@ -1,0 +1,150 @@
+"""Stretched out
+
+A straight arm cannot push further out: does its controller know?
+
+Minutes: 8
+You need: lesson "when-tasks-fight"; the rank of a matrix
+"""
+
+from __future__ import annotations
+
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option
+
+HAND = Signal("error/position", "mm")
+TORQUE = Signal("torque share", "%")
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "tdeosf", "hqp"))
+SMOOTH = Control("smooth", "Start gently", choices=(False, True))
+
+INVERSE = Step(
+    title="The wall of reach",
+    text=r"""
+         The arm starts straight, and the circle starts sideways at the very edge of its reach. All
+    three     columns of $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1}
+    J^\top$     loses its rank. Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
+    """,
+    do="Try TDEOSF, then HQP and HIMPC.",
+    why=r"""
+         In the first instant almost no torque would be enough, since the circle runs along what the arm
+    can     do. But rounding leaves a trace of error in the direction that cannot be served, and the
+    inverse     magnifies it many million times. Motors clip that nonsense, and it depends on luck what
+    is left.
+    """,
+    prediction=Choice(
+        "The hand should only move sideways. How much torque does OSF ask for, at most?",
+        (
+            Option("what the motion needs, a quarter of the limit", high=100.0),
+            Option("a few times the limit", 100.0, 1e4),
+            Option("more than a thousand times the limit", low=1e5),
+        ),
+        Measure(TORQUE),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The demand exceeds a thousand times the torque limit.",
+            Measure(TORQUE),
+            "at least",
+            1e5,
+            fails_with=("controller=himpc",),
+            because="nothing is inverted, and bounds are part of the problem",
+        ),
+    ),
+    set=("controller=osf",),
+    duration=1.0,
+    controls=(CONTROLLER,),
+    plots=(TORQUE, HAND),
+)
+
+REGULAR = Step(
+    title="No inverse, no singularity",
+    text=r"""
+         HIMPC asks a softer question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
+    \Delta\tau     \rVert^2$ small? Where $J$ loses a direction, the first term does not care and the
+    second says: then     do nothing there. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive
+    definite whatever $J$     is (Lemma 1).
+    """,
+    do="Make R smaller by a factor of a million. Is it still calm?",
+    why=r"""
+         The torque never leaves its bounds, and after a few tenths of a second the hand is on its
+    circle. No     case distinction, no damping factor to tune, no special treatment of singular poses.
+    """,
+    claims=(
+        Claim(
+            "The demanded torque stays within its limit.",
+            Measure(TORQUE),
+            "at most",
+            100.0,
+            fails_with=("controller=tdeosf",),
+            because="it inverts a matrix that has no inverse",
+        ),
+        Claim(
+            "From 1 s on the hand is within half a millimetre of its circle.",
+            Measure(HAND, after=1.0),
+            "at most",
+            0.5,
+            fails_with=("controller=hqp",),
+            because="it comes through as well, but with a model that is 20 % light",
+        ),
+    ),
+    duration=2.0,
+    controls=(CONTROLLER, Control("R", "R of both levels", 1e-5, 100.0, log=True)),
+    plots=(TORQUE, HAND),
+)
+
+BLAME = Step(
+    title="Who is to blame?",
+    text=r"""
+         There was an error of some millimetres right at the start. Is the singularity to blame, or the
+    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts gently,
+    at the same singular pose. The ghost starts with the jump.
+    """,
+    do="Look at 8 s: straight again, and the circles change there.",
+    why=r"""
+         Nearly all of it was the jump: an arm cannot change its velocity in no time. In a singular pose
+    HIMPC follows what can be followed. An experiment that shows two causes at once shows neither.
+    """,
+    prediction=Choice(
+        "Same singular pose, gentle start. The largest error becomes …",
+        (
+            Option("hardly smaller: the pose is the problem", low=0.7),
+            Option("about half", 0.3, 0.7),
+            Option("less than a third", high=0.3),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The largest error is at most a tenth of the ghost's.",
+            Measure(HAND, over_ghost=True),
+            "at most",
+            0.1,
+            fails_with=("smooth=false",),
+            because="then it is the ghost",
+        ),
+        Claim(
+            "The hand stays within half a millimetre.",
+            Measure(HAND),
+            "at most",
+            0.5,
+            fails_with=("controller=hqp",),
+            because="its model is wrong, smooth or not",
+        ),
+    ),
+    set=("smooth=true",),
+    duration=2.0,
+    ghost=Ghost("starts with a jump of velocity", ("smooth=false",)),
+    controls=(SMOOTH, CONTROLLER),
+    plots=(HAND, TORQUE),
+)
+
+LESSON = Lesson(
+    name="stretched-out",
+    card=card_of(__doc__),
+    scene="planar3-singular",
+    steps=(INVERSE, REGULAR, BLAME),
+)

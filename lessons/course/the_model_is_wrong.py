@@ -1,0 +1,161 @@
+"""The model is wrong
+
+If you had the exact model of an arm, would you still not use it?
+
+Minutes: 10
+You need: lesson "no-model-needed"
+"""
+
+from __future__ import annotations
+
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option, Value
+
+HAND = Signal("error/position", "mm")
+Q1 = Signal("error/q1", "deg")
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "hqp"))
+FRICTION = Control("plant.friction", "Friction of the joints, N·m", 0.0, 0.3)
+MASS = Control("plant.mass_scale", "Mass of the links, factor", 0.5, 2.0)
+# What the plant of this scene really is, told to the controller.
+EXACT = (
+    "nominal.mass_scale=1",
+    "nominal.inertia_scale=1",
+    "nominal.armature=[0.05,0.05,0.03]",
+    "nominal.damping=[0.15,0.1,0.08]",
+)
+
+EXACTLY = Step(
+    title="If only",
+    text=r"""
+         OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here it is told the
+    exact     masses, inertias and viscous friction, and the dry friction is taken out of the arm. Its
+    model (19)     is the arm. The ghost is HIMPC, which has no model and lives on what happened a
+    millisecond ago.
+    """,
+    do="Put a little dry friction back in.",
+    why=r"""
+         A perfect model wins by far: it knows what is going to happen, time-delay estimation only what
+    has     happened. The question is how long such a model stays perfect.
+    """,
+    prediction=Choice(
+        "Exact model against no model at all. OSF's error is …",
+        (
+            Option("much smaller than HIMPC's", high=0.2),
+            Option("about the same", 0.5, 2.0),
+            Option("larger", low=2.0),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "With the exact model the largest error is less than a tenth of HIMPC's.",
+            Measure(HAND, over_ghost=True),
+            "at most",
+            0.1,
+            fails_with=("plant.friction=0.05",),
+            because="so little dry friction is enough to lose the lead",
+        ),
+    ),
+    set=("controller=osf", "plant.friction=0", *EXACT),
+    duration=1.5,
+    ghost=Ghost("himpc: no model", ("controller=himpc",)),
+    controls=(FRICTION, MASS, CONTROLLER),
+    plots=(HAND, Q1),
+)
+
+REALITY = Step(
+    title="As identified",
+    text=r"""
+         Now as in a laboratory: all masses and inertias of the model are 20 % light, and it knows no
+    friction. What the model gets wrong, (24), acts like a disturbance all the time:
+
+        $$\beta = J M_n^{-1} ( \tilde M \ddot q + \tilde N + \tau_d )$$
+    """,
+    do="Remove the friction, then correct the masses. Which of the two errors mattered?",
+    why=r"""
+         The springs of (4) must hold against whatever the model does not explain; here that is mostly
+    the     friction. HIMPC never had an opinion about friction: it has measured what the torque of a
+    millisecond ago did.
+    """,
+    prediction=Value(
+        "Model 20 % light, friction unknown: how many times larger is OSF's error than HIMPC's?",
+        Measure(HAND, over_ghost=True),
+        low=0.1,
+        high=1000.0,
+        factor=2.0,
+    ),
+    claims=(
+        Claim(
+            "The largest error is at least ten times HIMPC's.",
+            Measure(HAND, over_ghost=True),
+            "at least",
+            10.0,
+            fails_with=("plant.friction=0", *EXACT),
+            because="with the exact model OSF is the better one",
+        ),
+    ),
+    set=("controller=osf",),
+    duration=1.5,
+    ghost=Ghost("himpc: no model", ("controller=himpc",)),
+    controls=(CONTROLLER, FRICTION, MASS),
+    plots=(HAND, Q1),
+)
+
+HEAVIER = Step(
+    title="Half as heavy again",
+    text=r"""
+         HIMPC, and every link 50 % heavier than before. Nothing is told, nothing is retuned; $\bar M$
+    stays.     Table V of the paper disturbs the inertias by ±20 % and finds level 1 changed by about 2
+    % at most. The ghost has     the old links.
+    """,
+    do="Go down to half the mass. Why is that the dangerous direction?",
+    why=r"""
+         The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower;
+    lighter ones bring the gauge towards its cliff. What matters is only that $\lVert I - M^{-1}\bar M
+    \rVert$ stays below 1, and that holds for a wide range of arms (Remark 4).
+    """,
+    prediction=Choice(
+        "Links 50 % heavier, not told. HIMPC's largest error grows …",
+        (
+            Option("by half, as the mass does", 1.35, 1.65),
+            Option("by less than a quarter", high=1.25),
+            Option("to more than twice", low=2.0),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The largest error grows by less than 25 %.",
+            Measure(HAND, over_ghost=True),
+            "at most",
+            1.25,
+            fails_with=("M_bar_scale=0.5",),
+            because="half the M̄ corrects half as fast",
+        ),
+        Claim(
+            "The hand stays within 0.3 mm.",
+            Measure(HAND),
+            "at most",
+            0.3,
+            fails_with=("controller=hqp",),
+            because="its model is wrong by more now",
+        ),
+    ),
+    set=("plant.mass_scale=1.5", "plant.inertia_scale=1.5"),
+    duration=1.5,
+    ghost=Ghost("links as they were", ("plant.mass_scale=1", "plant.inertia_scale=1")),
+    controls=(MASS, CONTROLLER, FRICTION),
+    plots=(HAND, Signal("gauge_radius")),
+)
+
+LESSON = Lesson(
+    name="the-model-is-wrong",
+    card=card_of(__doc__),
+    scene="planar3-circle",
+    steps=(EXACTLY, REALITY, HEAVIER),
+)

@@ -1,0 +1,173 @@
+"""Torque has a limit
+
+When the motors cannot do it all, who goes without?
+
+Minutes: 8
+You need: lesson "two-tasks"
+"""
+
+from __future__ import annotations
+
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option, Value
+
+HAND = Signal("error/position", "mm")
+Q1 = Signal("error/q1", "deg")
+TORQUE = Signal("torque share", "%")
+SCALE = Control("limits.torque_scale", "Torque limit, factor", 0.01, 1.0, log=True)
+SWING = "q1_amplitude_deg=60"
+
+ENOUGH = Step(
+    title="Enough for all",
+    text=r"""
+         The hand follows its circle and joint 1 swings by 60°, one round in 8 s. Every torque must stay
+    within its limit, now and over the whole horizon (32f):
+
+        $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
+
+        The motors could give 4 N·m. Six per cent of that are allowed here.
+    """,
+    do="Lower the limit until something changes. What is it that changes first?",
+    why=r"""
+         A slow motion needs little: three quarters of the 0.24 N·m. A bound that is not met does
+    nothing.
+    """,
+    prediction=Value(
+        "Which share of the reduced limit does the motion need at most?",
+        Measure(TORQUE),
+        low=1.0,
+        high=100.0,
+        factor=1.4,
+    ),
+    claims=(
+        Claim(
+            "The hand stays within 0.5 mm.",
+            Measure(HAND),
+            "at most",
+            0.5,
+            fails_with=("limits.torque_scale=0.03",),
+            because="that is too little for level 1 alone",
+        ),
+        Claim(
+            "Joint 1 stays within 1°.",
+            Measure(Q1),
+            "at most",
+            1.0,
+            fails_with=("limits.torque_scale=0.04",),
+            because="level 1 needs the torque that joint 1 would need",
+        ),
+    ),
+    set=(SWING, "limits.torque_scale=0.06"),
+    duration=3.0,
+    controls=(SCALE,),
+    plots=(TORQUE, HAND, Q1),
+)
+
+SHORT = Step(
+    title="A third less",
+    text=r"""
+         Four per cent of the torque are left, 0.16 N·m. It is not enough for both wishes any more.
+    Every     level is solved under the same bounds, level 1 first; level 2 chooses among what leaves
+    level 1 as     it is (34).
+    """,
+    do="Open the list of active bounds: which level feels the torque limit?",
+    why=r"""
+         Level 2 goes without: joint 1 falls behind by ten degrees and more while the hand does not
+    notice.     The bound is felt by the level that is still hungry.
+    """,
+    prediction=Choice(
+        "Both tasks together need more torque than there is. The hand's largest error …",
+        (
+            Option("stays below a millimetre", high=1.0),
+            Option("grows to some centimetres", low=10.0),
+        ),
+        Measure(HAND),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The hand stays within 0.5 mm.",
+            Measure(HAND),
+            "at most",
+            0.5,
+            fails_with=("limits.torque_scale=0.03",),
+            because="with even less torque level 1 goes without, too",
+        ),
+        Claim(
+            "Joint 1 falls behind by more than 5°.",
+            Measure(Q1),
+            "at least",
+            5.0,
+            fails_with=("limits.torque_scale=0.06",),
+            because="there is enough for both",
+        ),
+        Claim(
+            "The demanded torque never exceeds the limit.",
+            Measure(TORQUE),
+            "at most",
+            100.01,
+            fails_with=("controller=tdeosf",),
+            because="it knows no bounds",
+        ),
+    ),
+    set=(SWING, "limits.torque_scale=0.04"),
+    duration=3.0,
+    controls=(SCALE, Control("controller", "Controller", choices=("himpc", "tdeosf"))),
+    plots=(TORQUE, HAND, Q1),
+)
+
+LESS = Step(
+    title="Not even enough for one",
+    text=r"""
+         Three per cent, 0.12 N·m. Now the circle by itself is too much. The ghost has     the task of
+    joint 1 switched off.
+    """,
+    do="Find the least torque with which the hand is still served.",
+    why=r"""
+         The hand leaves its circle, since physics ranks above level 1. But it leaves it no further than
+    without any level 2. The levels below get only what level 1     has no use for.
+    """,
+    prediction=Choice(
+        "Compared with the ghost, which has no second task: how much larger is the hand's error?",
+        (
+            Option("not larger: the hand gets all there is", high=1.1),
+            Option("about twice", 1.1, 3.0),
+            Option("much larger", low=3.0),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The hand is off by more than 3 mm.",
+            Measure(HAND),
+            "at least",
+            3.0,
+            fails_with=("limits.torque_scale=0.04",),
+            because="that is still enough for level 1",
+        ),
+        Claim(
+            "Its largest error is at most 10 % above that of a hand alone.",
+            Measure(HAND, over_ghost=True),
+            "at most",
+            1.1,
+            fails_with=("limits.torque_scale=0.025",),
+            because="less torque than the ghost has",
+        ),
+    ),
+    set=(SWING, "limits.torque_scale=0.03"),
+    duration=3.0,
+    ghost=Ghost("without joint 1's task", ("levels.q1.enabled=false",)),
+    controls=(SCALE, Control("levels.q1.enabled", "Joint 1's task on", choices=(False, True))),
+    plots=(TORQUE, HAND, Q1),
+)
+
+LESSON = Lesson(
+    name="torque-has-a-limit",
+    card=card_of(__doc__),
+    scene="planar3-circle",
+    steps=(ENOUGH, SHORT, LESS),
+)

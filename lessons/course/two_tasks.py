@@ -1,0 +1,218 @@
+"""Two tasks, one arm
+
+Two wishes cannot both be granted: does weighing them do, or must one of them rank first?
+
+Minutes: 10
+You need: lesson "one-task"; Jacobians
+"""
+
+from __future__ import annotations
+
+from lessons.challenge import Challenge, Score
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option
+
+HAND = Signal("error/position", "mm")
+Q1 = Signal("error/q1", "deg")
+SECONDS = 4.0
+PLOTS = (HAND, Q1)
+
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "weighted"))
+WEIGHT = Control("levels.q1.Q", "Q of level 2", 0.01, 1000.0, log=True)
+
+BOTH = Step(
+    title="Enough for both",
+    text=r"""
+         Level 1: the hand follows a circle, two coordinates. Level 2: joint 1 swings by 20°, one
+    coordinate.     Three joints, three wishes: it works out exactly.
+    """,
+    do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
+    why="As long as all wishes can be granted together, priorities do not matter at all.",
+    claims=(
+        Claim(
+            "The hand stays within 1 mm of its circle.",
+            Measure(HAND),
+            "at most",
+            1.0,
+            fails_with=("controller=osf",),
+            because="its model is 20 % light and knows no friction",
+        ),
+        Claim(
+            "Joint 1 stays within 1° of its reference.",
+            Measure(Q1),
+            "at most",
+            1.0,
+            fails_with=("q1_amplitude_deg=-120",),
+            because="swinging that far, joint 1 would have to leave the circle",
+        ),
+    ),
+    set=("q1_amplitude_deg=20",),
+    duration=2.5,
+    controls=(Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 60.0),),
+    plots=PLOTS,
+)
+
+WEIGHTED = Step(
+    title="Weigh them",
+    text=r"""
+         Now joint 1 is to swing to −120° and back. From there the links cannot reach the circle. The
+    controller puts both wishes into one cost with equal weights, $Q_1 = Q_2 = 200$:
+
+        $$\min_{\Delta\tau} \; \lVert e_1 \rVert_{Q_1}^2 + \lVert e_2 \rVert_{Q_2}^2 + \lVert \Delta\tau
+    \rVert_R^2$$
+    """,
+    do="Make Q of level 2 smaller until the hand is where you want it. What does it cost?",
+    why=r"""
+         A sum is a trade: a metre of the hand against a radian of joint 1. Both lose, and the hand
+    leaves     its circle by a quarter of a metre. No unit tells you the right weights.
+    """,
+    prediction=Choice(
+        "Equal weights for hand and joint 1: how far from its circle does the hand get?",
+        (
+            Option("less than 1 mm", high=1.0),
+            Option("about a centimetre", 1.0, 50.0),
+            Option("more than 10 cm", low=100.0),
+        ),
+        Measure(HAND),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The hand is off by more than 10 cm.",
+            Measure(HAND),
+            "at least",
+            100.0,
+            fails_with=("controller=himpc",),
+            because="there the hand ranks first",
+        ),
+    ),
+    set=("controller=weighted",),
+    duration=SECONDS,
+    ghost=Ghost("himpc: strict priorities", ("controller=himpc",)),
+    controls=(CONTROLLER, WEIGHT),
+    plots=PLOTS,
+)
+
+STRICT = Step(
+    title="Rank them",
+    text=r"""
+         HIMPC solves one problem per level. The second may choose among the torques that leave the
+    first as     it is, and that is what (33) says:
+
+        $$\hat J_p \bar M^{-1} \Delta\tau_p^* = \hat J_p \bar M^{-1} \Delta\tau_i, \qquad p < i$$
+
+        Level 2 is granted what is left. The ghost is the weighted controller.
+    """,
+    do="Set Q of level 2 to 1000. Does the hand notice? And with the weighted controller?",
+    why=r"""
+         Joint 1 pays alone: it goes no further than the circle lets it. The hand keeps its circle to a
+    millimetre, and no weight of level 2 can change that.
+    """,
+    prediction=Choice(
+        "With strict priorities: who pays for the conflict?",
+        (
+            Option("the hand, a little", low=3.0),
+            Option("only joint 1", high=3.0),
+        ),
+        Measure(HAND),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The hand stays within 1.5 mm of its circle.",
+            Measure(HAND),
+            "at most",
+            1.5,
+            fails_with=("controller=weighted",),
+            because="equal weights trade the hand away",
+        ),
+        Claim(
+            "Joint 1 is off by more than 30°: it pays alone.",
+            Measure(Q1),
+            "at least",
+            30.0,
+            fails_with=("controller=weighted",),
+            because="there the hand pays for most of it",
+        ),
+    ),
+    duration=SECONDS,
+    ghost=Ghost("weighted, Q₁ = Q₂", ("controller=weighted",)),
+    controls=(CONTROLLER, WEIGHT),
+    plots=PLOTS,
+)
+
+LIMIT = Step(
+    title="Is a large weight a priority?",
+    text=r"""
+         Weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The ghost is
+    strict.
+    """,
+    do=r"""
+         Make Q of level 2 ten and a hundred times smaller still. Then look at level 2 on the easy
+    circle.
+    """,
+    why=r"""
+         Better, and still several times the error of a strict priority. In the limit the weighted
+    solution     becomes the strict one, but level 2 then weighs less than $R$ and is not followed any
+    more even     where it could be.
+    """,
+    prediction=Choice(
+        "The hand counts 200 times as much as joint 1. Its largest error is …",
+        (
+            Option("the same as with strict priorities", high=1.5),
+            Option("several times larger", 1.5, 30.0),
+            Option("still centimetres", low=30.0),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The largest error of the hand is more than twice that of strict priorities.",
+            Measure(HAND, over_ghost=True),
+            "at least",
+            2.0,
+            fails_with=("controller=himpc",),
+            because="then both robots are the same",
+        ),
+    ),
+    set=("controller=weighted", "levels.q1.Q=1"),
+    duration=SECONDS,
+    ghost=Ghost("himpc: strict priorities", ("controller=himpc",)),
+    controls=(CONTROLLER, WEIGHT),
+    plots=PLOTS,
+)
+
+CHALLENGE = Challenge(
+    text=r"""
+         The start is weighted with equal weights. Keep the hand within 5 mm of its circle while joint 1
+    still gets as close to its reference as it can (within 80°), with no torque change rougher than 0.1
+    N·m RMS.
+    """,
+    goals=(
+        Claim("The hand stays within 5 mm.", Measure(HAND), "at most", 5.0),
+        Claim("Joint 1 stays within 80°.", Measure(Q1), "at most", 80.0),
+        Claim(
+            "Torque changes stay below 0.1 N·m RMS.",
+            Measure(Signal("delta_tau", "N·m"), "rms"),
+            "at most",
+            0.1,
+        ),
+    ),
+    knobs=(CONTROLLER, WEIGHT, Control("levels.position.Q", "Q of level 1", 1.0, 1e5, log=True)),
+    score=Score(Measure(HAND, "rms"), worst=5.0, best=0.2),
+    solutions=(("controller=himpc",), ("levels.q1.Q=0.3",)),
+    set=("controller=weighted",),
+    duration=SECONDS,
+)
+
+LESSON = Lesson(
+    name="two-tasks",
+    card=card_of(__doc__),
+    scene="planar3-conflict",
+    steps=(BOTH, WEIGHTED, STRICT, LIMIT),
+    challenge=CHALLENGE,
+)

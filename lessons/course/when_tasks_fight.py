@@ -1,0 +1,168 @@
+"""When tasks fight
+
+Two tasks that are fine alone meet where they cannot both be had: why does that break some controllers?
+
+Minutes: 10
+You need: lesson "two-tasks"; the null space of a matrix
+"""
+
+from __future__ import annotations
+
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option
+
+HAND = Signal("error/position", "mm")
+Q1 = Signal("error/q1", "deg")
+TORQUE = Signal("torque share", "%")
+SPEED = Signal("speed share", "%")
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "tdeosf", "hqp"))
+AMPLITUDE = Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 20.0)
+
+PROJECTION = Step(
+    title="Project and invert",
+    text=r"""
+         The classical way to rank tasks: project task 2 into the null space of task 1, $J_{2|1} = J_2
+    P_1$,     and compute the force it takes there. That needs the inverse of $J_{2|1} M^{-1}
+    J_{2|1}^\top$. Here     the hand follows its circle and joint 1 swings to −120°, beyond what the
+    circle allows. At about 1.4     s the two motions need exactly the same joints: $J_{2|1}$ vanishes.
+    Its controller (OSF) has a model     that is 20 % light. The torque limit of the motors is only
+    measured here, not enforced.
+    """,
+    do="Switch to HIMPC in good time, and back, while the arm moves.",
+    why=r"""
+         Dividing by almost nothing gives almost infinity: the demanded torque reaches a thousand times
+    the     limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
+    singularity is made by the algorithm, and is called algorithmic for that.
+    """,
+    prediction=Choice(
+        "When the tasks start to conflict, the torque that OSF demands is at most …",
+        (
+            Option("within the limit: task 2 gives way", high=100.0),
+            Option("up to ten times the limit", 100.0, 1000.0),
+            Option("beyond a hundred times the limit", low=10000.0),
+        ),
+        Measure(TORQUE),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The demand exceeds a hundred times the torque limit.",
+            Measure(TORQUE),
+            "at least",
+            10000.0,
+            fails_with=("controller=himpc",),
+            because="nothing is inverted there, and the bounds are part of the problem",
+        ),
+        Claim(
+            "A joint turns at more than twenty times its speed limit: control is lost.",
+            Measure(SPEED),
+            "at least",
+            2000.0,
+            fails_with=("q1_amplitude_deg=20",),
+            because="a swing of 20° does not conflict",
+        ),
+    ),
+    set=("controller=osf",),
+    duration=2.0,
+    controls=(CONTROLLER, AMPLITUDE),
+    plots=(TORQUE, SPEED, HAND),
+)
+
+BETTER_MODEL = Step(
+    title="Would a better model help?",
+    text=r"""
+         TDEOSF replaces the model by time-delay estimation, as HIMPC does, and keeps the projection:
+    $(J_{2|1} \bar M^{-1} J_{2|1}^\top)^{-1}$. Until the conflict it is     far more accurate than OSF.
+    """,
+    do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
+    why=r"""
+         It knows the arm better and fails at the same place, for the same reason. The trouble is not
+    what     the model says, it is the inverse.
+    """,
+    prediction=Choice(
+        "Estimated dynamics instead of a wrong model. At the conflict the arm …",
+        (
+            Option("comes through, since the model is right", high=500.0),
+            Option("is lost as before", low=500.0),
+        ),
+        Measure(SPEED),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "Up to 1 s the hand is within 0.3 mm.",
+            Measure(HAND, until=1.0),
+            "at most",
+            0.3,
+            fails_with=("controller=osf",),
+            because="its model is 20 % light",
+        ),
+        Claim(
+            "Then a joint passes twenty times its speed limit.",
+            Measure(SPEED),
+            "at least",
+            2000.0,
+            fails_with=("controller=himpc",),
+            because="no projected Jacobian, no inverse",
+        ),
+    ),
+    set=("controller=tdeosf",),
+    duration=2.0,
+    controls=(CONTROLLER, AMPLITUDE),
+    plots=(TORQUE, SPEED, HAND),
+)
+
+EQUALITY = Step(
+    title="A constraint instead of a projection",
+    text=r"""
+         HIMPC never forms $J_{2|1}$. Level 2 is a problem of its own with the equality (34g), which
+    keeps     what level 1 decided. If nothing is left for level 2, that problem is still solvable:
+    $\Delta\tau_2     = \Delta\tau_1$ satisfies everything (Theorem 2), and its Hessian is positive
+    definite because of     $R$ (Lemma 1).
+    """,
+    do="Watch joint 1 at 1.4 s and again where it comes back.",
+    why=r"""
+         Level 2 wants something it cannot have. It presses against the edge of what level 1 leaves,
+    within the     bounds on speed and torque; the torque stays small because a large one would buy
+    nothing.
+    """,
+    claims=(
+        Claim(
+            "The hand stays within 1.5 mm of its circle.",
+            Measure(HAND),
+            "at most",
+            1.5,
+            fails_with=("controller=osf",),
+            because="it is off by millimetres, and then lost",
+        ),
+        Claim(
+            "The demanded torque never exceeds its limit.",
+            Measure(TORQUE),
+            "at most",
+            100.0,
+            fails_with=("controller=tdeosf",),
+            because="an inverse near a singularity knows no bound",
+        ),
+        Claim(
+            "No joint exceeds its speed limit by more than 5 %.",
+            Measure(SPEED),
+            "at most",
+            105.0,
+            fails_with=("controller=hqp",),
+            because="a one-step QP bounds torques, not speeds",
+        ),
+    ),
+    duration=3.5,
+    controls=(CONTROLLER, AMPLITUDE),
+    plots=(TORQUE, SPEED, HAND, Q1),
+)
+
+LESSON = Lesson(
+    name="when-tasks-fight",
+    card=card_of(__doc__),
+    scene="planar3-conflict",
+    steps=(PROJECTION, BETTER_MODEL, EQUALITY),
+)

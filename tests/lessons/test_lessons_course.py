@@ -1,0 +1,285 @@
+"""The course: every card is complete, every number on it is measured, and every claim can fail."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from latex2mathml.converter import convert
+
+from himpc.telemetry import layout_of
+from lessons.challenge import Challenge, Score
+from lessons.check import Verdict, check
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.course import COURSE, load_lesson
+from lessons.events import MoveTarget, Set
+from lessons.lesson import Card, Ghost, Lesson, Run, Step, card_of
+from lessons.measure import DERIVED, Measure, Signal
+from lessons.parallel import one_by_one
+from lessons.prediction import Choice, Option, Sketch, Value
+from lessons.run import parse_assignment
+from lessons.scene import Scene
+from lessons.settings import changed, paths
+from robots import InputError
+
+HAND = Signal("error/position", "mm")
+
+
+@pytest.fixture(scope="module")
+def verdicts() -> list[Verdict]:
+    """Every run of every lesson, once."""
+    return check([load_lesson(name) for name in COURSE])
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_everything_a_lesson_states_is_so(name: str, verdicts: list[Verdict]) -> None:
+    """Claims hold and fail under their wrong setting; answers are measured; challenges can be solved."""
+    own = [verdict for verdict in verdicts if verdict.lesson == name]
+    assert sum(bool(verdict.wrong) for verdict in own) == sum(
+        len(step.claims) for step in load_lesson(name).steps
+    )
+    assert not [f"{verdict.where}: {verdict.what}: {verdict.fault}" for verdict in own if verdict.fault]
+
+
+def texts(lesson: Lesson) -> Iterator[str]:
+    for step in lesson.steps:
+        yield from (step.text, step.do, step.why)
+        yield from (claim.text for claim in step.claims)
+    if lesson.challenge is not None:
+        yield lesson.challenge.text
+
+
+def scene_of(run: Run) -> Scene:
+    scene = run.prepared()
+    assert isinstance(scene, Scene)
+    return scene
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_a_card_is_complete(name: str) -> None:
+    """Name, question, time, what is needed, and two to four steps with one idea each."""
+    lesson = load_lesson(name)
+    assert lesson.name == name
+    assert lesson.card.question.endswith("?")
+    assert 5 <= lesson.card.minutes <= 20
+    assert lesson.card.needs
+    assert 2 <= len(lesson.steps) <= 4
+    assert any(step.prediction is not None for step in lesson.steps)
+    assert all(step.text and step.do and step.why and step.plots for step in lesson.steps)
+    earlier = COURSE[: COURSE.index(name)]
+    assert all(word in earlier for word in re.findall(r'lesson "([^"]+)"', lesson.card.needs))
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_equations_can_be_rendered(name: str) -> None:
+    """Dollar signs come in pairs, and what stands between them is LaTeX."""
+    for text in texts(load_lesson(name)):
+        assert text.count("$") % 2 == 0, text
+        for display, inline in re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", text, re.DOTALL):
+            assert "<math" in convert(display or inline)
+        # A forgotten backslash in a Python string turns \t and \b into control characters.
+        assert not re.search(r"[\x00-\x09\x0b-\x1f]", text), text
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_controls_and_plots_exist_in_the_scene(name: str) -> None:
+    """Each control's path is a setting whose value the control can show; each signal is recorded."""
+    lesson = load_lesson(name)
+    for step in lesson.steps:
+        scene = scene_of(lesson.run_of(step))
+        fields = layout_of(scene.robot, scene.settings.levels).fields
+        assert all(signal.name in fields or signal.name in DERIVED for signal in step.plots)
+        for control in step.controls:
+            assert_takes(scene, control)
+    if lesson.challenge is not None:
+        for knob in lesson.challenge.knobs:
+            assert_takes(scene_of(lesson.run_of(lesson.challenge)), knob)
+        assert len(set(lesson.challenge.solutions)) >= 2
+
+
+def assert_takes(scene: Scene, control: Control) -> None:
+    assert control.path in paths(scene.settings)
+    for value in control.choices or (control.low, control.high):
+        assert control.takes(value)
+        changed(scene.settings, control.path, value)
+
+
+def test_lessons_can_be_sent_to_another_process() -> None:
+    """Runs and measures are plain data: equal after pickling, and usable as keys."""
+    for name in COURSE:
+        lesson = load_lesson(name)
+        runs = {lesson.run_of(step): step.claims[0].measure for step in lesson.steps}
+        assert pickle.loads(pickle.dumps(runs)) == runs
+
+
+def test_an_unknown_lesson_is_answered_with_the_nearest() -> None:
+    with pytest.raises(InputError, match="did you mean 'stretched-out'"):
+        load_lesson("streched-out")
+
+
+def test_cards_are_read_from_the_docstring() -> None:
+    card = card_of("Title\n\nWhat is it?\n\nMinutes: 7\nYou need: one thing,\nand another\n")
+    assert card == Card("Title", "What is it?", 7, "one thing, and another")
+    for broken in (
+        "Title\n\nWhat is it?\n\nMinutes: 7\n",
+        "Title\n\nNo question.\n\nMinutes: 7\nYou need: x",
+        None,
+    ):
+        with pytest.raises(ValueError, match="docstring"):
+            card_of(broken)
+
+
+def lesson_with(step: Step, challenge: Challenge | None = None) -> Lesson:
+    return Lesson("probe", Card("t", "q?", 5, "n"), "planar3-hold", (step,), challenge=challenge)
+
+
+MOVE = ((0.0, MoveTarget("position", (0.6, 0.2))),)
+
+
+def aside(claim: Claim, **changes: object) -> Step:
+    """Two tenths of a second in which the planar hand starts towards a target 10 cm away."""
+    return Step("s", "t", "d", "w", (claim,), **{"events": MOVE, "duration": 0.2, **changes})  # pyright: ignore[reportArgumentType]
+
+
+OFF = ("levels.position.enabled=false",)
+SMALL = Claim("The hand follows.", Measure(HAND), "at most", 2.0, OFF, "nobody asks")
+
+
+def faults(lesson: Lesson) -> list[str]:
+    return [verdict.fault for verdict in check([lesson], one_by_one) if verdict.fault]
+
+
+def test_a_sound_lesson_has_no_faults() -> None:
+    assert not faults(lesson_with(aside(SMALL)))
+
+
+@pytest.mark.parametrize(
+    ("step", "fault"),
+    [
+        (aside(replace(SMALL, bound=1e-3)), "it is false"),
+        (aside(replace(SMALL, bound=1e3)), "it holds with levels.position.enabled=false too"),
+        (aside(replace(SMALL, fails_with=("levels.nothing.Q=1",))), "its wrong setting cannot be run"),
+        (aside(replace(SMALL, measure=Measure(HAND, after=5.0))), "it is false"),
+        (aside(SMALL, events=(*MOVE, (0.0, Set("horizon", 0)))), "1 of its events are not accepted"),
+        (
+            aside(
+                SMALL, prediction=Choice("?", (Option("a", high=9.0), Option("b", low=9.0)), Measure(HAND), 0)
+            ),
+            "the tempting option is the right one",
+        ),
+        (
+            aside(
+                SMALL, prediction=Choice("?", (Option("a", low=9.0), Option("b", low=99.0)), Measure(HAND), 0)
+            ),
+            "0 of its options fit",
+        ),
+        (aside(SMALL, prediction=Value("?", Measure(HAND), 50.0, 60.0)), "is off its scale"),
+        (aside(SMALL, prediction=Sketch("?", HAND, 0.0, 0.1, 0.2)), "is off its scale"),
+    ],
+    ids=[
+        "false",
+        "cannot fail",
+        "wrong path",
+        "no data",
+        "refused event",
+        "not tempting",
+        "no option",
+        "off scale",
+        "off the drawing",
+    ],
+)
+def test_the_check_finds(step: Step, fault: str) -> None:
+    """Each way a lesson can be unsound is a fault with its own sentence."""
+    (found,) = faults(lesson_with(step))
+    assert fault in found
+
+
+def test_the_check_judges_challenges() -> None:
+    """A start that passes, a solution that does not, and one that turns a knob that is none."""
+    goal = Claim("Close.", Measure(HAND), "at most", 1e-3)
+    knob = Control("horizon", "N", 1, 10)
+    challenge = Challenge("?", (goal,), (knob,), Score(Measure(HAND), 1.0, 0.0), (("horizon=1",), OFF))
+    challenge = replace(challenge, duration=0.2, events=MOVE)
+    assert faults(lesson_with(aside(SMALL), challenge)) == [
+        "it does not pass: Close.",
+        "levels.position.enabled=false is none of its knobs, or out of their range",
+    ]
+    easy = replace(challenge, goals=(replace(goal, bound=1e3),), solutions=(("horizon=1",), ("horizon=2",)))
+    assert faults(lesson_with(aside(SMALL), easy)) == ["it passes without doing anything"]
+
+
+def test_claims_are_judged_on_a_run_half_done() -> None:
+    """None before the window begins; then true or false; NaN is never true."""
+    rows = {"t": np.arange(10.0)[:, None] / 10, "error/position": np.arange(10.0)[:, None] * 1e-3}
+    late = Claim("…", Measure(HAND, after=0.5), "at most", 7.0)
+    assert late.judge({name: field[:4] for name, field in rows.items()}) is None
+    assert late.judge({name: field[:8] for name, field in rows.items()}) is True
+    assert late.judge(rows) is False
+    assert not late.holds(math.nan)
+
+
+@pytest.mark.parametrize(
+    ("statistic", "value"),
+    [
+        ("largest", 4.0),
+        ("rms", math.sqrt(10.0)),
+        ("mean", -2.0),
+        ("range", 4.0),
+        ("last", -2.0),
+        ("sum", -6.0),
+    ],
+)
+def test_statistics(statistic: str, value: float) -> None:
+    """Values 1, −2, −4, 0, NaN, of which the first lies before the window; NaN counts nowhere."""
+    rows = {"t": np.arange(5.0)[:, None], "v": np.array([[1.0], [-2.0], [-4.0], [0.0], [np.nan]])}
+    measure = Measure(Signal("v"), statistic, after=1.0)  # pyright: ignore[reportArgumentType]
+    assert measure.value(rows) == pytest.approx({"rms": math.sqrt(20 / 3)}.get(statistic, value))
+
+
+def test_a_measure_over_the_ghost_is_a_ratio() -> None:
+    t = np.arange(3.0)[:, None]
+    own, ghost = {"t": t, "v": np.full((3, 2), 3.0)}, {"t": t, "v": np.full((3, 2), 6.0)}
+    ratio = Measure(Signal("v"), over_ghost=True)
+    assert ratio.value(own, ghost) == pytest.approx(0.5)
+    assert math.isnan(ratio.value(own))
+    assert ratio.unit == "×"
+
+
+def test_predictions_are_graded_against_the_run() -> None:
+    t = np.linspace(0.0, 1.0, 101)[:, None]
+    rows = {"t": t, "error/position": 1e-3 * t}
+    options = (Option("small", high=0.5), Option("large", low=0.5))
+    choice = Choice("?", options, Measure(HAND), tempting=0)
+    assert (choice.grade(0, rows).score, choice.grade(1, rows).score) == (0.0, 1.0)
+    assert "1 mm" in choice.grade(0, rows).words
+    value = Value("?", Measure(HAND), 0.1, 10.0, factor=2.0)
+    assert [value.grade(guess, rows).score for guess in (1.0, 1.9, 4.1, 0.1)] == pytest.approx([1, 1, 0, 0])
+    assert 0.0 < value.grade(3.0, rows).score < 1.0
+    sketch = Sketch("?", HAND, 0.0, 1.0, 1.0, band=0.1)
+    assert sketch.grade([(0.0, 0.0), (1.0, 1.0)], rows).score == 1.0
+    assert sketch.grade([(0.0, 0.5), (1.0, 0.5)], rows).score == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_step_must_say_where_its_claims_fail() -> None:
+    with pytest.raises(ValueError, match="fails"):
+        aside(replace(SMALL, fails_with=()))
+    with pytest.raises(ValueError, match="ghost"):
+        aside(replace(SMALL, measure=Measure(HAND, over_ghost=True)))
+    assert (
+        aside(replace(SMALL, measure=Measure(HAND, over_ghost=True)), ghost=Ghost("g", OFF)).ghost is not None
+    )
+
+
+def test_solutions_use_knobs_only() -> None:
+    for name in COURSE:
+        challenge = load_lesson(name).challenge
+        if challenge is not None:
+            for assignments in challenge.solutions:
+                turned = {parse_assignment(each)[0] for each in assignments}
+                assert turned <= {knob.path for knob in challenge.knobs}
