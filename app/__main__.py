@@ -15,7 +15,11 @@ COMMANDS: dict[str, str] = {
     "scenes": "list the scenes",
     "controllers": "list the controllers",
     "robots": "list the robots, or check a URDF",
+    "lessons": "list the lessons, or run every claim of them headless",
     "bench": "control-step times of the routes and solvers, side by side",
+    "reproduce": "the papers' tables and figures: our number beside the printed one",
+    "sweep": "a grid of runs over settings, as a map; stopped, it carries on",
+    "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
 """What there is, in one line each; `app/commands/NAME.py` holds `NAME(…) -> exit code`."""
 

@@ -59,6 +59,7 @@ class Plant:
         self._diagonal = settings.per_joint("diagonal_scale", robot.n)
         self._altered = bool((self._diagonal != 1.0).any())
         self._resolution = encoder_resolution(robot, settings)
+        self._rounds = bool(self._resolution.any())
         limit = robot.tau_limit if settings.saturate else np.full(robot.n, np.inf)
         self._tau_lower, self._tau_upper = -limit, limit
         self._lag, self._delay = 1e-3 * settings.torque_lag_ms, 1e-3 * settings.delay_ms
@@ -112,7 +113,7 @@ class Plant:
         """The state as the sensors see it. With ideal encoders that is the true one; else q is rounded and
         v is its backward difference over `period` (s, the control period). Calling it changes nothing.
         """
-        if not self._resolution.any():
+        if not self._rounds:
             return PlantState(self.t, self.q, self.v)
         q, v = self._encoders.read(period, self._resolution)
         return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self._data.qvel))
@@ -127,8 +128,8 @@ class Plant:
         if not (math.isfinite(period) and period > 0.0):
             raise ValueError(f"the period is {period} s; it must be positive")
         data, motors = self._data, self._motors
-        within = np.clip(as_vector("tau", tau, self.n), self._tau_lower, self._tau_upper)
-        motors.command(within, data.time)
+        asked = as_vector("tau", tau, self.n)
+        motors.command(np.minimum(np.maximum(asked, self._tau_lower), self._tau_upper), data.time)
         count = max(1, math.ceil(period / self.timestep - 1e-9))
         h = period / count
         self._model.opt.timestep = h
@@ -252,8 +253,7 @@ class Plant:
         return self._probe
 
     def _site(self, frame: str) -> int:
-        index = self.robot.frame_id(frame)
-        return self._model.site(f"frame{index}").id
+        return self._model.site(f"frame{self.robot.frame_id(frame)}").id
 
 
 def _compile(robot: Robot, settings: PlantSettings) -> mujoco.MjModel:

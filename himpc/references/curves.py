@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from himpc.references.phase import Phase
+from himpc.references.phase import Phase, column
 from himpc.references.preview import Array, Preview, sampled, times
 
 
@@ -27,16 +28,17 @@ class Circle:
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         phi, rate, acceleration = self.phase.at(times(t, T_s, N))
-        cos, sin = np.cos(phi), np.sin(phi)
-        # Components along u and w: outward (cos, sin), along the tangent (−sin, cos).
-        part = np.empty((3, N + 1, 2))
-        part[0, :, 0], part[0, :, 1] = cos, sin
-        part[1, :, 0], part[1, :, 1] = -rate * sin, rate * cos
-        square = rate * rate
-        part[2, :, 0] = -acceleration * sin - square * cos
-        part[2, :, 1] = acceleration * cos - square * sin
-        outward, velocity, curvature = part @ np.array((self.u, self.w))
-        return sampled(self.centre + outward, velocity, curvature)
+        turn = np.empty((N + 1, 2))
+        np.cos(phi, out=turn[:, 0])
+        np.sin(phi, out=turn[:, 1])
+        outward, tangent = turn.dot(self._axes[0]), turn.dot(self._axes[1])
+        rate, acceleration = column(rate), column(acceleration)
+        return sampled(self.centre + outward, rate * tangent, acceleration * tangent - rate * rate * outward)
+
+    @cached_property
+    def _axes(self) -> tuple[Array, Array]:
+        """What (cos φ, sin φ) is multiplied by for the position and for its derivative by φ."""
+        return np.array((self.u, self.w)), np.array((self.w, -self.u))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class FigureEight:
         position = np.stack((np.sin(phi), 0.5 * np.sin(2 * phi)), axis=1) @ axes
         first = np.stack((np.cos(phi), np.cos(2 * phi)), axis=1) @ axes
         second = np.stack((-np.sin(phi), -2 * np.sin(2 * phi)), axis=1) @ axes
-        rate, acceleration = np.reshape(rate, (-1, 1)), np.reshape(acceleration, (-1, 1))
+        rate, acceleration = column(rate), column(acceleration)
         return sampled(self.centre + position, rate * first, acceleration * first + rate * rate * second)
 
 
@@ -68,9 +70,7 @@ class Sinusoid:
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         phi, rate, acceleration = self.phase.at(times(t, T_s, N))
-        cos, sin = np.cos(phi), np.sin(phi)
-        return sampled(
-            self.offset + np.multiply.outer(sin, self.amplitude),
-            np.multiply.outer(rate * cos, self.amplitude),
-            np.multiply.outer(acceleration * cos - rate * rate * sin, self.amplitude),
-        )
+        swing = np.sin(phi)[:, None] * self.amplitude
+        slope = np.cos(phi)[:, None] * self.amplitude
+        rate, acceleration = column(rate), column(acceleration)
+        return sampled(self.offset + swing, rate * slope, acceleration * slope - rate * rate * swing)

@@ -32,3 +32,8 @@ class Phase:
         if self.law == "uniform":
             return wt + self.offset, w, 0.0
         return wt - np.sin(wt) + self.offset, w * (1 - np.cos(wt)), w * w * np.sin(wt)
+
+
+def column(rate: Array | float) -> Array | float:
+    """A rate per sample as a column, to be multiplied with rows of coordinates; a plain number stays one."""
+    return rate[:, None] if isinstance(rate, np.ndarray) else rate

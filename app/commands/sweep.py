@@ -1,0 +1,84 @@
+"""`himpc-lab sweep`."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from app.commands.progress import progress_bar
+
+if TYPE_CHECKING:
+    from lessons.sweep import Cell, Sweep
+
+
+def sweep(
+    scene: tyro.conf.Positional[str],
+    out: Path,
+    over: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=lo:hi:n")] = (),
+    controller: str = "himpc",
+    set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
+    duration: float | None = None,
+    seed: int = 0,
+    metric: str | None = None,
+    scheduler: str | None = None,
+) -> int:
+    """Run a grid of settings of a scene on all cores and draw it as a map.
+
+    Ctrl-C stops it; the same command carries on. A run that fails or loses control is a cell of the map.
+
+    Args:
+        scene: name of a scene; see himpc-lab scenes.
+        out: folder for cells.jsonl, results.json and map.png.
+        over: a setting and its range, e.g. --over M_bar_scale=0.2:4:20 --over horizon=1:20:20. Ranges of a
+            decade and more go in equal ratios; PATH=lo:hi:n:lin and :log decide it.
+        controller: which controller; see himpc-lab controllers.
+        set: change a setting in all runs, e.g. --set plant.payload_kg=2.
+        duration: simulated seconds per run; the scene's own by default.
+        seed: seed of the runs.
+        metric: what the map shows; by default the RMSE of level 1 after the first second.
+        scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
+    """
+    from lessons.jobs import Job
+    from lessons.parallel import on_cluster, on_cores
+    from lessons.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
+
+    definition = make_sweep(Job(scene, controller, tuple(set), duration, seed), over)
+    choices = metrics(definition)
+    shown = check_metric(metric or choices[0], choices)
+    held = len(finished_cells(definition, out))
+    total = len(definition.points)
+    way = nullcontext(on_cores) if scheduler is None else on_cluster(scheduler)
+    print(f"{total} cells, {held} of them already in {out}", file=sys.stderr)
+    try:
+        with way as spread, progress_bar(f"sweep {scene} …") as advance:
+            cells = carry_on(definition, out, spread, lambda done, all: advance(done / all))
+    except KeyboardInterrupt:
+        done = len(finished_cells(definition, out))
+        print(
+            f"himpc-lab: stopped with {done} of {total} cells; the same command carries on", file=sys.stderr
+        )
+        raise
+    _conclude(definition, cells, shown, out)
+    return 0
+
+
+def _conclude(definition: Sweep, cells: list[Cell], metric: str, out: Path) -> None:
+    from lessons.sweep import best_cell, draw_sweep
+
+    picture = draw_sweep(definition, cells, metric, out)
+    lost = sum(cell.diverged for cell in cells)
+    failed = sum(cell.error is not None for cell in cells)
+    print(f"{len(cells)} cells: {lost} lost control, {failed} could not be run")
+    best = best_cell(cells, metric)
+    if best is not None:
+        point = zip(definition.axes, definition.points[best.index], strict=True)
+        at = ", ".join(f"{axis.path} = {value:g}" for axis, value in point)
+        print(f"least {metric}: {best.value(metric):.3g} at {at}")
+    first = next((cell.error for cell in cells if cell.error), None)
+    if first:
+        print(f"first failure: {first}")
+    print(f"results: {out / 'results.json'}" + (f", picture: {picture}" if picture else ""))

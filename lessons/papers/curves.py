@@ -1,0 +1,84 @@
+"""Panels that several figures share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lessons.jobs import Run
+from lessons.plots.panels import Curve, Panel
+from lessons.plots.style import name
+
+
+def curve(run: Run, field: str, k: int = 0, scale: float = 1.0, **how: object) -> Curve:
+    """A field of a run over time; nothing is drawn for a run that failed."""
+    return Curve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
+
+
+def by_controller(runs: Sequence[Run], field: str, k: int, scale: float = 1.0) -> tuple[Curve, ...]:
+    """A field of several controllers' runs, each in its colour; the first is drawn broad, so that those
+    that coincide with it leave it visible."""
+    shown = [run for run in runs if len(run.t)]
+    return tuple(
+        curve(
+            run,
+            field,
+            k,
+            scale,
+            label=name(run.job.controller),
+            colour=run.job.controller,
+            weight=2.4 if place == 0 and len(shown) > 1 else 1.0,
+        )
+        for place, run in enumerate(shown)
+    )
+
+
+def excerpt(panel: Panel, start: float, end: float) -> Panel:
+    """A short piece of a panel's time axis, held values shown as steps."""
+    curves = []
+    for each in panel.curves:
+        inside = (each.x >= start) & (each.x <= end)
+        curves.append(replace(each, x=each.x[inside], y=each.y[inside], style="steps", weight=1.0))
+    return replace(panel, curves=tuple(curves), y_label="")
+
+
+def error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, float]]) -> tuple[Panel, ...]:
+    """A panel per coordinate: (task, coordinate, label with unit, scale from m or rad)."""
+    return tuple(
+        Panel(label, by_controller(runs, f"error/{task}", k, scale)) for task, k, label, scale in tasks
+    )
+
+
+PLANAR_ERRORS = (
+    ("position", 0, "$e_x$ (mm)", 1e3),
+    ("position", 1, "$e_y$ (mm)", 1e3),
+    ("q1", 0, "$e_{q_1}$ (deg)", 180 / np.pi),
+)
+
+
+def joint_panels(
+    runs: Sequence[Run],
+    field: str,
+    symbol: str,
+    unit: str,
+    scale: float = 1.0,
+    bound: str | None = None,
+    joints: int | None = None,
+) -> tuple[Panel, ...]:
+    """A panel per joint of a per-joint field, with ± the bound's field of the first run that has one."""
+    known = next((run for run in runs if run.error is None), None)
+    if known is None:
+        return (Panel(f"${symbol}$ ({unit})", ()),)
+    count = joints or known[field].shape[1]
+    panels = []
+    for k in range(count):
+        bounds: tuple[float, ...] = ()
+        if bound is not None:
+            size = scale * float(known.column(bound, k)[0])
+            bounds = (-size, size) if np.isfinite(size) else ()
+        panels.append(
+            Panel(f"${symbol}_{k + 1}$ ({unit})", by_controller(runs, field, k, scale), bounds=bounds)
+        )
+    return tuple(panels)

@@ -1,0 +1,255 @@
+"""What the text of the paper argues without numbers: Remarks 5, 6 and 8, and section IV-C."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from lessons.jobs import Job, Results, Run
+from lessons.papers.himpc_paper.effort import EffortJob
+from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET
+from lessons.papers.himpc_paper.planar import RT1
+from lessons.papers.himpc_paper.table_7 import step_seconds
+from lessons.papers.item import Check, Item, Section, Table
+from lessons.papers.words import number, trouble
+from lessons.plots.panels import Curve, Panel, Picture
+
+_FAINTEST = 1e-3
+"""mm: errors below are drawn here, since a logarithmic axis has no zero."""
+
+
+def _level_1(run: Run, scale: float = 1e3) -> float:
+    """The largest RMSE of level 1's coordinates after the first second, mm; NaN if control was lost."""
+    if not run.completed:
+        return math.nan
+    return scale * max(value for value in run.summary["tasks"][0]["rmse_after_1s"])
+
+
+def _line(runs: Mapping[float, Run], label: str, colour: str) -> Curve:
+    errors = np.array([_level_1(run) for run in runs.values()])
+    return Curve(np.array(list(runs)), np.maximum(errors, _FAINTEST), label, colour)
+
+
+# -------------------------------------------------------------------------------- Remark 8
+
+_N = 20
+_SHORTER = {False: (20, 10, 5, 2, 1), True: (20, 5, 1)}
+"""Knots of the lower levels; by whether the quick version is asked for, as below."""
+
+
+def _shorter(knots: int, timed: bool) -> Job:
+    extra = () if knots == _N else tuple(f"levels.{level}.horizon={knots}" for level in (2, 3))
+    return Job(RT4, set=(f"horizon={_N}", *extra), duration=0.3 if timed else 2.5, timed=timed)
+
+
+def _remark_8(results: Results, quick: bool) -> Section:
+    rows, medians, errors = [], [], []
+    for knots in _SHORTER[quick]:
+        run, clock = results[_shorter(knots, False)], results[_shorter(knots, True)]
+        medians.append(1e3 * step_seconds(clock)["median"])
+        errors.append([_level_1(run), run.error_of("orientation", 2), run.error_of("q1")])
+        rows.append((str(knots), number(medians[-1]), *map(number, errors[-1]), trouble(run)))
+    x = np.array(_SHORTER[quick], float)
+    panels = (
+        Panel("median step (ms)", (Curve(x, np.array(medians), colour="0"),), "knots of levels 2 and 3"),
+        Panel(
+            "RMSE over that with all knots",
+            tuple(
+                Curve(x, np.array([each[k] / errors[0][k] for each in errors]), label, str(k))
+                for k, label in enumerate(("level 1, worst axis", "$o_Z$", "$q_1$"))
+            ),
+            "knots of levels 2 and 3",
+        ),
+    )
+    columns = ("knots of levels 2 and 3", "median step (ms)", "level 1 (mm)", "o_Z (deg)", "q₁ (deg)", "")
+    return Section(
+        notes=(
+            f"**Remark 8, shorter horizons for lower levels.** Level 1 looks {_N} knots ahead, levels 2 and "
+            "3 fewer; R on Δτ as printed. With one knot a step takes "
+            f"{number(medians[-1] / medians[0])} of the time with all: here most of a step is kinematics and "
+            "null spaces, which every knot needs anyway.",
+        ),
+        tables=(Table("Remark 8: time against accuracy", columns, tuple(rows)),),
+        pictures=(Picture("himpc-remark-8", "Shorter horizons for lower levels, RT4.", panels, 2),),
+    )
+
+
+# -------------------------------------------------------------------------------- Remarks 5 and 6
+
+_PERIODS = (0.5, 1.0, 2.0, 4.0)
+_LAGS = {False: (0.0, 0.5, 1.0, 2.0, 4.0, 8.0), True: (0.0, 2.0, 8.0)}
+_SCENES = {False: (RT1, RT4_DATA_SHEET), True: (RT1,)}
+
+
+def _period_job(scene: str, ms: float) -> Job:
+    return Job(scene, set=() if ms == 1.0 else (f"T_s={ms * 1e-3:g}",))
+
+
+def _lag_job(scene: str, ms: float) -> Job:
+    return Job(scene, set=() if ms == 0.0 else (f"plant.torque_lag_ms={ms:g}",))
+
+
+def _over(
+    title: str,
+    what: str,
+    values: tuple[float, ...],
+    runs: Mapping[str, Mapping[float, Run]],
+    note: str,
+    log: bool,
+) -> Section:
+    curves = tuple(_line(runs[scene], scene, str(k)) for k, scene in enumerate(runs))
+    rows = tuple(
+        (f"{value:g}", *(number(_level_1(runs[scene][value])) for scene in runs)) for value in values
+    )
+    lost = [f"{scene} at {value:g}: {trouble(run)}" for scene in runs for value, run in runs[scene].items()]
+    troubles = "; ".join(each for each in lost if not each.endswith(": "))
+    panel = Panel("level-1 RMSE, worst axis (mm)", curves, what, log_x=log, log_y=True)
+    return Section(
+        notes=(note, *((f"Lost: {troubles}.",) if troubles else ())),
+        tables=(Table(f"{title}: level-1 RMSE, worst axis (mm)", (what, *runs), rows),),
+        pictures=(
+            Picture(
+                f"himpc-{title.lower().replace(' ', '-')}", f"Level-1 RMSE over the {what.lower()}.", (panel,)
+            ),
+        ),
+    )
+
+
+def _remark_6(results: Results, quick: bool) -> Section:
+    runs = {scene: {ms: results[_period_job(scene, ms)] for ms in _PERIODS} for scene in _SCENES[quick]}
+    note = "**Remark 6, sampling period.** T_s is also the delay of time-delay estimation; M̄ stays."
+    section = _over("Remark 6", "sampling period (ms)", _PERIODS, runs, note, log=True)
+    ratio = _level_1(runs[RT1][4.0]) / _level_1(runs[RT1][0.5])
+    check = Check(f"{RT1}: level-1 RMSE at 4 ms over that at 0.5 ms > 1", ratio, ratio > 1.0)
+    return Section(section.notes, tables=section.tables, checks=(check,), pictures=section.pictures)
+
+
+def _remark_5(results: Results, quick: bool) -> Section:
+    runs = {scene: {ms: results[_lag_job(scene, ms)] for ms in _LAGS[quick]} for scene in _SCENES[quick]}
+    note = (
+        "**Remark 5, actuators.** A first-order lag between the torque command and the torque; the "
+        "controller's τ₀ is the torque that acted. Estimation covers a lag that is short against the closed "
+        "loop, not a long one."
+    )
+    return _over("Remark 5", "motor time constant (ms)", _LAGS[quick], runs, note, log=False)
+
+
+# -------------------------------------------------------------------------------- Section IV-C
+
+_WEIGHTS = {False: (1e-4, 1e-3, 1e-2, 5e-2, 1.0, 10.0), True: (1e-4, 5e-2, 1.0)}
+_REFERENCES = {
+    "RT4": (),
+    "still, folded up": (0.0, 30.0, 0.0, 20.0, 0.0, 10.0, 0.0),
+    "still, stretched out": (0.0, 90.0, 0.0, 10.0, 0.0, 10.0, 0.0),
+}
+_EFFORTS: dict[str, Literal["increment", "torque"]] = {"Δτ": "increment", "τ": "torque"}
+_TEX = {"Δτ": r"\Delta\tau", "τ": r"\tau"}
+_FINE = 1.0
+"""mm: level-1 accuracy that a weight must allow."""
+
+
+def _effort_job(effort: str, R: float, reference: str) -> EffortJob:
+    return EffortJob(
+        RT4_DATA_SHEET, duration=2.0, effort=_EFFORTS[effort], R=R, hold_deg=_REFERENCES[reference]
+    )
+
+
+def _effort_jobs(quick: bool) -> tuple[Job, ...]:
+    return tuple(_effort_job(e, R, r) for e in _EFFORTS for R in _WEIGHTS[quick] for r in _REFERENCES)
+
+
+def _section_4c(results: Results, quick: bool) -> Section:
+    rows, panels, usable = [], [], {}
+    for effort in _EFFORTS:
+        curves, good = [], []
+        for k, reference in enumerate(_REFERENCES):
+            runs = {R: results[_effort_job(effort, R, reference)] for R in _WEIGHTS[quick]}
+            curves.append(_line(runs, reference, str(k)))
+            fine = {R for R, run in runs.items() if _level_1(run) <= _FINE}
+            good.append(fine)
+            rows.append(
+                (
+                    effort,
+                    reference,
+                    *((trouble(run) and "lost") or number(_level_1(run)) for run in runs.values()),
+                )
+            )
+        usable[effort] = set.intersection(*good)
+        panels.append(
+            Panel(
+                "level-1 RMSE, worst axis (mm)",
+                tuple(curves),
+                "R (paper: 0.05)",
+                title=f"$\\|{_TEX[effort]}\\|^2$ in the cost",
+                bounds=(_FINE,),
+                log_x=True,
+                log_y=True,
+                y_range=(1e-3, 1e3),
+            )
+        )
+    columns = ("R weighs", "reference", *(f"R = {R:g}" for R in _WEIGHTS[quick]))
+    return Section(
+        notes=(
+            "**Section IV-C, ‖τ‖² instead of ‖Δτ‖².** All tasks in one cost, one step ahead, so that nothing "
+            "but the regularisation differs. Holding a pose needs torque, and ‖τ‖² trades it against "
+            "accuracy: the more gravity, the smaller R must be; yet RT4 starts singular and a small R loses "
+            "it there. ‖Δτ‖² is zero at rest whatever the pose.",
+        ),
+        tables=(Table("Section IV-C: level-1 RMSE, worst axis (mm)", columns, tuple(rows)),),
+        checks=(
+            Check(
+                f"with ‖Δτ‖² some R keeps all references within {_FINE:g} mm: how many of the tried",
+                float(len(usable["Δτ"])),
+                len(usable["Δτ"]) > 0,
+            ),
+            Check(
+                "with ‖τ‖² fewer of the tried R do",
+                float(len(usable["τ"])),
+                len(usable["τ"]) < len(usable["Δτ"]),
+            ),
+        ),
+        pictures=(
+            Picture(
+                "himpc-section-4c",
+                "What R weighs, and which R each reference needs (gaps: control lost).",
+                tuple(panels),
+                2,
+            ),
+        ),
+    )
+
+
+# -------------------------------------------------------------------------------- all
+
+
+def _jobs(quick: bool) -> tuple[Job, ...]:
+    return (
+        *(_shorter(knots, timed) for knots in _SHORTER[quick] for timed in (False, True)),
+        *(_period_job(scene, ms) for scene in _SCENES[quick] for ms in _PERIODS),
+        *(_lag_job(scene, ms) for scene in _SCENES[quick] for ms in _LAGS[quick]),
+        *_effort_jobs(quick),
+    )
+
+
+def _section(results: Results, quick: bool) -> Section:
+    parts = [part(results, quick) for part in (_remark_8, _remark_6, _remark_5, _section_4c)]
+    return Section(
+        notes=tuple(note for part in parts for note in part.notes),
+        tables=tuple(table for part in parts for table in part.tables),
+        checks=tuple(check for part in parts for check in part.checks),
+        pictures=tuple(picture for part in parts for picture in part.pictures),
+    )
+
+
+ITEMS = (
+    Item(
+        "himpc-ablations",
+        "What the text argues without numbers",
+        "HIMPC (T-RO 2024), Remarks 5, 6, 8 and section IV-C",
+        _jobs,
+        _section,
+    ),
+)

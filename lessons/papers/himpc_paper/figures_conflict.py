@@ -1,0 +1,181 @@
+"""Figs. 10 to 15: scenario 2 of section V over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from lessons.jobs import Job, Results, Run
+from lessons.papers.curves import PLANAR_ERRORS, curve, error_panels, joint_panels
+from lessons.papers.himpc_paper.planar import SOURCE, level_1, rt1, rt2, rt3
+from lessons.papers.item import Item, Row, Section
+from lessons.papers.words import trouble
+from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.plots.style import name
+from robots import Robot, load_robot
+
+Array = NDArray[np.float64]
+DEG = 180 / np.pi
+
+
+def _runs(results: Results, jobs: Sequence[Job]) -> list[Run]:
+    return [results[job] for job in jobs]
+
+
+def _picture(name: str, caption: str, panels: Sequence[Panel | Bars], columns: int = 1) -> Section:
+    return Section(pictures=(Picture(name, caption, tuple(panels), columns),))
+
+
+# ------------------------------------------------------------------------ Figs. 10 to 13: conflict
+
+
+def _fig_10(results: Results, quick: bool) -> Section:
+    runs = _runs(results, (rt2("hqp"), rt2("himpc")))
+    caption = "Tracking errors on RT2. While the tasks conflict, level 2 gives way."
+    return _picture("himpc-fig-10", caption, error_panels(runs, PLANAR_ERRORS))
+
+
+def _fig_11(results: Results, quick: bool) -> Section:
+    panels, rows = [], []
+    for controller in ("hqp", "himpc"):
+        circle, conflict = results[rt1(controller)], results[rt2(controller)]
+        for k, axis in enumerate("xy"):
+            curves = tuple(
+                curve(run, "error/position", k, 1e3, label=label, colour=colour)
+                for run, label, colour in ((conflict, "RT2", "1"), (circle, "RT1", "0"))
+            )
+            panels.append(Panel(f"$e_{axis}$ (mm)", curves, title=name(controller) if k == 0 else ""))
+        rows.append(
+            Row(
+                f"{name(controller)}: level-1 RMSE in RT2 over RT1",
+                "1",
+                None,
+                level_1(conflict) / level_1(circle),
+                "the paper shows curves only and calls HIMPC's nearly unaffected",
+            )
+        )
+    caption = "Level-1 errors with and without conflict."
+    return Section(
+        rows=tuple(rows),
+        pictures=(Picture("himpc-fig-11", caption, (panels[0], panels[2], panels[1], panels[3]), 2),),
+    )
+
+
+def _fig_12(results: Results, quick: bool) -> Section:
+    runs = _runs(results, (rt2("hqp"), rt2("himpc")))
+    panels = joint_panels(runs, "tau_demand", r"\tau", "N·m", bound="tau_upper")
+    return _picture("himpc-fig-12", "Torque demands on RT2, with their bounds.", panels)
+
+
+def _fig_13(results: Results, quick: bool) -> Section:
+    runs = _runs(results, (rt2("hqp"), rt2("himpc")))
+    panels = joint_panels(runs, "v", r"\dot q", "deg/s", DEG, bound="v_limit")
+    return _picture("himpc-fig-13", "Joint velocities on RT2, with their bounds.", panels)
+
+
+# ------------------------------------------------------------------------ Figs. 14 and 15: singularity
+
+POSES = 19
+
+
+def skeleton(robot: Robot, q: Array) -> Array:
+    """Joint origins and tip in the world, (n + 1, 3) m."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    joints = [data.oMi[joint].translation for joint in range(1, robot.model.njoints)]
+    return np.array([*joints, data.oMf[robot.frame_id(robot.tip)].translation])
+
+
+def _fig_14(results: Results, quick: bool) -> Section:
+    run = results[rt3("himpc")]
+    panels = []
+    if len(run.t):
+        robot = load_robot("planar3")
+        places = np.linspace(0, len(run.t) - 1, POSES).round().astype(int)
+        for title, chosen in (("0 to 8 s", places[:10]), ("8 to 16 s", places[9:])):
+            chains = [(place, skeleton(robot, run["q"][place])) for place in chosen]
+            arms = tuple(
+                Curve(
+                    points[:, 0],
+                    points[:, 1],
+                    label="HIMPC" if k == 0 else "",
+                    colour="himpc",
+                    weight=2.2 if k in (0, len(chains) - 1) else 1.0,
+                )
+                for k, (_, points) in enumerate(chains)
+            )
+            span = slice(chosen[0], chosen[-1] + 1)
+            x_d = run["x_d/position"][span]
+            path = Curve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
+            panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title))
+    caption = f"HIMPC on RT3 in {POSES} poses; straight, thus singular, in the 1st, 10th and 19th (thick)."
+    return _picture("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)
+
+
+def _fig_15(results: Results, quick: bool) -> Section:
+    run = results[rt3("himpc")]
+    whole = [run.error_of("position", k, "rmse") for k in (0, 1)]
+    found = _picture("himpc-fig-15", "Tracking errors of HIMPC on RT3.", error_panels([run], PLANAR_ERRORS))
+    return Section(
+        rows=tuple(
+            Row(
+                f"HIMPC, {axis}: RMSE over the whole run",
+                "m",
+                None,
+                value,
+                trouble(run) or "the paper: a curve only",
+            )
+            for axis, value in zip("xy", whole, strict=True)
+        ),
+        pictures=found.pictures,
+    )
+
+
+_S2 = f"{SOURCE}-C"
+ITEMS = (
+    Item(
+        "himpc-fig-10",
+        "Errors under conflict",
+        f"{_S2}, Fig. 10",
+        lambda _: (rt2("hqp"), rt2("himpc")),
+        _fig_10,
+    ),
+    Item(
+        "himpc-fig-11",
+        "Level 1 with and without conflict",
+        f"{_S2}, Fig. 11",
+        lambda _: tuple(make(controller) for make in (rt1, rt2) for controller in ("hqp", "himpc")),
+        _fig_11,
+    ),
+    Item(
+        "himpc-fig-12",
+        "Torques under conflict",
+        f"{_S2}, Fig. 12",
+        lambda _: (rt2("hqp"), rt2("himpc")),
+        _fig_12,
+    ),
+    Item(
+        "himpc-fig-13",
+        "Velocities under conflict",
+        f"{_S2}, Fig. 13",
+        lambda _: (rt2("hqp"), rt2("himpc")),
+        _fig_13,
+    ),
+    Item(
+        "himpc-fig-14",
+        "Through the singularity, poses",
+        f"{_S2}, Fig. 14",
+        lambda _: (rt3("himpc"),),
+        _fig_14,
+    ),
+    Item(
+        "himpc-fig-15",
+        "Through the singularity, errors",
+        f"{_S2}, Fig. 15",
+        lambda _: (rt3("himpc"),),
+        _fig_15,
+    ),
+)

@@ -1,0 +1,130 @@
+"""Figs. 17 to 21, the iiwa over time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lessons.jobs import Job, Results
+from lessons.papers.curves import by_controller, curve, excerpt
+from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
+from lessons.papers.himpc_paper.table_6 import horizon_job, horizons
+from lessons.papers.himpc_paper.table_7 import step_seconds, timed
+from lessons.papers.himpc_paper.table_8 import resolution_job, smoothness
+from lessons.papers.item import Item, Section, Table
+from lessons.papers.printed import printed
+from lessons.papers.words import number, trouble
+from lessons.plots.panels import Bars, Panel, Picture
+
+DEG = 180 / np.pi
+
+
+def _fig_17(results: Results, quick: bool) -> Section:
+    run = results[rt4()]
+    panels = tuple(
+        Panel(
+            label,
+            tuple(
+                curve(run, f"error/{task}", k, scale, label=axis, colour=str(colour + k))
+                for k, axis in enumerate(axes)
+            ),
+        )
+        for task, label, axes, scale, colour in (
+            ("position", "level 1 (mm)", ("x", "y", "z"), 1e3, 0),
+            ("orientation", "level 2 (deg)", ("$o_X$", "$o_Y$", "$o_Z$"), DEG, 3),
+            ("q1", "level 3 (deg)", ("$q_1$",), DEG, 6),
+        )
+    )
+    return Section(pictures=(Picture("himpc-fig-17", "Tracking errors of HIMPC on RT4, N = 5.", panels),))
+
+
+def _fig_18_jobs(quick: bool) -> tuple[Job, ...]:
+    return tuple(horizon_job("himpc", N, (), quick) for N in horizons("himpc", quick))
+
+
+def _fig_18(results: Results, quick: bool) -> Section:
+    curves = tuple(
+        curve(results[job], "error/position", 0, 1e3, label=f"N = {N}", colour=str(k))
+        for k, (job, N) in enumerate(zip(_fig_18_jobs(quick), horizons("himpc", quick), strict=True))
+    )
+    panel = Panel("$e_x$ (mm)", curves)
+    return Section(
+        pictures=(Picture("himpc-fig-18", "Error of x on RT4 over the horizon, HIMPC.", (panel,)),)
+    )
+
+
+def _fig_19_horizons(quick: bool) -> tuple[int, ...]:
+    return tuple(N for N in horizons("nhimpc", quick) if N <= 20)
+
+
+def _fig_19_jobs(quick: bool) -> tuple[Job, ...]:
+    return tuple(
+        horizon_job(controller, N, (), quick)
+        for N in _fig_19_horizons(quick)
+        for controller in ("himpc", "nhimpc")
+    )
+
+
+def _fig_19(results: Results, quick: bool) -> Section:
+    panels = []
+    for N in _fig_19_horizons(quick):
+        runs = [results[horizon_job(controller, N, (), quick)] for controller in ("himpc", "nhimpc")]
+        curves = by_controller(runs, "error/position", 0, 1e3)
+        panels.append(Panel("$e_x$ (mm)", curves, title=f"N = {N}"))
+    caption = "Error of x on RT4, Jacobians along the last plan (HIMPC) and along the current one (NHIMPC)."
+    return Section(pictures=(Picture("himpc-fig-19", caption, tuple(panels)),))
+
+
+def _fig_20_horizons(quick: bool) -> tuple[int, ...]:
+    return (5, 10, 20) if quick else (5, 10, 15, 20, 25, 30)
+
+
+def _fig_20(results: Results, quick: bool) -> Section:
+    Ns = _fig_20_horizons(quick)
+    runs = [results[timed("himpc", N, quick)] for N in Ns]
+    average = tuple(1e3 * step_seconds(run)["average"] for run in runs)
+    bars = Bars("average step time (ms)", tuple(map(str, Ns)), (("HIMPC", "himpc", average),), "horizon N")
+    rows = tuple(
+        (str(N), number(value), trouble(run)) for N, value, run in zip(Ns, average, runs, strict=True)
+    )
+    note = (
+        "The paper shows bars without numbers, growing exponentially with N (8.05 ms at N = 5, Table VII). "
+        "Here bases and bounds cost in proportion to N and the least squares with its cube."
+    )
+    return Section(
+        notes=(note,),
+        tables=(Table("Average step time (ms)", ("N", "ours", ""), rows),),
+        pictures=(Picture("himpc-fig-20", "Average computing time of HIMPC per step on RT4.", (bars,)),),
+    )
+
+
+def _fig_21_jobs(quick: bool) -> tuple[Job, ...]:
+    return tuple(resolution_job(each, quick) for each in (printed("himpc_table_8")["benchmark"], 5))
+
+
+def _fig_21(results: Results, quick: bool) -> Section:
+    benchmark, coarse = (results[job] for job in _fig_21_jobs(quick))
+    curves = (
+        curve(coarse, "tau", 0, label="5e-3°", colour="1"),
+        curve(benchmark, "tau", 0, label="1e-5° (benchmark)", colour="0"),
+    )
+    whole = Panel(r"$\tau_1$ (N·m)", curves)
+    panels = (whole, replace(excerpt(whole, 1.0, 1.05), title="50 ms of it"))
+    caption = f"Torque of joint 1 with encoders of 5e-3°: S = {number(smoothness(coarse, benchmark))} N·m."
+    return Section(pictures=(Picture("himpc-fig-21", caption, panels, 2),))
+
+
+ITEMS = (
+    Item("himpc-fig-17", "Errors on three levels", f"{SOURCE}-B, Fig. 17", lambda quick: (rt4(),), _fig_17),
+    Item("himpc-fig-18", "Error of x over the horizon", f"{SOURCE}-C, Fig. 18", _fig_18_jobs, _fig_18),
+    Item("himpc-fig-19", "HIMPC and NHIMPC", f"{SOURCE}-C, Fig. 19", _fig_19_jobs, _fig_19),
+    Item(
+        "himpc-fig-20",
+        "Computing time over the horizon",
+        f"{SOURCE}-C, Fig. 20",
+        lambda quick: tuple(timed("himpc", N, quick) for N in _fig_20_horizons(quick)),
+        _fig_20,
+    ),
+    Item("himpc-fig-21", "Chatter with coarse encoders", f"{SOURCE}-D, Fig. 21", _fig_21_jobs, _fig_21),
+)

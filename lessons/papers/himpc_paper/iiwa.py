@@ -1,0 +1,28 @@
+"""Section VI, the iiwa on RT4: the runs that its tables and figures share."""
+
+from __future__ import annotations
+
+from lessons.jobs import Job
+
+RT4, RT4_DATA_SHEET = "iiwa14-circle-paper", "iiwa14-circle"
+SOURCE = "HIMPC (T-RO 2024), section VI"
+DISTURBED = "[0.8,0.8,1.2,1.2,0.8,1.2,1.2]"
+"""Section VI-B: each diagonal element reduced or increased by 20 %, in the order − − + + − + +."""
+_LEVELS = (
+    ("position", ("x", "y", "z"), "m"),
+    ("orientation", ("o_X", "o_Y", "o_Z"), "deg"),
+    ("q1", ("q₁",), "deg"),
+)
+COORDINATES = tuple(
+    (label, task, k, unit) for task, labels, unit in _LEVELS for k, label in enumerate(labels)
+)
+"""(label, task, its coordinate, unit) of the seven columns of Table V."""
+OPEN = (
+    "The paper does not print the plant's inertias, gravity, friction, integrator or start; "
+    f"`{RT4}` is our best reading."
+)
+
+
+def rt4(controller: str = "himpc", *assignments: str, seconds: float | None = None) -> Job:
+    """RT4 as the paper most likely ran it, 4 s."""
+    return Job(RT4, controller, assignments, seconds)

@@ -1,0 +1,87 @@
+"""Table VII: computing time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lessons.jobs import Job, Results, Run
+from lessons.papers.himpc_paper.iiwa import RT4, SOURCE
+from lessons.papers.item import Item, Row, Section, Table, at_least
+from lessons.papers.printed import printed
+from lessons.papers.words import number, trouble
+from lessons.plots.style import name
+
+
+def timed(controller: str, N: int, quick: bool) -> Job:
+    """RT4 for step times: alone on the machine, half a second."""
+    return Job(RT4, controller, (f"horizon={N}",), 0.2 if quick else 0.5, timed=True)
+
+
+def step_seconds(run: Run) -> dict[str, float]:
+    """Average, median and maximum step time, s; the first ten steps warm up. NaN for a failed run."""
+    times = 1e-6 * run.column("step_us")[10:]
+    if not len(times):
+        return dict.fromkeys(("average", "median", "maximum"), math.nan)
+    return {
+        "average": float(times.mean()),
+        "median": float(np.median(times)),
+        "maximum": float(times.max()),
+    }
+
+
+def _table_7(results: Results, quick: bool) -> Section:
+    paper = printed("himpc_table_7")
+    ours = {each: step_seconds(results[timed(each, 5, quick)]) for each in ("himpc", "nhimpc")}
+    rows = [
+        Row(
+            f"{name(controller)}, {kind}",
+            "s",
+            paper[controller][kind],
+            ours[controller][kind],
+            trouble(results[timed(controller, 5, quick)])
+            or "another machine, and the structured route with DAQP instead of qpOASES or CasADi's SQP",
+        )
+        for controller in ("himpc", "nhimpc")
+        for kind in ("average", "median", "maximum")
+    ]
+    for kind in ("average", "median"):
+        rows.append(
+            Row(
+                f"NHIMPC over HIMPC, {kind}",
+                "1",
+                paper["nhimpc"][kind] / paper["himpc"][kind],
+                ours["nhimpc"][kind] / ours["himpc"][kind],
+                "the ratio is that of our two implementations: SQP through the same QP solver, warm-started",
+            )
+        )
+    runs = [results[timed(controller, 5, quick)] for controller in ("himpc", "nhimpc")]
+    table = Table(
+        "Iterations per step (solutions of all levels)",
+        ("controller", "mean", "largest"),
+        tuple(
+            (
+                name(run.job.controller),
+                *(number(run.figure("solver", "iterations", kind)) for kind in ("mean", "max")),
+            )
+            for run in runs
+        ),
+    )
+    return Section(
+        notes=("Step times with nothing else of ours running, state in to torque out, N = 5.",),
+        rows=tuple(rows),
+        tables=(table,),
+        checks=(at_least("NHIMPC's median time over HIMPC's", rows[-1].ours, 1.0),),
+    )
+
+
+ITEMS = (
+    Item(
+        "himpc-table-7",
+        "Computing time with N = 5",
+        f"{SOURCE}-C, Table VII",
+        lambda quick: tuple(timed(controller, 5, quick) for controller in ("himpc", "nhimpc")),
+        _table_7,
+    ),
+)

@@ -1,0 +1,72 @@
+"""Table VIII: smoothness of the torque over the encoders' resolution."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from lessons.jobs import Job, Results, Run
+from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
+from lessons.papers.item import Check, Item, Row, Section, at_most
+from lessons.papers.printed import printed
+from lessons.papers.words import trouble
+
+_FREE = ("limits.position=off",)
+"""A state bound that is active hides the sensor's noise: Table VIII is about noise."""
+
+
+def resolution_job(thousandths: float, quick: bool = False) -> Job:
+    """RT4 with encoders of a resolution in 1e-3 deg, no state bound active."""
+    extra = (*_FREE, f"plant.encoder_resolution_deg={thousandths * 1e-3:g}")
+    return rt4("himpc", *extra, seconds=2.0 if quick else None)
+
+
+def _jobs(quick: bool) -> tuple[Job, ...]:
+    paper = printed("himpc_table_8")
+    return tuple(resolution_job(each, quick) for each in (paper["benchmark"], *paper["resolution"]))
+
+
+def smoothness(run: Run, benchmark: Run) -> float:
+    """S of section VI-D: the RMS of ‖τ − τ of the benchmark‖, N·m, over the time both ran."""
+    ticks = min(len(run.t), len(benchmark.t))
+    if not ticks:
+        return math.nan
+    difference = run["tau"][:ticks] - benchmark["tau"][:ticks]
+    return float(np.sqrt((difference**2).sum(axis=1).mean()))
+
+
+def _section(results: Results, quick: bool) -> Section:
+    paper = printed("himpc_table_8")
+    benchmark = results[resolution_job(paper["benchmark"], quick)]
+    found = [smoothness(results[resolution_job(each, quick)], benchmark) for each in paper["resolution"]]
+    rows = tuple(
+        Row(
+            f"S at {resolution:g}e-3°",
+            "N·m",
+            value,
+            ours,
+            trouble(results[resolution_job(resolution, quick)])
+            or "scales with M̄ and the sensor model, and the paper does not say how it gets q̇ from q",
+        )
+        for resolution, value, ours in zip(paper["resolution"], paper["smoothness"], found, strict=True)
+    )
+    rising = float(np.min([b - a for a, b in pairwise(found)]))
+    worst = max(abs(row.ratio - 1) if row.ratio else math.inf for row in rows)
+    return Section(
+        notes=(
+            "q̇ is the backward difference of the quantised q, and position limits are off besides velocity "
+            f"limits: no state bound clips the chatter. The benchmark has {paper['benchmark']:g}e-3°.",
+        ),
+        rows=rows,
+        checks=(
+            Check(
+                "S strictly increases with the resolution: least difference (N·m) above 0", rising, rising > 0
+            ),
+            at_most("largest deviation of S from the paper's, as a share", worst, 0.3),
+        ),
+    )
+
+
+ITEMS = (Item("himpc-table-8", "Smoothness over the resolution", f"{SOURCE}-D, Table VIII", _jobs, _section),)

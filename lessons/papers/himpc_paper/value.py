@@ -1,0 +1,88 @@
+"""The value function V_N(k) of section IV-B along a run, and how it decreases, (39)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lessons.jobs import Job, Results, Run
+from lessons.papers.item import Check, Item, Section
+from lessons.papers.words import number, trouble
+from lessons.plots.panels import Curve, Panel, Picture
+
+Array = NDArray[np.float64]
+
+_JOB = Job("iiwa14-circle", duration=1.5)
+"""From rest, while the reference starts with a velocity: V_N begins far above where it settles."""
+_LEVELS = ("position", "orientation", "q1")
+_SETTLED_AFTER = 1.0
+_FAR = 10.0
+"""V_N above this many times ε_N counts as far from the reference."""
+
+
+def decrease(V: Array, t: Array) -> tuple[float, float]:
+    """(ε_N, α) such that V(k+1) − V(k) ≤ −α V(k) + ε_N on all ticks far from the reference, see (39).
+
+    ε_N is the largest value after it has settled; α the least relative decrease over the ticks before, as
+    long as V > 10 ε_N, with ε_N granted. α > 0: V decreases there. NaN without such ticks.
+    """
+    late = V[t >= _SETTLED_AFTER]
+    if not len(late):
+        return float("nan"), float("nan")
+    epsilon = float(late.max())
+    ends = np.flatnonzero(_FAR * epsilon >= V)
+    first = int(ends[0]) if len(ends) else len(V) - 1
+    if first < 2:
+        return epsilon, float("nan")
+    far = V[: first + 1]
+    return epsilon, float(((far[:-1] - far[1:] + epsilon) / far[:-1]).min())
+
+
+def _section(results: Results, quick: bool) -> Section:
+    run = results[_JOB]
+    epsilon, alpha = decrease(run.column("cost/position"), run.t)
+    curves = tuple(_value(run, level, k) for k, level in enumerate(_LEVELS))
+    V = run.column("cost/position")
+    ratio = Curve(V[:-1], V[1:] / V[:-1], "level 1", "0", "dots") if len(V) else Curve(V, V)
+    panels = (
+        Panel("$V_N(k)$", curves, log_y=True),
+        Panel(
+            "$V_N(k+1) / V_N(k)$, level 1",
+            (ratio,),
+            "$V_N(k)$, level 1 (below 1: it decreases)",
+            bounds=(1.0,),
+            log_x=True,
+            y_range=(0.0, 2.0),
+        ),
+    )
+    caption = "Value functions of the three levels from rest on RT4, and level 1's from tick to tick."
+    return Section(
+        notes=(
+            "V_N(k) is the optimal cost of each level, from the telemetry. Level 1 must decrease as long as "
+            "it is far above the bound ε_N that the estimation error leaves (39); lower levels only as far "
+            f"as level 1 lets them. {trouble(run)}",
+        ),
+        checks=(
+            Check(
+                f"level 1, ticks with V_N above {_FAR:g} ε_N = {number(_FAR * epsilon)}: least α of (39) > 0",
+                alpha,
+                bool(alpha > 0),
+            ),
+        ),
+        pictures=(Picture("himpc-value", caption, panels),),
+    )
+
+
+def _value(run: Run, level: str, place: int) -> Curve:
+    return Curve(run.t, run.column(f"cost/{level}"), f"level {place + 1}", str(place))
+
+
+ITEMS = (
+    Item(
+        "himpc-value",
+        "The value function decreases",
+        "HIMPC (T-RO 2024), section IV-B, (37) to (39)",
+        lambda quick: (_JOB,),
+        _section,
+    ),
+)

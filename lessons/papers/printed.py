@@ -1,0 +1,12 @@
+"""The values the papers print, one data file per table."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+
+def printed(table: str) -> dict[str, Any]:
+    """The printed values of a table, e.g. printed("himpc_table_2")."""
+    return tomllib.loads((Path(__file__).parent / "values" / f"{table}.toml").read_text(encoding="utf-8"))

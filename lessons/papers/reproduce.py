@@ -1,0 +1,169 @@
+"""Runs items and writes what came out: `report.md`, `results.json` and the pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lessons.jobs import Results, perform_all
+from lessons.papers.item import Check, Item, Row, Section, Table
+from lessons.papers.words import number
+from lessons.plots.draw import draw
+from robots import InputError
+
+
+@dataclass(frozen=True)
+class Report:
+    """An item with what it reports and the runs that failed or lost control."""
+
+    item: Item
+    section: Section
+    troubles: tuple[str, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether every check holds."""
+        return all(check.holds for check in self.section.checks)
+
+
+def reproduce(
+    items: Sequence[Item], quick: bool = False, progress: Callable[[float], None] | None = None
+) -> list[Report]:
+    """Runs everything the items need, runs they share once, and makes their sections.
+
+    Args:
+        items: what to reproduce.
+        quick: shorter and fewer runs.
+        progress: called with the share of the runs that is done.
+    """
+    results = perform_all((job for item in items for job in item.jobs(quick)), progress)
+    return [
+        Report(item, item.report(results, quick), tuple(_troubles(item, quick, results))) for item in items
+    ]
+
+
+def _troubles(item: Item, quick: bool, results: Results) -> list[str]:
+    found = []
+    for job in dict.fromkeys(item.jobs(quick)):
+        run = results[job]
+        if run.error is not None:
+            found.append(f"`{job.words}` could not be run: {run.error}")
+        elif run.lost_at is not None:
+            found.append(f"`{job.words}` lost control at {run.lost_at:.3f} s")
+    return found
+
+
+def write(reports: Sequence[Report], folder: Path, quick: bool) -> None:
+    """Writes report.md, results.json and the pictures. Raises InputError if it cannot."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for report in reports:
+            for picture in report.section.pictures:
+                draw(picture, folder)
+        (folder / "results.json").write_text(json.dumps(as_data(reports, quick), indent=1) + "\n")
+        (folder / "report.md").write_text(_markdown(reports, quick), encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            f"--out {folder}: cannot be written ({error.strerror}); give another folder"
+        ) from None
+
+
+# -------------------------------------------------------------------------------- JSON
+
+
+def as_data(reports: Sequence[Report], quick: bool) -> dict[str, Any]:
+    """The reports as JSON-ready data; what is not finite becomes None."""
+    return {"quick": quick, "items": [_item_data(report) for report in reports]}
+
+
+def _item_data(report: Report) -> dict[str, Any]:
+    section = report.section
+    return {
+        "name": report.item.name,
+        "title": report.item.title,
+        "source": report.item.source,
+        "rows": [_row_data(row) for row in section.rows],
+        "tables": [
+            {"title": table.title, "columns": list(table.columns), "rows": [list(row) for row in table.rows]}
+            for table in section.tables
+        ],
+        "checks": [
+            {"text": check.text, "value": _finite(check.value), "holds": check.holds}
+            for check in section.checks
+        ],
+        "notes": list(section.notes),
+        "pictures": [f"{picture.name}.png" for picture in section.pictures],
+        "troubles": list(report.troubles),
+    }
+
+
+def _row_data(row: Row) -> dict[str, Any]:
+    return {
+        "quantity": row.quantity,
+        "unit": row.unit,
+        "paper": row.paper,
+        "ours": _finite(row.ours),
+        "ratio": row.ratio,
+        "remark": row.remark,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+# -------------------------------------------------------------------------------- Markdown
+
+
+def _markdown(reports: Sequence[Report], quick: bool) -> str:
+    checks = [check for report in reports for check in report.section.checks]
+    held = sum(check.holds for check in checks)
+    lines = [
+        "# The papers' tables and figures, reproduced",
+        "",
+        "Written by `himpc-lab reproduce" + (" --quick" if quick else "") + "`. "
+        f"{held} of {len(checks)} checks hold." + (" Quick: shorter and fewer runs." if quick else ""),
+        "",
+        "Ratio: ours over the paper's. – : no such number.",
+    ]
+    for report in reports:
+        lines += ["", f"## {report.item.name}: {report.item.title}", "", f"*{report.item.source}*"]
+        section = report.section
+        for note in section.notes:
+            lines += ["", note]
+        if section.rows:
+            lines += ["", *_rows_markdown(section.rows)]
+        for table in section.tables:
+            lines += ["", *_table_markdown(table)]
+        if section.checks:
+            lines += ["", *(_check_markdown(check) for check in section.checks)]
+        for picture in section.pictures:
+            lines += ["", f"![{picture.caption}]({picture.name}.png)", "", f"*{picture.caption}*"]
+        if report.troubles:
+            lines += ["", *(f"- {trouble}" for trouble in report.troubles)]
+    return "\n".join(lines) + "\n"
+
+
+def _rows_markdown(rows: Sequence[Row]) -> list[str]:
+    table = [
+        (row.quantity, row.unit, number(row.paper), number(row.ours), number(row.ratio), row.remark)
+        for row in rows
+    ]
+    return _grid(("", "unit", "paper", "ours", "ratio", "remark"), table)
+
+
+def _table_markdown(table: Table) -> list[str]:
+    return [f"**{table.title}**", "", *_grid(table.columns, table.rows)]
+
+
+def _grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    cells = [[cell.replace("|", "\\|") for cell in row] for row in (columns, ["---"] * len(columns), *rows)]
+    return [f"| {' | '.join(row)} |" for row in cells]
+
+
+def _check_markdown(check: Check) -> str:
+    return f"- {'✓' if check.holds else '✗'} {check.text} (measured: {number(check.value)})"

@@ -1,0 +1,39 @@
+"""Sentences and rows that several items share."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lessons.jobs import Run
+from lessons.papers.item import Row
+from lessons.scenes import load_scene
+
+
+def number(value: float | None) -> str:
+    """Three figures, "–" for none."""
+    return "–" if value is None or not math.isfinite(value) else f"{value:.3g}"
+
+
+def trouble(run: Run) -> str:
+    """Why a run has no figures; "" if it has."""
+    if run.error is not None:
+        return f"could not be run: {run.error}"
+    return "" if run.lost_at is None else f"lost control at {run.lost_at:.2f} s"
+
+
+def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:
+    """The stiffness and damping a scene uses beside a table's; NaN if a task's coordinates have several."""
+    tasks = {task.name: task for level in load_scene(scene).settings.levels for task in level.tasks}
+    rows = []
+    for entry in table["tasks"]:
+        task = tasks[entry["scene_task"]]
+        for gain, words, unit in (("K_p", "stiffness", "1/s²"), ("K_v", "damping", "1/s")):
+            used = np.unique(np.asarray(getattr(task, gain), float))
+            ours = float(used[0]) if used.size == 1 else math.nan
+            rows.append(
+                Row(f"{entry['label']}, {words}", unit, entry[gain], ours, "the scene was given other gains")
+            )
+    return tuple(rows)

@@ -1,0 +1,178 @@
+"""Independent work on all local cores, or on a Dask cluster: the same function, items in, outcomes out.
+
+A piece of work that fails is an outcome, not the end of the others. Outcomes come as they are ready; each
+carries the place of its item, so that what is made of them does not depend on who was faster.
+"""
+
+from __future__ import annotations
+
+import multiprocessing as mp
+import os
+import signal
+import socket
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+from urllib.parse import urlsplit
+
+from robots import InputError
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Why a piece of work has no result, in one sentence."""
+
+    reason: str
+
+
+class Spread(Protocol):
+    """A way to spread work: (place of the item, its outcome), in the order they become ready. Closing the
+    generator ends what still runs."""
+
+    def __call__(
+        self, function: Callable[[T], U], items: Sequence[T]
+    ) -> Generator[tuple[int, U | Failed], None, None]: ...
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return max(1, len(affinity(0)) if affinity else os.cpu_count() or 1)
+
+
+def on_cores(function: Callable[[T], U], items: Sequence[T]) -> Generator[tuple[int, U | Failed], None, None]:
+    """Spreads work over spawned processes, one per core, each with one thread of linear algebra.
+
+    Args:
+        function: importable by name; its argument and result can be pickled.
+        items: its arguments.
+
+    Yields:
+        (place of the item, what the function returned, or `Failed` if it raised or its process died).
+    """
+    orphans: list[int] = []
+    with _pool(min(cores(), max(1, len(items)))) as pool:
+        places = {pool.submit(_guarded, function, item): place for place, item in enumerate(items)}
+        for future in as_completed(places):
+            try:
+                yield places[future], future.result()
+            except BrokenProcessPool:
+                orphans.append(places[future])
+    # A dying process takes its pool's other work with it: one at a time, the culprit shows.
+    for place in sorted(orphans):
+        yield place, _alone(function, items[place])
+
+
+def one_by_one(
+    function: Callable[[T], U], items: Sequence[T]
+) -> Generator[tuple[int, U | Failed], None, None]:
+    """The same in this process, in order: for measuring times, and for tests."""
+    for place, item in enumerate(items):
+        yield place, _guarded(function, item)
+
+
+@contextmanager
+def on_cluster(address: str) -> Iterator[Spread]:
+    """A way to spread work over the workers of an existing Dask scheduler; they need himpc-lab installed.
+
+    Raises:
+        InputError: dask.distributed is not installed, or nobody answers at the address.
+    """
+    try:
+        from distributed import Client
+        from distributed import as_completed as as_they_end
+    except ImportError:
+        raise InputError(
+            '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
+            "to use this machine's cores"
+        ) from None
+    # Asked first by plain socket: a Client that finds nobody goes on trying in the background.
+    try:
+        parts = urlsplit(address)
+        socket.create_connection((parts.hostname or "", parts.port or 0), timeout=10).close()
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--scheduler {address}: no Dask scheduler answers there ({type(error).__name__}); "
+            "give its address as dask prints it, e.g. tcp://10.0.0.1:8786"
+        ) from None
+
+    def spread(
+        function: Callable[[T], U], items: Sequence[T]
+    ) -> Generator[tuple[int, U | Failed], None, None]:
+        # pure=False: two equal items are two pieces of work; retries: a lost worker is no failure.
+        futures = [client.submit(_guarded, function, item, pure=False, retries=2) for item in items]
+        places = {future.key: place for place, future in enumerate(futures)}
+        try:
+            for future in as_they_end(futures):
+                error = future.exception()
+                yield places[future.key], future.result() if error is None else Failed(_sentence(error))
+        finally:
+            client.cancel(futures)
+
+    with client:
+        yield spread
+
+
+def _guarded(function: Callable[[T], U], item: T) -> U | Failed:
+    try:
+        return function(item)
+    except Exception as error:
+        return Failed(_sentence(error))
+
+
+def _sentence(error: BaseException) -> str:
+    text = " ".join(str(error).split()) or "no reason given"
+    return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
+
+
+def _alone(function: Callable[[T], U], item: T) -> U | Failed:
+    with _pool(1) as pool:
+        try:
+            return pool.submit(_guarded, function, item).result()
+        except BrokenProcessPool:
+            return Failed("its process died (out of memory, or a crash in a compiled library)")
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Spawned processes that end at once if their owner is interrupted."""
+    others = set(mp.active_children())
+    pool = ProcessPoolExecutor(workers, mp.get_context("spawn"), initializer=_ignore_interrupts)
+    try:
+        with _one_thread_each():
+            yield pool
+    except BaseException:
+        for child in set(mp.active_children()) - others:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _ignore_interrupts() -> None:
+    # Ctrl-C in a terminal reaches the whole process group; the owner ends its children itself.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Children inherit these variables; they count when numpy is first imported, before any code of ours."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

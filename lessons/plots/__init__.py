@@ -1,0 +1,1 @@
+"""Pictures for print and page. The only door to matplotlib; what is drawn is data (`panels`)."""

@@ -1,0 +1,147 @@
+"""Pictures drawn as PNG files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.plots.style import BOUND, RC, colour
+from lessons.plots.ticks import label_values
+
+WIDTH = 7.2
+"""Inches: a page between its margins."""
+DPI = 150
+_MARKED = 12
+"""Curves of at most so many points show them."""
+_DECADES = 300
+"""A logarithmic axis that spans less than this factor has ticks at 1, 2, 5."""
+_TALL = 50
+"""Bars whose heights differ by more than this factor get a logarithmic axis."""
+_STYLES = {"line": "-", "dashed": (0, (5, 2)), "dots": "", "steps": "-"}
+
+
+def draw(picture: Picture, folder: Path) -> Path:
+    """Draws a picture into a folder and returns its file."""
+    rows = -(-len(picture.panels) // picture.columns)
+    with mpl.rc_context(RC):
+        heights = [_height(picture, row) for row in range(rows)]
+        figure = Figure(figsize=(WIDTH, sum(heights) + 0.35), dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.subplots(rows, picture.columns, squeeze=False, height_ratios=heights)
+        for place, axes in enumerate(grid.flat):
+            if place >= len(picture.panels):
+                axes.set_axis_off()
+                continue
+            panel = picture.panels[place]
+            _draw_bars(axes, panel) if isinstance(panel, Bars) else _draw_panel(axes, panel)
+        _label_shared_x(picture, grid)
+        figure.align_ylabels(grid)
+        _legend(figure, grid)
+        path = folder / f"{picture.name}.png"
+        figure.savefig(path)
+    return path
+
+
+def _height(picture: Picture, row: int) -> float:
+    """Inches of a row: equal axes need a square, long time series do not."""
+    panels = picture.panels[row * picture.columns : (row + 1) * picture.columns]
+    if any(isinstance(panel, Panel) and panel.equal for panel in panels):
+        return min(4.6, 0.85 * WIDTH / picture.columns)
+    return 2.9 if len(picture.panels) <= picture.columns else 1.75
+
+
+def _draw_panel(axes: Axes, panel: Panel) -> None:
+    for curve in panel.curves:
+        _draw_curve(axes, curve)
+    for bound in panel.bounds:
+        axes.axhline(bound, color=BOUND, linewidth=1.2, linestyle=(0, (4, 1.5, 1, 1.5)), zorder=1)
+    axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
+    if panel.log_x and _positive(curve.x for curve in panel.curves):
+        axes.set_xscale("log")
+        used = sorted({float(x) for curve in panel.curves for x in curve.x})
+        if len(used) <= _MARKED:
+            label_values(axes.xaxis, used, log=True)
+    if panel.log_y and _positive(curve.y for curve in panel.curves):
+        axes.set_yscale("log")
+        low, high = panel.y_range or axes.get_ylim()
+        if high < _DECADES * low:
+            label_values(axes.yaxis, (), log=True)
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="datalim")
+    if panel.y_range is not None:
+        axes.set_ylim(*panel.y_range)
+    elif panel.bounds and not panel.log_y:
+        # A curve that stays far inside its bounds must not be squeezed flat by them, nor hide them.
+        low, high = min(panel.bounds), max(panel.bounds)
+        margin = 0.08 * (high - low or abs(high) or 1.0)
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(min(bottom, low - margin), max(top, high + margin))
+    if panel.x_label == "time (s)":
+        axes.margins(x=0.01)
+
+
+def _positive(values: Iterable[np.ndarray]) -> bool:
+    """Whether a logarithmic axis would have anything to show."""
+    return any(bool((each[np.isfinite(each)] > 0).any()) for each in values)
+
+
+def _draw_curve(axes: Axes, curve: Curve) -> None:
+    shade = colour(curve.colour)
+    if curve.style == "dots":
+        axes.plot(
+            curve.x, curve.y, ".", color=shade, label=curve.label, markersize=3 * curve.weight, zorder=3
+        )
+        return
+    axes.plot(
+        curve.x,
+        curve.y,
+        linestyle=_STYLES[curve.style],
+        drawstyle="steps-post" if curve.style == "steps" else "default",
+        marker="o" if len(curve.x) <= _MARKED else None,
+        markersize=3.5,
+        color=shade,
+        linewidth=1.1 * curve.weight,
+        label=curve.label,
+        zorder=3,
+    )
+
+
+def _draw_bars(axes: Axes, panel: Bars) -> None:
+    width = 0.8 / len(panel.series)
+    middle = np.arange(len(panel.groups))
+    for place, (label, key, values) in enumerate(panel.series):
+        offset = (place - 0.5 * (len(panel.series) - 1)) * width
+        axes.bar(middle + offset, values, 0.92 * width, color=colour(key), label=label, zorder=3)
+    axes.set_xticks(middle, panel.groups)
+    axes.grid(visible=False, axis="x")
+    axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
+    known = [value for _, _, values in panel.series for value in values if value > 0]
+    if known and max(known) > _TALL * min(known):
+        axes.set_yscale("log")
+
+
+def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:
+    """The label of an axis that all panels of a column share stands below the last one only."""
+    for column in grid.T:
+        shown = [axes for axes in column if axes.axison]
+        if len({axes.get_xlabel() for axes in shown}) == 1:
+            for axes in shown[:-1]:
+                axes.set_xlabel("")
+
+
+def _legend(figure: Figure, grid: np.ndarray) -> None:
+    found = {}
+    for axes in grid.flat:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if len(found) > 1:
+        figure.legend(
+            found.values(), found.keys(), loc="outside upper center", ncols=min(len(found), 4), markerscale=2
+        )

@@ -1,0 +1,143 @@
+"""The picture of a sweep: a heat map over two settings, a curve over one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from lessons.plots.style import RC
+from lessons.plots.ticks import label_values
+
+Array = NDArray[np.float64]
+_LOST, _FAILED = "#F3D9D6", "#D5D9DE"
+_EDGE = "#B3261E"
+
+
+def draw_map(
+    path: Path,
+    title: str,
+    metric: str,
+    labels: tuple[str, ...],
+    values: tuple[tuple[float, ...], ...],
+    log: tuple[bool, ...],
+    z: Array,
+    diverged: NDArray[np.bool_],
+    failed: NDArray[np.bool_],
+) -> None:
+    """Draws one or two swept settings.
+
+    Args:
+        path: the PNG file.
+        title, metric: headline, and what the colour or the curve shows, with its unit.
+        labels, values, log: per axis: the path, its values, whether they go in equal ratios.
+        z: metric, (n,) or (n_1, n_2); NaN where there is none.
+        diverged, failed: cells that lost control, and that could not be run; shaped as z.
+    """
+    with mpl.rc_context(RC):
+        figure = Figure(figsize=(7.2, 5.0 if z.ndim == 2 else 3.4), dpi=150, layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots()
+        axes.set_title(title)
+        if z.ndim == 2:
+            _two(figure, axes, metric, labels, values, log, z, diverged, failed)
+        else:
+            _one(axes, metric, labels[0], values[0], log[0], z, diverged, failed)
+        handles = [
+            Patch(facecolor=face, edgecolor=_EDGE, hatch=hatch, linewidth=0.0, label=label)
+            for mask, face, hatch, label in (
+                (diverged, _LOST, "////", "control lost"),
+                (failed, _FAILED, "xxxx", "could not be run"),
+            )
+            if mask.any()
+        ]
+        if handles:
+            figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        figure.savefig(path)
+
+
+def _norm(z: Array) -> Normalize:
+    """Logarithmic colours if the values are positive and span more than a decade."""
+    known = z[np.isfinite(z)]
+    if known.size and known.min() > 0 and known.max() > 10 * known.min():
+        return LogNorm(known.min(), known.max())
+    return Normalize(known.min(), known.max()) if known.size else Normalize(0, 1)
+
+
+def _edges(values: tuple[float, ...], log: bool) -> Array:
+    """Borders of the cells around the values, halfway (in ratio if log)."""
+    centres = np.log(values) if log else np.array(values)
+    if len(centres) == 1:
+        half = 0.5 * (abs(centres[0]) or 1.0)
+        edges = np.array([centres[0] - half, centres[0] + half])
+    else:
+        inner = 0.5 * (centres[1:] + centres[:-1])
+        edges = np.r_[2 * centres[0] - inner[0], inner, 2 * centres[-1] - inner[-1]]
+    return np.exp(edges) if log else edges
+
+
+def _two(
+    figure: Figure,
+    axes: Axes,
+    metric: str,
+    labels: tuple[str, ...],
+    values: tuple[tuple[float, ...], ...],
+    log: tuple[bool, ...],
+    z: Array,
+    diverged: NDArray[np.bool_],
+    failed: NDArray[np.bool_],
+) -> None:
+    x, y = (_edges(each, is_log) for each, is_log in zip(values, log, strict=True))
+    shown = axes.pcolormesh(x, y, np.ma.masked_invalid(z.T), norm=_norm(z), cmap="viridis_r", rasterized=True)
+    for mask, face, hatch in ((diverged, _LOST, "////"), (failed, _FAILED, "xxxx")):
+        for i, j in np.argwhere(mask):
+            axes.fill(
+                [x[i], x[i + 1], x[i + 1], x[i]],
+                [y[j], y[j], y[j + 1], y[j + 1]],
+                facecolor=face,
+                edgecolor=_EDGE,
+                hatch=hatch,
+                linewidth=0.0,
+            )
+    axes.set(xscale="log" if log[0] else "linear", yscale="log" if log[1] else "linear")
+    label_values(axes.xaxis, values[0], log[0])
+    label_values(axes.yaxis, values[1], log[1])
+    axes.set(xlabel=labels[0], ylabel=labels[1], xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    axes.grid(visible=False)
+    figure.colorbar(shown, ax=axes, label=metric)
+
+
+def _one(
+    axes: Axes,
+    metric: str,
+    label: str,
+    values: tuple[float, ...],
+    log: bool,
+    z: Array,
+    diverged: NDArray[np.bool_],
+    failed: NDArray[np.bool_],
+) -> None:
+    edges = _edges(values, log)
+    axes.plot(values, z, "-o", color="#0057B8", markersize=4, linewidth=1.2, zorder=3)
+    for mask, face, hatch in ((diverged, _LOST, "////"), (failed, _FAILED, "xxxx")):
+        for i in np.flatnonzero(mask):
+            axes.axvspan(
+                float(edges[i]),
+                float(edges[i + 1]),
+                facecolor=face,
+                edgecolor=_EDGE,
+                hatch=hatch,
+                linewidth=0.0,
+            )
+    axes.set_xscale("log" if log else "linear")
+    label_values(axes.xaxis, values, log)
+    if isinstance(_norm(z), LogNorm):
+        axes.set_yscale("log")
+    axes.set(xlabel=label, ylabel=metric, xlim=(edges[0], edges[-1]))

@@ -1,0 +1,87 @@
+"""A picture as data: panels of curves with the bounds they must keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """y over x.
+
+    Attributes:
+        x, y: (k,) each.
+        label: name in the legend; "" for none.
+        colour: a controller's name, "reference", or a place "0", "1", … in the sequence of colours.
+        style: "line", "dashed", "dots" or "steps".
+        weight: line width relative to an ordinary curve.
+    """
+
+    x: Array
+    y: Array
+    label: str = ""
+    colour: str = "0"
+    style: str = "line"
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Axes with curves.
+
+    Attributes:
+        y_label, x_label: with units.
+        curves: drawn in order.
+        bounds: horizontal bounds: constants, drawn grey.
+        title: above the panel.
+        log_x, log_y: logarithmic axes.
+        equal: one metre is as long in x as in y.
+        y_range: fixed range of y; what leaves it is cut, and the picture's caption says so.
+    """
+
+    y_label: str
+    curves: tuple[Curve, ...]
+    x_label: str = "time (s)"
+    bounds: tuple[float, ...] = ()
+    title: str = ""
+    log_x: bool = False
+    log_y: bool = False
+    equal: bool = False
+    y_range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Groups of bars: one group per `groups`, in it one bar per series.
+
+    Attributes:
+        series: (label, colour, one value per group).
+    """
+
+    y_label: str
+    groups: tuple[str, ...]
+    series: tuple[tuple[str, str, tuple[float, ...]], ...]
+    x_label: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Panels on a grid, one legend for all.
+
+    Attributes:
+        name: file name without ending.
+        caption: what is seen, in a sentence or two.
+        panels: row by row.
+        columns: panels side by side.
+    """
+
+    name: str
+    caption: str
+    panels: tuple[Panel | Bars, ...]
+    columns: int = 1

@@ -1,0 +1,144 @@
+"""`reproduce`, `sweep` and `tune` as their users meet them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.__main__ import main
+
+ROOT = Path(__file__).parents[2]
+SHORT = ["planar3-circle", "--duration", "0.02"]
+
+WRONG: dict[str, tuple[list[str], str]] = {
+    "no such item": (["reproduce", "himpc-table-22"], "himpc-table-2"),
+    "a folder that is a file": (["reproduce", "himpc-table-1", "--out", "/dev/null/x"], "--out"),
+    "nothing to sweep": (["sweep", *SHORT, "--out", "/tmp/never"], "--over"),
+    "no such path": (["sweep", *SHORT, "--out", "/tmp/never", "--over", "M_bar_scal=1:2:2"], "M_bar_scale"),
+    "no such scene": (
+        ["sweep", "planar3-cirle", "--out", "/tmp/never", "--over", "Q=1:2:2"],
+        "planar3-circle",
+    ),
+    "no such metric": (
+        ["sweep", *SHORT, "--out", "/tmp/never", "--over", "Q=1:2:2", "--metric", "tasks.position.rms"],
+        "tasks.position.rmse",
+    ),
+    "a folder nobody may write": (["sweep", *SHORT, "--out", "/dev/null/x", "--over", "Q=1:2:2"], "--out"),
+    "no scheduler": (
+        ["sweep", *SHORT, "--out", "/tmp/never", "--over", "Q=1:2:2", "--scheduler", "tcp://127.0.0.1:1"],
+        "--scheduler",
+    ),
+    "tuning from nothing": (["tune", *SHORT, "--start", "0"], "--start"),
+    "tuning in no steps": (["tune", *SHORT, "--factor", "1"], "--factor"),
+    "tuning what is not there": (["tune", "planar3-cirle"], "planar3-circle"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_gets_one_sentence_and_exit_2(case: str, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments, says = WRONG[case]
+    assert main(arguments) == 2
+    out, err = capfd.readouterr()
+    lines = [line for line in err.strip().splitlines() if line.startswith("himpc-lab: ")]
+    assert len(lines) == 1
+    assert says in lines[0]
+    assert "Traceback" not in err
+    assert out.strip() == ""
+
+
+def test_reproduce_writes_a_report(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Two items without runs: report.md, results.json, and the same on standard output."""
+    arguments = ["reproduce", "himpc-table-1", "himpc-table-4", "--out", str(tmp_path), "--json", "-"]
+    assert main(arguments) == 0
+    printed = json.loads(capfd.readouterr().out)
+    assert printed == json.loads((tmp_path / "results.json").read_text())
+    assert [item["name"] for item in printed["items"]] == ["himpc-table-1", "himpc-table-4"]
+    assert "himpc-table-4" in (tmp_path / "report.md").read_text()
+
+
+def test_a_check_that_fails_is_exit_1(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ran, but a claim does not hold: the command says which and by what."""
+    from lessons import papers
+    from lessons.papers.item import Check, Item, Section
+
+    section = Section(checks=(Check("the moon is of cheese", 0.0, False),))
+    item = Item("moon", "", "", lambda quick: (), lambda results, quick: section)
+    monkeypatch.setitem(papers.ITEMS, "moon", item)
+    assert main(["reproduce", "moon", "--out", str(tmp_path)]) == 1
+    assert "the moon is of cheese" in capfd.readouterr().out
+
+
+def cells(folder: Path) -> list[dict[str, Any]]:
+    """Finished cells of a sweep's folder."""
+    file = folder / "cells.jsonl"
+    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def gone(group: int, within: float) -> bool:
+    """Whether no process of a group is left after at most so many seconds."""
+    give_up = time.monotonic() + within
+    while time.monotonic() < give_up:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_a_sweep_stopped_by_ctrl_c_carries_on(tmp_path: Path) -> None:
+    """Interrupted like from a terminal: it says how far it got, leaves no process behind, and the same
+    command ends in the same results as an uninterrupted one."""
+    # Cells long enough that the second is not done when the first is seen.
+    what = ["planar3-circle", "--over", "Q=100:200:6", "--duration", "0.4"]
+    command = [sys.executable, "-m", "app", "sweep", *what, "--out"]
+    part = tmp_path / "part"
+    process = subprocess.Popen(
+        [*command, str(part)], cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    give_up = time.monotonic() + 120
+    while not cells(part) and time.monotonic() < give_up:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "the same command carries on" in err
+    assert "Traceback" not in err
+    # Python's own helper process ends a moment after its parent.
+    assert gone(process.pid, within=30.0)
+    assert 0 < len(cells(part)) < 6
+    assert main(["sweep", *what, "--out", str(part)]) == 0
+    assert main(["sweep", *what, "--out", str(tmp_path / "whole")]) == 0
+    assert (part / "results.json").read_bytes() == (tmp_path / "whole" / "results.json").read_bytes()
+    assert (part / "map.png").is_file()
+
+
+def test_tune_prints_its_steps(capfd: pytest.CaptureFixture[str]) -> None:
+    """M̄ grows by the factor until the accuracy is reached, and the result can be pasted."""
+    arguments = ["tune", "planar3-circle", "--duration", "0.5", "--start", "0.2", "--accuracy", "1e-4"]
+    assert main(arguments) == 0
+    lines = capfd.readouterr().out.splitlines()
+    assert lines[0].startswith(" 1. M̄ × 0.2 ")
+    assert lines[-2].endswith("satisfactory")
+    assert "--set M_bar=[" in lines[-1]
+
+
+def test_tune_stops_when_the_torque_is_noisy(capfd: pytest.CaptureFixture[str]) -> None:
+    """With coarse encoders M̄ stays below what an unreachable accuracy would ask for."""
+    coarse = ["--set", "plant.encoder_resolution_deg=0.005"]
+    arguments = ["tune", "planar3-circle", "--duration", "0.3", "--start", "0.02", "--accuracy", "1e-9"]
+    assert main([*arguments, *coarse, "--json", "-"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    verdicts = [step["verdict"] for step in data["steps"]]
+    assert verdicts == [*["go on"] * (len(verdicts) - 1), "noisy"]
+    assert data["chosen"]["scale"] < data["steps"][-1]["scale"]

@@ -1,0 +1,295 @@
+"""The reproduction: every item can be asked for, failures are data, what is written is what was measured."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lessons.jobs import Job, Results, Run, perform_all
+from lessons.kinds import paths_of
+from lessons.papers import ITEMS
+from lessons.papers.himpc_paper.accuracy import model_errors
+from lessons.papers.himpc_paper.effort import EffortJob
+from lessons.papers.himpc_paper.planar import rt1, rt2, rt3
+from lessons.papers.himpc_paper.table_3 import CRITERIA, verdicts
+from lessons.papers.himpc_paper.table_8 import smoothness
+from lessons.papers.himpc_paper.value import decrease
+from lessons.papers.item import Check, Item, Row, Section, Table, at_least, at_most
+from lessons.papers.printed import printed
+from lessons.papers.reproduce import Report, as_data, reproduce, write
+from lessons.plots.panels import Bars, Curve, Panel, Picture
+from robots import InputError
+
+QUICK = (False, True)
+
+
+def failed(jobs: Iterable[Job]) -> Results:
+    """A run for every job, all failed."""
+    return {job: Run(job, {}, {}, "there was no time") for job in jobs}
+
+
+@pytest.fixture(scope="module")
+def short() -> dict[str, Run]:
+    """A second and a bit of RT1 for two controllers."""
+    jobs = {name: Job("planar3-circle", name, duration=1.2) for name in ("himpc", "osf")}
+    found = perform_all(jobs.values())
+    return {name: found[job] for name, job in jobs.items()}
+
+
+# -------------------------------------------------------------------------------- items
+
+
+def test_the_papers_tables_and_figures_are_there() -> None:
+    """Everything the paper reports as a table or plot, by the name one would guess."""
+    tables = {f"himpc-table-{number}" for number in range(1, 9)}
+    figures = {f"himpc-fig-{number}" for number in (*range(3, 16), *range(17, 22))}
+    assert tables | figures | {"himpc-accuracy", "himpc-ablations", "himpc-value"} <= set(ITEMS)
+
+
+@pytest.mark.parametrize("quick", QUICK)
+@pytest.mark.parametrize("name", ITEMS)
+def test_every_job_can_be_set_up(name: str, quick: bool) -> None:
+    """Scene, controller and every assignment exist, so that no item fails for a typo."""
+    for job in ITEMS[name].jobs(quick):
+        scene = job.prepared()
+        assert scene.settings.controller == job.controller
+        assert {text.partition("=")[0] for text in job.set} <= set(paths_of(scene))
+
+
+@pytest.mark.parametrize("quick", QUICK)
+@pytest.mark.parametrize("name", ITEMS)
+def test_failed_runs_do_not_stop_a_report(name: str, quick: bool, tmp_path: Path) -> None:
+    """With every run failed there is still a report: no number of ours, no check that holds."""
+    item = ITEMS[name]
+    jobs = item.jobs(quick)
+    section = item.report(failed(jobs), quick)
+    if jobs:
+        assert all(math.isnan(row.ours) for row in section.rows)
+        assert not any(check.holds for check in section.checks)
+    write([Report(item, section, ())], tmp_path, quick)
+    assert {f"{picture.name}.png" for picture in section.pictures} <= {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("name", ITEMS)
+def test_quick_runs_are_no_longer_than_the_others(name: str) -> None:
+    """--quick is never more work."""
+
+    def seconds(quick: bool) -> float:
+        return sum(job.duration or job.prepared().duration for job in set(ITEMS[name].jobs(quick)))
+
+    assert seconds(True) <= seconds(False)
+
+
+@pytest.mark.parametrize("name", ["himpc-table-1", "himpc-table-4"])
+def test_the_scenes_have_the_gains_of_the_paper(name: str) -> None:
+    section = ITEMS[name].report({}, False)
+    assert section.rows
+    assert all(row.ratio == 1.0 for row in section.rows)
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_every_table_has_its_printed_values(number: int) -> None:
+    assert printed(f"himpc_table_{number}")
+
+
+def test_printed_values_are_what_the_paper_prints() -> None:
+    """One number per table, read from the paper a second time."""
+    assert printed("himpc_table_2")["hqp"] == {"x": 3.11e-3, "y": 2.39e-3, "q1": 1.05}
+    assert printed("himpc_table_3")["Input constraints"]["hqp"] is True
+    assert printed("himpc_table_5")["disturbed"]["orientation"] == [3.388e-2, 2.290e-2, 2.122e-1]
+    assert printed("himpc_table_6")["nhimpc"]["20"] == 1.598
+    assert printed("himpc_table_7")["himpc"]["median"] == 9.04e-3
+    assert printed("himpc_table_8")["smoothness"][3] == 11.62
+
+
+# -------------------------------------------------------------------------------- verdicts
+
+
+def fake(job: Job, error: float, torque: float, speed: float, lost: float | None = None) -> Run:
+    """A run with a level-1 error (m), and shares of the bounds."""
+    task = {"name": "position", "rmse_after_1s": [error, error / 2], "rmse": [error, error / 2]}
+    limits = {"torque": {"max_ratio": torque}, "velocity": {"max_ratio": speed}}
+    data: dict[str, Any] = {"diverged": lost is not None, "diverged_at_s": lost, "tasks": [task]}
+    return Run(job, {**data, "limits": limits}, {"error/position": np.full((4, 2), error)})
+
+
+def ticks(error: float, torque: float, speed: float, lost: float | None = None) -> dict[str, bool | None]:
+    """The verdicts if all three runs end alike."""
+    runs = {make("himpc"): fake(make("himpc"), error, torque, speed, lost) for make in (rt1, rt2, rt3)}
+    return {name: verdict.holds for name, verdict in verdicts(runs, "himpc").items()}
+
+
+def test_ticks_are_decided_by_the_runs() -> None:
+    """Each property turns with its own number, and none is decided by a run that failed."""
+    assert ticks(1e-5, 1.0, 1.0) == dict.fromkeys(CRITERIA, True)
+    assert ticks(1e-3, 1.0, 1.0)["High accuracy"] is False
+    assert ticks(0.05, 1.0, 1.0)["Singularity-free"] is False
+    assert ticks(1e-5, 5.0, 1.0)["Singularity-free"] is False
+    assert ticks(1e-5, 1.0, 1.0, lost=0.5)["Singularity-free"] is False
+    assert ticks(1e-5, 1.01, 1.0)["Input constraints"] is False
+    assert ticks(1e-5, 1.0, 1.1)["State constraints"] is False
+    missing = failed(make("himpc") for make in (rt1, rt2, rt3))
+    assert {verdict.holds for verdict in verdicts(missing, "himpc").values()} == {None}
+    assert {verdict.tick for verdict in verdicts(missing, "himpc").values()} == {"–"}
+
+
+@pytest.mark.parametrize(
+    ("row", "ratio", "remark"),
+    [
+        (Row("x", "m", 2.0, 2.1, "why"), 1.05, "agrees within 10%"),
+        (Row("x", "m", 2.0, 4.0, "why"), 2.0, "why"),
+        (Row("x", "m", None, 4.0, "why"), None, "why"),
+        (Row("x", "m", 2.0, math.nan, "why"), None, "why"),
+    ],
+)
+def test_a_row_says_why_unless_it_agrees(row: Row, ratio: float | None, remark: str) -> None:
+    assert row.ratio == ratio
+    assert row.remark == remark
+
+
+def test_nothing_measured_is_no_check_passed() -> None:
+    assert not at_most("x", math.nan, 1.0).holds
+    assert not at_least("x", math.nan, 1.0).holds
+    assert at_most("x", 1.0, 1.0).holds
+    assert at_least("x", 1.0, 1.0).holds
+
+
+# -------------------------------------------------------------------------------- runs
+
+
+def test_jobs_run_anywhere_give_the_same_numbers(short: dict[str, Run]) -> None:
+    """A spawned process and this one agree to the bit, and the arrays are as long as the run."""
+    run = short["himpc"]
+    again = run.job.do()
+    assert np.array_equal(run["tau"], again["tau"])
+    assert run.error_of("position", 1) == again.error_of("position", 1) > 0
+    assert len(run.t) == 1200
+
+
+def test_a_job_that_cannot_be_done_is_a_run_with_a_sentence() -> None:
+    job = Job("planar3-circle", "himcp", duration=0.01)
+    run = perform_all([job])[job]
+    assert run.error is not None
+    assert "himpc" in run.error
+    assert math.isnan(run.error_of("position"))
+    assert len(run.t) == 0
+
+
+def test_the_incremental_model_is_better_than_a_model_20_percent_off(short: dict[str, Run]) -> None:
+    """Section III-B on its own definitions: γ of (21) at least ten times δ of (25)."""
+    errors = model_errors(short["himpc"])
+    assert errors.gamma > 10 * errors.delta > 0
+    assert errors.beta > 10 * errors.epsilon > 0
+
+
+def test_an_exact_nominal_model_has_no_error() -> None:
+    """γ vanishes when nominal model and plant agree: the definition measures the model, nothing else."""
+    exact = tuple(
+        f"nominal.{key}" for key in ("mass_scale=1", "inertia_scale=1", "armature=[0.05,0.05,0.03]")
+    )
+    bare = ("plant.friction=0", "plant.damping=0")
+    job = Job("planar3-circle", set=(*exact, *bare), duration=1.2)
+    wrong = Job("planar3-circle", set=bare, duration=1.2)
+    found = perform_all([job, wrong])
+    # What is left is the change of M and C within a tick.
+    assert model_errors(found[job]).gamma < 0.01 * model_errors(found[wrong]).gamma
+
+
+def test_smoothness_is_the_rms_distance() -> None:
+    job = Job("planar3-circle")
+    one = Run(job, {}, {"t": np.zeros((4, 1)), "tau": np.zeros((4, 2))})
+    other = Run(job, {}, {"t": np.zeros((3, 1)), "tau": np.array([[3.0, 4.0]] * 3)})
+    assert smoothness(other, one) == 5.0
+
+
+def test_the_decrease_of_the_value_function_is_measured() -> None:
+    """A geometric decay has its rate; one tick that rises far from the reference spoils it."""
+    t = np.array([1e-3 * k for k in range(2000)])
+    V = np.maximum(100.0 * 0.9 ** np.arange(len(t)), 1e-3)
+    epsilon, alpha = decrease(V, t)
+    assert epsilon == 1e-3
+    assert alpha == pytest.approx(0.1, abs=0.01)
+    V[20] = 2 * V[19]
+    assert decrease(V, t)[1] < 0
+
+
+def test_weighing_the_torque_costs_accuracy_where_gravity_pulls() -> None:
+    """Section IV-C: at rest ‖Δτ‖² has no bias whatever the weight, ‖τ‖² has, and the more the larger R."""
+    still = EffortJob("iiwa14-circle", duration=1.2, hold_deg=(0.0, 90.0, 0.0, 10.0, 0.0, 10.0, 0.0))
+    assert still.do().error_of("position") < 1e-9
+    errors = [replace(still, effort="torque", R=R).do().error_of("position") for R in (1e-4, 1e-2)]
+    assert 1e-6 < errors[0] < 0.1 * errors[1]
+
+
+# -------------------------------------------------------------------------------- writing
+
+
+def picture(name: str) -> Picture:
+    x = np.linspace(0.0, 1.0, 50)
+    panels = (
+        Panel("y (m)", (Curve(x, x, "a", "himpc"), Curve(x, -x, "b", "reference", "dots")), bounds=(-2, 2)),
+        Panel("y (m)", (Curve(x[:5] + 1, x[:5] + 1, colour="0"),), "x (m)", log_x=True, log_y=True),
+        Panel("y (m)", (Curve(x, x),), "x (m)", equal=True, y_range=(0.0, 0.5)),
+        Bars("c", ("one", "two"), (("HIMPC", "himpc", (1.0, 1e3)), ("HQP", "hqp", (math.nan, 2.0)))),
+        Panel("nothing", ()),
+    )
+    return Picture(name, "what is seen", panels, 2)
+
+
+def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
+    """report.md, results.json and the picture agree with the section, and NaN becomes null."""
+    section = Section(
+        notes=("A note.",),
+        rows=(Row("x", "m", 2.0, 4.0, "differs | because"), Row("y", "m", None, math.nan, "none")),
+        tables=(Table("T", ("a", "b"), (("1", "2"),)),),
+        checks=(Check("holds", 1.0, True), Check("does not", math.nan, False)),
+        pictures=(picture("seen"),),
+    )
+    item = Item("test-1", "A title", "a source", lambda quick: (), lambda results, quick: section)
+    (report,) = reproduce([item])
+    assert not report.sound
+    write([report], tmp_path, quick=False)
+    data = json.loads((tmp_path / "results.json").read_text())
+    assert data == json.loads(json.dumps(as_data([report], False)))
+    assert data["items"][0]["rows"][0] == {
+        "quantity": "x",
+        "unit": "m",
+        "paper": 2.0,
+        "ours": 4.0,
+        "ratio": 2.0,
+        "remark": "differs | because",
+    }
+    assert data["items"][0]["rows"][1]["ours"] is None
+    text = (tmp_path / "report.md").read_text()
+    assert "| x | m | 2 | 4 | 2 | differs \\| because |" in text
+    assert "1 of 2 checks hold" in text
+    assert "✗ does not" in text
+    assert (tmp_path / "seen.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_items_share_their_runs(short: dict[str, Run]) -> None:
+    """Two items that need the same job get the same run."""
+    job = replace(short["himpc"].job, duration=0.01)
+    seen: list[Run] = []
+
+    def report(results: Results, quick: bool) -> Section:
+        seen.append(results[job])
+        return Section()
+
+    items = [Item(name, "", "", lambda quick: (job, job), report) for name in ("a", "b")]
+    reproduce(items)
+    assert seen[0] is seen[1]
+    assert seen[0].error is None
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="--out"):
+        write([], tmp_path / "file", quick=False)
