@@ -13,22 +13,23 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.controllers import make_controller
 from himpc.plan import Binding, Plan
-from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Preview, Reference, Target
-from himpc.rotation import from_quaternion, quaternion
+from himpc.references import Preview, Reference, Target
+from himpc.rotation import quaternion
 from himpc.stack import Stack
-from himpc.tasks import FrameOrientation, FramePosition, Task
+from himpc.tasks import FramePosition, Task
 from himpc.telemetry import Layout, layout_of, write_plan
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.handover import Handover, settled
 from lessons.scene import Scene
 from lessons.settings import SceneSettings, changed
+from lessons.targets import move_target, target_at
 from lessons.truth import dynamic_leak
 from robots import InputError, Plant, convergence_gauge
 from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
 
-TRUTH_TICKS = 10
+TRUTH_TICKS = 20
 """What needs the plant's M (the gauge of M̄ and the honest leak) is refreshed every so many ticks."""
 
 LOST_POSITION = 0.5
@@ -86,6 +87,7 @@ class Session:
         self._script = deque(scene.events)
         self._push_until = math.inf
         self._ticks = 0
+        self._hands = _hands(self.settings.levels)
         self._truth = (math.nan, math.nan, math.nan)
 
     def _fresh_references(self) -> dict[str, Reference]:
@@ -94,7 +96,7 @@ class Session:
         start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
         for task in _tasks(self.settings.levels):
             if task.name not in given:
-                given[task.name] = _target_at(task, task.value(start))
+                given[task.name] = target_at(task, task.value(start))
         return given
 
     def target(self, task: str) -> Target | None:
@@ -129,7 +131,8 @@ class Session:
             case MoveLevel(level, to):
                 self._adopt(replace(self.settings, levels=_moved(self.settings.levels, level, to)))
             case MoveTarget(task, value):
-                self._move_target(task, value)
+                tasks = {each.name: each for each in _tasks(self.settings.levels)}
+                move_target(tasks, self.references, task, value)
             case Push(body, force, torque, seconds):
                 if not (math.isfinite(seconds) and seconds > 0):
                     raise InputError(f"a push of {seconds} s cannot be: give a time above 0")
@@ -153,30 +156,7 @@ class Session:
             taking.reset(self.plant.tau)
             self.controller = Handover(self.controller, taking)
         self.settings = settings
-
-    def _move_target(self, name: str, value: tuple[float, ...]) -> None:
-        tasks = {task.name: task for task in _tasks(self.settings.levels)}
-        if name not in tasks:
-            raise unknown_name("task", name, tasks)
-        target = self.target(name)
-        if target is None:
-            raise InputError(
-                f"the target of task '{name}' follows a fixed motion in this scene: take a hold scene"
-            )
-        array = np.array(value, float)
-        if not np.isfinite(array).all():
-            raise InputError(f"the target of task '{name}' is not finite: give finite numbers")
-        task = tasks[name]
-        if isinstance(task, FrameOrientation):
-            if array.size != 4 or not array.any():
-                raise InputError(f"the target of task '{name}' must be a quaternion x y z w")
-            target.move(from_quaternion(array))
-            return
-        if isinstance(task, FramePosition) and array.size == 3:
-            array = array[task.components]
-        if array.shape != target.raw.shape:
-            raise InputError(f"the target of task '{name}' needs {target.raw.size} numbers, not {array.size}")
-        target.move(array)
+        self._hands = _hands(settings.levels)
 
     def tick(self) -> Array:
         """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it).
@@ -238,17 +218,13 @@ class Session:
     def _is_wild(self, q: Array, v: Array) -> bool:
         share = v / self.robot.v_limit
         # A comparison with NaN is false, so "not within" also catches what is not finite.
-        slow = float(share @ share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
-        return not slow or not math.isfinite(float(q.sum()))
+        slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
+        return not slow or not math.isfinite(q.dot(q))
 
     def _is_far(self, plan: Plan) -> bool:
         """Level 1 is lost. A hand that drags a target out of reach does that too, so it is no notice."""
-        first = next((level for level in self.settings.levels if level.enabled), None)
-        return first is not None and any(
-            isinstance(task, FramePosition) and float(error @ error) > LOST_POSITION**2
-            for task in first.tasks
-            if (error := plan.errors.get(task.name)) is not None
-        )
+        errors = (plan.errors.get(name) for name in self._hands)
+        return any(error is not None and error.dot(error) > LOST_POSITION**2 for error in errors)
 
     def predicted_path(self, frame: str = "") -> Array:
         """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""
@@ -281,10 +257,10 @@ def _tasks(stack: Stack) -> list[Task]:
     return [task for level in stack for task in level.tasks]
 
 
-def _target_at(task: Task, value: Array) -> Target:
-    if isinstance(task, FrameOrientation):
-        return Target(value, ROTATION_CAPS, task.components)
-    return Target(value, POSITION_CAPS if task.unit == "m" else JOINT_CAPS)
+def _hands(stack: Stack) -> tuple[str, ...]:
+    """Names of the position tasks of the first level that is on."""
+    first = next((level.tasks for level in stack if level.enabled), ())
+    return tuple(task.name for task in first if isinstance(task, FramePosition))
 
 
 def _moved(stack: Stack, name: str, to: int) -> Stack:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -106,6 +107,6 @@ def quantise(q: np.ndarray, resolution: np.ndarray) -> np.ndarray:
 def as_vector(name: str, value: np.ndarray, n: int) -> np.ndarray:
     """A copy of n finite numbers. Raises ValueError, naming what it is, for anything else."""
     array = np.array(value, dtype=float)
-    if array.shape != (n,) or not np.isfinite(array).all():
+    if array.shape != (n,) or not (math.isfinite(array.sum()) or np.isfinite(array).all()):
         raise ValueError(f"{name} must be {n} finite numbers, not {array}")
     return array

@@ -56,6 +56,6 @@ class Settings:
                 raise unknown_name(name, str(getattr(self, name)), choices)
         if not is_installed(self.solver):
             raise InputError(
-                f"solver '{self.solver}' comes with CasADi, which is not here: pip install casadi, or take daqp"
+                f"solver '{self.solver}' needs CasADi, which is not here: pip install casadi, or take daqp"
             )
         check_names(self.stack)

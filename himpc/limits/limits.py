@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -51,6 +52,10 @@ class Limits:
             raise InputError(f"limits.position is '{self.position}': choose viability, paper or off")
 
 
+POSITION_MARGIN = 0.007
+"""rad: how far before its limit a joint is stopped; the estimation error carries it up to half of that on."""
+
+
 @dataclass(frozen=True, eq=False)
 class LimitsInForce:
     """The bounds of this tick, before any tightening; infinite where nothing is imposed.
@@ -68,6 +73,16 @@ class LimitsInForce:
     q_lower: Array
     q_upper: Array
     a_max: Array
+
+    @cached_property
+    def torque(self) -> Array:
+        """Lower and upper torque bounds, (2, n)."""
+        return np.array((self.tau_lower, self.tau_upper))
+
+    @cached_property
+    def stops(self) -> tuple[Array, Array]:
+        """Where joints are stopped, POSITION_MARGIN before their limits, (n,) rad each."""
+        return self.q_lower + POSITION_MARGIN, self.q_upper - POSITION_MARGIN
 
 
 def in_force(robot: Robot, limits: Limits) -> LimitsInForce:

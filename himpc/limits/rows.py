@@ -49,8 +49,6 @@ class Rows(NamedTuple):
         return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
 
 
-POSITION_MARGIN = 0.007
-"""rad: how far before its limit a joint is stopped; the estimation error carries it up to half of that on."""
 REACTION = 5.0
 """Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
 
@@ -95,13 +93,11 @@ def build_rows(
     kinds: tuple[Kind, ...] = ("torque", "velocity", "position") if paper else ("torque", "velocity")
     # [lower, upper] side by side halves the number of array operations.
     bounds = np.empty((2, len(kinds) * N, n))
-    bounds[0, :N] = force.tau_lower - tau_0
-    bounds[1, :N] = force.tau_upper - tau_0
+    bounds[:, :N] = (force.torque - tau_0)[:, None]
 
     if limits.position == "viability":
         reaction = T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
-        q_lower, q_upper = force.q_lower + POSITION_MARGIN, force.q_upper - POSITION_MARGIN
-        v = viability_bounds(state.q, q_lower, q_upper, force.v_limit, force.a_max, reaction)
+        v = viability_bounds(state.q, *force.stops, force.v_limit, force.a_max, reaction)
     else:
         v = np.array((-force.v_limit, force.v_limit))
     scale = M_bar / T_s

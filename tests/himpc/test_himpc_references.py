@@ -89,7 +89,7 @@ def test_waypoints_are_met_at_rest() -> None:
 def test_an_eased_phase_rests_at_both_ends_of_a_turn() -> None:
     phase, rate, acceleration = Phase(2.0, "eased", 0.3).at(np.array([0.0, np.pi]))
     np.testing.assert_allclose(phase, [0.3, 0.3 + 2 * np.pi])
-    np.testing.assert_allclose([rate, acceleration], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.array([rate, acceleration]), 0.0, atol=1e-12)
 
 
 # ------------------------------------------------------------------ the dragged target

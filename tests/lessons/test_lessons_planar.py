@@ -88,8 +88,8 @@ def test_rt1_with_the_right_model_they_are_accurate(controller: str) -> None:
 def test_rt1_himpc_is_no_rougher_than_tdeosf() -> None:
     """RMS of Δτ with encoders of 1.25e-3°, over the whole scene.
 
-    The paper calls HIMPC smoother; here it is by 1 %: against Q = 200 times (J M̄⁻¹)² the printed R = 10 weighs
-    less than a thousandth.
+    The paper calls HIMPC smoother; here it is by 1 %: against Q = 200 times (J M̄⁻¹)² the printed R = 10
+    weighs less than a thousandth.
     """
     rough = {
         name: np.sqrt((record("planar3-circle", name, ENCODER)["delta_tau"] ** 2).mean())

@@ -58,10 +58,11 @@ def test_a_path_reaches_its_field_and_nothing_else(start: SceneSettings) -> None
 
 
 def test_one_joint_of_many(start: SceneSettings) -> None:
-    """A place behind a per-joint path changes that joint alone, and one number first spreads to all joints."""
+    """A place behind a per-joint path changes that joint alone; one number first spreads to all."""
     scaled = changed(start, "plant.inertia_scale.2", 0.5)
     assert scaled.plant.inertia_scale == (1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0)
-    assert changed(scaled, "plant.inertia_scale.7", 2.0).plant.inertia_scale[5:] == (1.0, 2.0)
+    again = changed(scaled, "plant.inertia_scale.7", 2.0).plant.inertia_scale
+    assert again == (1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 2.0)
     assert changed(start, "M_bar.1", 0.25).M_bar == (0.25, *start.M_bar[1:])
     for path, value, says in (
         ("M_bar.8", 1.0, "from 1 to 7"),

@@ -1,0 +1,54 @@
+"""The hand on a target: where it starts, and what it may be moved to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Reference, Target
+from himpc.rotation import from_quaternion
+from himpc.tasks import FrameOrientation, FramePosition, Task
+from robots import InputError
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+
+
+def target_at(task: Task, value: Array) -> Target:
+    """A draggable target of a task that starts at a value of it."""
+    if isinstance(task, FrameOrientation):
+        return Target(value, ROTATION_CAPS, task.components)
+    return Target(value, POSITION_CAPS if task.unit == "m" else JOINT_CAPS)
+
+
+def move_target(
+    tasks: Mapping[str, Task], references: Mapping[str, Reference], name: str, value: tuple[float, ...]
+) -> None:
+    """Puts a task's target somewhere: position (m), quaternion (x y z w) or joints (rad).
+
+    Raises:
+        InputError: no such task, a reference that is no target, or a value that does not fit the task.
+    """
+    if name not in tasks:
+        raise unknown_name("task", name, tasks)
+    target = references.get(name)
+    if not isinstance(target, Target):
+        raise InputError(
+            f"the target of task '{name}' follows a fixed motion in this scene: take a hold scene"
+        )
+    array = np.array(value, float)
+    if not np.isfinite(array).all():
+        raise InputError(f"the target of task '{name}' is not finite: give finite numbers")
+    task = tasks[name]
+    if isinstance(task, FrameOrientation):
+        if array.size != 4 or not array.any():
+            raise InputError(f"the target of task '{name}' must be a quaternion x y z w")
+        target.move(from_quaternion(array))
+        return
+    if isinstance(task, FramePosition) and array.size == 3:
+        array = array[task.components]
+    if array.shape != target.raw.shape:
+        raise InputError(f"the target of task '{name}' needs {target.raw.size} numbers, not {array.size}")
+    target.move(array)
