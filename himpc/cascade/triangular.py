@@ -26,25 +26,27 @@ _ACCURACY = 1e-8
 """N·m: how far a point may be from the optimum; normal equations can lose more, the other routes do not."""
 _ROUNDS = 2
 """The normal equations lose digits on long horizons; one step of refinement brings them back."""
-_NOTHING = np.empty(0)
+_PASSES = 3
+"""How often the levels are solved while rows are added; then a QP solver sorts them out."""
 _WORK = 64
 """LAPACK's work space, enough for any small matrix; without it each call asks first."""
 
 
-_Solved = tuple[Array, Array | None, float, str, float]
-"""Q^½ e, multipliers, norm of the gradient, status and microseconds of a level."""
+_Solved = tuple[Array, ActiveRows, float, str, float]
+"""Q^½ e, active rows, norm of the gradient, status and microseconds of a level."""
 
 
 def solve_triangular(
     problems: Sequence[LevelProblem], B: Array, rows: Rows, warm: Sequence[ActiveRows]
 ) -> list[Point]:
-    """The leading levels whose optimum has the same active rows as a tick ago.
+    """The leading levels whose optimum has the same active rows as a tick ago, or nearly so.
 
     One Householder QR per knot, [B_1ᵀ … B_rᵀ] = Q T, gives coordinates U_j = Q_j y_j in which the cascade is
     triangular: B_i sees the first m_1 + … + m_i of them only, (33) freezes those of the levels above, and
     ‖U‖² = ‖y‖². Each level then solves for its own coordinates; the rest of its freedom stays at zero but for
     what active rows, taken as equalities, push into it. A level's point is kept if the KKT conditions hold:
-    gradient, signs of the multipliers, no other row violated. The first level that fails ends the list.
+    gradient, signs of the multipliers, no other row violated. Rows whose multiplier has lost its sign are let
+    go, violated ones are added, a few times; the first level that still fails ends the list.
 
     Small products are written `a.dot(b)`: for these sizes that takes half the time of `a @ b`.
 
@@ -62,54 +64,63 @@ def solve_triangular(
     N, _, n = problems[0].B.shape
     if any(problem.common_R is None or problem.knots < N for problem in problems):
         return []
-    ends, whole = _columns(tuple(problem.B.shape[1] for problem in problems), n)
-    if not ends:
+    spans, factors, whole = _columns(tuple(problem.B.shape[1] for problem in problems), n)
+    if not factors:
         Q = T = _identity(N, n)
     else:
         if whole:
             B = np.concatenate([problem.B for problem in problems], axis=1)
-        elif B.shape[1] > ends[-1]:
-            B = B[:, : ends[-1]]
+        elif B.shape[1] > spans[factors - 1][1]:
+            B = B[:, : spans[factors - 1][1]]
         Q, T = _factorised(B)
         pivots = np.abs(T.diagonal(axis1=1, axis2=2))
         if not float(pivots.min()) > CLEARLY_REGULAR * float(pivots.max()):
             return []
 
-    last = len(problems) - 1
-    y = np.zeros((last + 1, N, n))
+    y = np.zeros((len(problems), N, n))
+    taken = list(warm)
     points: list[_Solved] = []
-    start = 0
-    for place, problem in enumerate(problems):
-        if place:
-            y[place, :, :start] = y[place - 1, :, :start]
-        if place < len(ends):
-            end = ends[place]
-            seen = T[:, :end, start:end].transpose(2, 0, 1)
-        elif start == n or place == last:
-            end = n
-            seen = (problem.B @ Q).transpose(1, 0, 2)
-        else:
-            break  # whether this level leaves anything free takes a rank
-        found = _level(problem, seen, y[place], start, end, Q, rows, warm[place])
-        if found is None:
+    good: list[Point] = []
+    for _ in range(_PASSES):
+        del points[len(good) :]
+        for place in range(len(good), len(spans)):
+            problem, (start, end) = problems[place], spans[place]
+            y[place] = 0.0
+            if place:
+                y[place, :, :start] = y[place - 1, :, :start]
+            if place < factors:
+                seen = T[:, :end, start:end].transpose(2, 0, 1)
+            else:
+                seen = (problem.B @ Q).transpose(1, 0, 2)
+            found = _level(problem, seen, y[place], start, end, Q, rows, taken[place])
+            if found is None:
+                break
+            now = perf_counter_ns()
+            points.append((*found, "optimal" if end > start else "empty", (now - started) / 1e3))
+            started = now
+        good, wanted = _within(points, Q, y, rows)
+        if wanted is None:
             break
-        now = perf_counter_ns()
-        points.append((*found, "optimal" if end > start else "empty", (now - started) / 1e3))
-        started, start = now, end
-    return _within(points, warm, Q, y, rows) if points else []
+        taken[len(good)] = wanted
+    return good
 
 
 @lru_cache(maxsize=64)
-def _columns(sizes: tuple[int, ...], n: int) -> tuple[list[int], bool]:
-    """Where the own columns end of the levels that are factorised, and whether the last level is one of them.
+def _columns(sizes: tuple[int, ...], n: int) -> tuple[list[tuple[int, int]], int, bool]:
+    """First and last own column of the levels, how many levels are factorised, and whether all of them are.
 
-    The last level is left out where it reaches all that is left: nobody below needs what it leaves.
+    The last level is left out where it reaches all that is left: nobody below needs what it leaves. A level
+    that wants more than is left ends the list if others follow: what it leaves them takes a rank.
     """
     ends = [end for end in accumulate(sizes) if end <= n]
-    whole = len(ends) == len(sizes)
-    if whole and sum(sizes) == n:
-        return ends[:-1], False
-    return ends, whole
+    factors = len(ends) - (sum(sizes) == n)
+    spans: list[tuple[int, int]] = []
+    for place in range(len(sizes)):
+        start = spans[-1][1] if spans else 0
+        if place >= len(ends) and start < n and place < len(sizes) - 1:
+            break
+        spans.append((start, ends[place] if place < len(ends) else n))
+    return spans, factors, factors == len(sizes)
 
 
 @lru_cache(maxsize=64)
@@ -144,7 +155,7 @@ def _level(
     Q: Array,
     rows: Rows,
     active: ActiveRows,
-) -> tuple[Array, Array | None, float] | None:
+) -> tuple[Array, ActiveRows, float] | None:
     """Solves for coordinates start … n of one level and writes them into y, (N, n).
 
     Args:
@@ -157,8 +168,7 @@ def _level(
         active: rows to take as equalities.
 
     Returns:
-        Q^½ e, the multipliers of the active rows if there are any, and the norm of the gradient; None if the
-        active rows do not hold an optimum, or not an accurate one.
+        Q^½ e, the rows that hold the optimum, and the norm of the gradient; None if it was not found.
     """
     N, m, _ = problem.B.shape
     R = problem.common_R or 0.0
@@ -168,23 +178,27 @@ def _level(
     if start:
         error += effect.reshape(N * m, N * end).dot(y[:, :end].reshape(-1))
     if own == 0:
-        return error, None, 0.0
+        return error, NO_ROWS, 0.0
     G = (effect[:, :, start:] if start else effect).reshape(N * m, N * own)
     H = G.T.dot(G)
     H.reshape(-1)[:: N * own + 1] += R
-    if len(active):
+    while len(active):
         found = _bound_optimum(G, error, H, R, _equalities(active, y, start, own, Q, rows))
-    else:
-        found = _free_optimum(G, error, H, R)
+        if found is None:
+            return None
+        solved, multipliers, rest, after, gradient = found
+        pressing = multipliers * active.multiplier
+        if float(pressing.min()) > 0.0:
+            y[:, start:end] = solved.reshape(N, own)
+            y[:, end:] = rest.reshape(N, -1)
+            return after, ActiveRows(active.row, active.joint, multipliers, pressing), gradient
+        active = active.only(pressing > 0.0)
+    found = _free_optimum(G, error, H, R)
     if found is None:
         return None
-    solved, multipliers, rest, error, gradient = found
+    solved, after, gradient = found
     y[:, start:end] = solved.reshape(N, own)
-    if multipliers is not None:
-        if not float((multipliers * active.multiplier).min()) > 0.0:
-            return None
-        y[:, end:] = rest.reshape(N, -1)
-    return error, multipliers, gradient
+    return after, NO_ROWS, gradient
 
 
 class _Equalities(NamedTuple):
@@ -208,25 +222,27 @@ def _equalities(active: ActiveRows, y: Array, start: int, own: int, Q: Array, ro
     return _Equalities(A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1), target)
 
 
-_Optimum = tuple[Array, Array | None, Array, Array, float]
-"""Own coordinates, multipliers λ, the coordinates beyond, Q^½ e, norm of the gradient."""
-
-
-def _free_optimum(G: Array, error: Array, H: Array, R: float) -> _Optimum | None:
-    """min ½R‖y‖² + ½‖error + G y‖², H = GᵀG + R; None if it is not accurate."""
+def _free_optimum(G: Array, error: Array, H: Array, R: float) -> tuple[Array, Array, float] | None:
+    """y of min ½R‖y‖² + ½‖error + G y‖², H = GᵀG + R, Q^½ e and the gradient's norm; None: not accurate."""
     factor, own, _ = dposv(H.T, -error.dot(G), overwrite_a=1, overwrite_b=1)
     for _ in range(_ROUNDS):
         after = error + G.dot(own)
         slope = R * own + after.dot(G)
         gradient = math.sqrt(slope.dot(slope))
         if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
-            return own, None, _NOTHING, after, gradient
+            return own, after, gradient
         own = own - dpotrs(factor, slope)[0]
     return None
 
 
-def _bound_optimum(G: Array, error: Array, H: Array, R: float, equalities: _Equalities) -> _Optimum | None:
-    """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None too for dependent rows."""
+def _bound_optimum(
+    G: Array, error: Array, H: Array, R: float, equalities: _Equalities
+) -> tuple[Array, Array, Array, Array, float] | None:
+    """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None also if the rows are dependent.
+
+    Returns:
+        own coordinates, multipliers λ, the coordinates beyond, Q^½ e, norm of the gradient.
+    """
     A_own, A_rest, target = equalities
     d, corner = len(H), A_rest.dot(A_rest.T / -R)
     K = np.empty((d + target.size, d + target.size))
@@ -248,24 +264,29 @@ def _bound_optimum(G: Array, error: Array, H: Array, R: float, equalities: _Equa
 
 
 def _within(
-    points: Sequence[_Solved], warm: Sequence[ActiveRows], Q: Array, y: Array, rows: Rows
-) -> list[Point]:
-    """The points up to the first whose increments Q y violate a row or leave room at an active one."""
+    points: Sequence[_Solved], Q: Array, y: Array, rows: Rows
+) -> tuple[list[Point], ActiveRows | None]:
+    """The points up to the first whose increments Q y violate a row or leave room at an active one.
+
+    Returns:
+        these points, and the rows to take as active for the first that violates some; None: none does.
+    """
     U = np.matmul(Q, y[: len(points), :, :, None])[..., 0]
     value = rows.L @ U
-    room = np.minimum(rows.upper - value, value - rows.lower)
+    above, below = rows.upper - value, value - rows.lower
+    room = np.minimum(above, below)
     # A comparison with NaN is false, so what is not a number is no point either.
-    sound = float(room.min()) >= -_TOLERANCE
-    found = []
-    for place, (error, multipliers, kkt, status, time_us) in enumerate(points):
+    sound = not points or float(room.min()) >= -_TOLERANCE
+    good: list[Point] = []
+    for place, (error, active, kkt, status, time_us) in enumerate(points):
         if not sound and not float(room[place].min()) >= -_TOLERANCE:
-            break
-        active = NO_ROWS
-        if multipliers is not None:
-            active = warm[place]
+            row, joint = np.nonzero(room[place] < -_TOLERANCE)
+            side = np.where(above[place, row, joint] < below[place, row, joint], 1.0, -1.0)
+            return good, active.with_rows(row, joint, side) if row.size else None
+        if active.row.size:
             slack = room[place, active.row, active.joint]
             if not float(slack.max()) <= _TOLERANCE:
-                break
-            active = ActiveRows(active.row, active.joint, multipliers, slack)
-        found.append(Point(U[place], active, kkt, status, error, time_us=time_us))
-    return found
+                return good, None
+            active = ActiveRows(active.row, active.joint, active.multiplier, slack)
+        good.append(Point(U[place], active, kkt, status, error, time_us=time_us))
+    return good, None
