@@ -104,7 +104,13 @@ def test_a_sweep_stopped_by_ctrl_c_carries_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "app", "sweep", *what, "--out"]
     part = tmp_path / "part"
     process = subprocess.Popen(
-        [*command, str(part)], cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True
+        [*command, str(part)],
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # A job in the background inherits that Ctrl-C means nothing; a terminal's does not.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     give_up = time.monotonic() + 120
     while not cells(part) and time.monotonic() < give_up:

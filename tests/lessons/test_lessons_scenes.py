@@ -90,13 +90,7 @@ def circle_with(assignment: str) -> dict[str, Any]:
     return summary(record("iiwa14-circle", assignment, duration=4.0))
 
 
-UNSOLVED = pytest.mark.xfail(
-    strict=True,
-    reason="one level-2 QP in 12,000, with 22 rows of no room, that DAQP calls infeasible: inherit 1",
-)
-
-
-@pytest.mark.parametrize("assignment", [VARIANTS[0], pytest.param(VARIANTS[1], marks=UNSOLVED), VARIANTS[2]])
+@pytest.mark.parametrize("assignment", VARIANTS)
 def test_the_circle_stays_sound_when(assignment: str) -> None:
     """A longer horizon, a payload nobody told the controller of, and lighter links."""
     assert_sound(circle_with(assignment))
