@@ -27,9 +27,6 @@ COMMANDS: dict[str, str] = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code: 0 sound, 1 a claim failed, 2 wrong input."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    # One thread per matrix product: the matrices are tiny, and every session has its own process.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     name = arguments.pop(0) if arguments and not arguments[0].startswith("-") else "serve"
     try:
         if name not in COMMANDS:

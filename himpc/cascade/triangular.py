@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 _TOLERANCE = 1e-9
 """N·m: a row violated by less counts as met."""
 _ACCURACY = 1e-8
-"""N·m: how far a point may be from the optimum; normal equations can lose more, the other routes do not."""
+"""N·m: how far a point may be from the optimum, since H ≥ R; the normal equations can lose more."""
+_ROUNDING = 2e-15
+"""A gradient below this share of ‖G‖‖e‖ is rounding: no better point can be told from this one."""
 _ROUNDS = 2
 """The normal equations lose digits on long horizons; one step of refinement brings them back."""
 _PASSES = 3
@@ -33,7 +35,7 @@ _WORK = 64
 
 
 _Solved = tuple[Array, ActiveRows, float, str, float]
-"""Q^½ e, active rows, norm of the gradient, status and microseconds of a level."""
+"""Q^½ e, active rows, KKT residual, status and microseconds of a level."""
 
 
 def solve_triangular(
@@ -159,16 +161,14 @@ def _level(
     """Solves for coordinates start … n of one level and writes them into y, (N, n).
 
     Args:
-        problem: the level.
+        problem, rows, Q: the level, all bounds, the bases (N, n, n).
         seen: its rows in the new coordinates, (m, N, end): B Q without columns that are zero.
         y: coordinates of the levels above in columns up to `start`, zero beyond.
         start, end: its own columns.
-        Q: (N, n, n).
-        rows: all bounds.
         active: rows to take as equalities.
 
     Returns:
-        Q^½ e, the rows that hold the optimum, and the norm of the gradient; None if it was not found.
+        Q^½ e, the rows that hold the optimum, and the KKT residual; None if it was not found.
     """
     N, m, _ = problem.B.shape
     R = problem.common_R or 0.0
@@ -222,15 +222,26 @@ def _equalities(active: ActiveRows, y: Array, start: int, own: int, Q: Array, ro
     return _Equalities(A[:, :, :own].reshape(count, -1), A[:, :, own:].reshape(count, -1), target)
 
 
+def _accurate(slope: Array, G: Array, error: Array, own: Array, R: float) -> float | None:
+    """The KKT residual if the gradient `slope` is small enough, or as small as rounding lets it be."""
+    gradient = math.sqrt(slope.dot(slope))
+    if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
+        return gradient
+    size = float(np.linalg.norm(G))
+    if not gradient <= _ROUNDING * size * float(np.linalg.norm(error)):
+        return None
+    return gradient / max(1.0, (R + size**2) * float(np.linalg.norm(own)))
+
+
 def _free_optimum(G: Array, error: Array, H: Array, R: float) -> tuple[Array, Array, float] | None:
     """y of min ½R‖y‖² + ½‖error + G y‖², H = GᵀG + R, Q^½ e and the gradient's norm; None: not accurate."""
     factor, own, _ = dposv(H.T, -error.dot(G), overwrite_a=1, overwrite_b=1)
     for _ in range(_ROUNDS):
         after = error + G.dot(own)
         slope = R * own + after.dot(G)
-        gradient = math.sqrt(slope.dot(slope))
-        if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
-            return own, after, gradient
+        kkt = _accurate(slope, G, error, own, R)
+        if kkt is not None:
+            return own, after, kkt
         own = own - dpotrs(factor, slope)[0]
     return None
 
@@ -238,11 +249,8 @@ def _free_optimum(G: Array, error: Array, H: Array, R: float) -> tuple[Array, Ar
 def _bound_optimum(
     G: Array, error: Array, H: Array, R: float, equalities: _Equalities
 ) -> tuple[Array, Array, Array, Array, float] | None:
-    """The same on the equalities, with y_rest = −A_restᵀλ/R eliminated; None also if the rows are dependent.
-
-    Returns:
-        own coordinates, multipliers λ, the coordinates beyond, Q^½ e, norm of the gradient.
-    """
+    """The same on the equalities, with y_rest = −A_restᵀλ/R: own coordinates, λ, the coordinates beyond,
+    Q^½ e, KKT residual. None also if the rows are dependent."""
     A_own, A_rest, target = equalities
     d, corner = len(H), A_rest.dot(A_rest.T / -R)
     K = np.empty((d + target.size, d + target.size))
@@ -255,9 +263,9 @@ def _bound_optimum(
         own, multipliers = x[:d], x[d:]
         after = error + G.dot(own)
         slope = R * own + after.dot(G) + multipliers.dot(A_own)
-        gradient = math.sqrt(slope.dot(slope))
-        if gradient <= min(_ACCURACY * R, KKT_TOLERANCE):
-            return own, multipliers, multipliers.dot(A_rest) / -R, after, gradient
+        kkt = _accurate(slope, G, error, own, R)
+        if kkt is not None:
+            return own, multipliers, multipliers.dot(A_rest) / -R, after, kkt
         lost = A_own @ own + corner @ multipliers - target
         x = x - dgetrs(factor, pivots, np.concatenate((slope, lost)))[0]
     return None
