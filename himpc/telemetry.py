@@ -136,11 +136,13 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
         if where is not None:
             row[where] = quaternion(value) if value.ndim == 2 else value
             row[fields[f"error/{name}"]] = plan.errors[name]
-    row[fields["at_bound"]] = 0.0
+    # The per-level fields stand side by side, level by level, in the order of _PER_LEVEL.
+    base = fields[f"cost/{layout.levels[0]}"].start
+    evidence = [math.nan] * (len(_PER_LEVEL) * len(layout.levels))
+    marks = [0] * len(layout.joints)
     for level in plan.levels:
-        # The per-level fields stand side by side in the order of _PER_LEVEL.
-        start = fields[f"cost/{level.name}"].start
-        row[start : start + len(_PER_LEVEL)] = (
+        start = fields[f"cost/{level.name}"].start - base
+        evidence[start : start + len(_PER_LEVEL)] = (
             level.cost,
             level.kkt_residual,
             RUNGS.index(level.rung),
@@ -149,13 +151,15 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
             level.active.row.size,
         )
         if level.active.row.size:
-            _mark_bounds(row[fields["at_bound"]], level.active, plan.rows)
+            _mark_bounds(marks, level.active, plan.rows)
+    row[base : base + len(evidence)] = evidence
+    row[fields["at_bound"]] = marks
 
 
 _BITS = {"torque": AT_TORQUE, "velocity": AT_VELOCITY, "position": AT_POSITION}
 
 
-def _mark_bounds(at_bound: Array, active: ActiveRows, rows: Rows) -> None:
+def _mark_bounds(marks: list[int], active: ActiveRows, rows: Rows) -> None:
     N = rows.L.shape[1]
     for row, joint in zip(active.row.tolist(), active.joint.tolist(), strict=True):
-        at_bound[joint] = int(at_bound[joint]) | _BITS[rows.kinds[row // N]]
+        marks[joint] |= _BITS[rows.kinds[row // N]]
