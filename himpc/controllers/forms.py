@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from himpc.controllers.settings import Settings
 from himpc.prediction.task import ResidualModel, residual_model
 from himpc.references import Preview
 from himpc.references.hold import still
-from himpc.stack import Level
+from himpc.stack import DAMPING_LEVEL, Level, active_levels, freedom_left
 from himpc.tasks import Damping, Task
 from robots import InputError, Robot
 
@@ -177,6 +178,43 @@ def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> Sta
         model=residual_model(np.concatenate(K_p), np.concatenate(K_v), N, settings.T_s),
         root_Q=np.concatenate([form.root_Q for form in forms]),
     )
+
+
+class Prepared(NamedTuple):
+    """The settings of a controller, applied to a robot.
+
+    Attributes:
+        form: the levels to solve; the damping level where there are none.
+        idle: no level is on and damping is off: nothing is asked for.
+        off: tasks of the levels that are not solved.
+    """
+
+    form: StackForm
+    idle: bool
+    off: list[Task]
+
+
+def prepare(robot: Robot, settings: Settings) -> Prepared:
+    """The levels that take part.
+
+    Raises:
+        InputError: M̄ has the wrong length, a frame or joint is unknown, or a gain or weight does not fit.
+    """
+    if len(settings.M_bar) != robot.n:
+        raise InputError(f"M_bar has {len(settings.M_bar)} entries: '{robot.name}' has {robot.n} joints")
+    levels = active_levels(settings.stack, settings.damping, freedom_left(robot, settings.stack))
+    # Levels that are off are prepared too: a wrong gain must be refused now, not when it is switched on.
+    stack_form(robot, (*settings.stack, DAMPING_LEVEL), settings)
+    return Prepared(
+        form=stack_form(robot, levels or (DAMPING_LEVEL,), settings),
+        idle=not levels,
+        off=[task for level in settings.stack if level not in levels for task in level.tasks],
+    )
+
+
+def usable(x: Array) -> bool:
+    """Finite, and small enough that its squares and the bounds' differences stay so."""
+    return float(x @ x) < 1e18
 
 
 def _spread(value: float | tuple[float, ...], size: int, what: str) -> Array:

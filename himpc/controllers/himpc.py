@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
-from himpc.controllers.forms import StackForm, measure, stack_form
+from himpc.controllers.forms import StackForm, measure, prepare, stack_form, usable
 from himpc.controllers.memory import Memory
 from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, Rows, build_rows, in_force, ramp
 from himpc.plan import Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
-from himpc.stack import DAMPING_LEVEL, active_levels, freedom_left
-from robots import InputError, Robot
+from himpc.stack import DAMPING_LEVEL
+from robots import Robot
 
 Array = NDArray[np.float64]
 
@@ -88,19 +88,8 @@ class HIMPC:
                 self._weight[form.name] = 0.0
 
     def _apply(self, settings: Settings) -> None:
-        if len(settings.M_bar) != self.robot.n:
-            raise InputError(
-                f"M_bar has {len(settings.M_bar)} entries: '{self.robot.name}' has {self.robot.n} joints"
-            )
-        freedom = freedom_left(self.robot, settings.stack)
-        active = active_levels(settings.stack, settings.damping, freedom)
-        levels = active or (DAMPING_LEVEL,)
-        # Levels that are off are prepared too: a wrong gain must be refused now, not when it is switched on.
-        stack_form(self.robot, (*settings.stack, DAMPING_LEVEL), settings)
-        self._form = stack_form(self.robot, levels, settings)
-        self._off = [task for level in settings.stack if level not in levels for task in level.tasks]
+        self._form, self._idle, self._off = prepare(self.robot, settings)
         self._M_bar = np.array(settings.M_bar)
-        self._idle = not active
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
         self._settings = settings
@@ -120,10 +109,10 @@ class HIMPC:
             that is not finite holds the last torque.
         """
         started = perf_counter_ns()
-        if tau_applied is not None and _usable(tau_applied):
+        if tau_applied is not None and usable(tau_applied):
             self._tau_0 = np.array(tau_applied, float)
         settings, T_s, N = self._settings, self._settings.T_s, self._settings.horizon
-        if not _usable(q) or not _usable(v):
+        if not usable(q) or not usable(v):
             return self._hold(q, started)
         memory = self._memory or Memory.start(q, v, T_s)
         state = JointState(q, v, (v - memory.v) / memory.period)
@@ -141,7 +130,7 @@ class HIMPC:
         solutions, predicted_q = found.solutions, found.predicted_q
         first = solutions[-1].U[0] if solutions else 0.0
         tau = np.minimum(np.maximum(self._tau_0 + first, self._limits.tau_lower), self._limits.tau_upper)
-        if not _usable(tau):
+        if not usable(tau):
             return self._hold(q, started)
         by_name = {solution.name: solution for solution in solutions}
         self._memory = Memory(q, v, T_s, found.x_dot, self._form, predicted_q, by_name)
@@ -250,8 +239,3 @@ class HIMPC:
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=1,
         )
-
-
-def _usable(x: Array) -> bool:
-    """Finite, and small enough that its squares and the bounds' differences stay so."""
-    return float(x @ x) < 1e18

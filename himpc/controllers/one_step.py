@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from himpc.cascade.level import NO_ROWS, LevelSolution
 from himpc.configuration import Configuration
-from himpc.controllers.forms import LevelForm, StackForm, measure, stack_form
+from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Plan
 from himpc.references import Preview
-from himpc.stack import DAMPING_LEVEL, active_levels, freedom_left
 from himpc.tasks import Damping
-from robots import InputError, Robot
+from robots import Robot
 
 Array = NDArray[np.float64]
 
@@ -102,18 +101,9 @@ class OneStepController(ABC):
         self._changed = True
 
     def _apply(self, settings: Settings) -> None:
-        if len(settings.M_bar) != self.robot.n:
-            raise InputError(
-                f"M_bar has {len(settings.M_bar)} entries: '{self.robot.name}' has {self.robot.n} joints"
-            )
-        freedom = freedom_left(self.robot, settings.stack)
-        levels = active_levels(settings.stack, settings.damping, freedom)
-        # Levels that are off are prepared too: a wrong gain must be refused now, not when it is switched on.
-        stack_form(self.robot, (*settings.stack, DAMPING_LEVEL), settings)
-        form = stack_form(self.robot, levels or (DAMPING_LEVEL,), settings)
+        prepared = prepare(self.robot, settings)
         self._adopt(settings)
-        self._form, self._idle = form, not levels
-        self._off = [task for level in settings.stack if level not in levels for task in level.tasks]
+        self._form, self._idle, self._off = prepared
         self._goal = in_force(self.robot, settings.limits)
         self._settings = settings
 
@@ -143,9 +133,9 @@ class OneStepController(ABC):
             the plan, whose torque is finite. A state that is not finite holds the last torque.
         """
         started = perf_counter_ns()
-        if tau_applied is not None and _usable(tau_applied):
+        if tau_applied is not None and usable(tau_applied):
             self._tau_0 = np.array(tau_applied, float)
-        if not (_usable(q) and _usable(v)):
+        if not (usable(q) and usable(v)):
             return self._hold(q, "state not finite", started)
         T_s = self._settings.T_s
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, T_s)
@@ -159,7 +149,7 @@ class OneStepController(ABC):
                 tau, levels = self._blended(law)
             except np.linalg.LinAlgError:
                 return self._hold(q, "model or reference not finite", started)
-        if not _usable(tau):
+        if not usable(tau):
             return self._hold(q, "torque not finite", started)
         self._before = (v, T_s)
         plan = self._plan(tau, levels, np.array((q, q + T_s * v)), errors, values, started)
@@ -256,8 +246,3 @@ def leak(demands: list[Demand], accelerations: list[Array], level: int) -> float
     """
     moved = (demands[p].J @ (accelerations[level] - accelerations[p]) for p in range(level))
     return max((float(np.abs(each).max()) for each in moved), default=0.0)
-
-
-def _usable(x: Array) -> bool:
-    """Finite, and small enough that its squares stay so."""
-    return float(x @ x) < 1e18
