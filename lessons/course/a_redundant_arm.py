@@ -25,14 +25,14 @@ TURN_ELBOW = ((0.1, MoveTarget("posture", (0.0, 0.5236, 1.0472, -1.5708, 0.0, 1.
 FOLLOW = Step(
     title="The hand follows",
     text=r"""
-         Seven joints $q$, one hand. Its position $x = f(q)$ is where the arm's geometry puts it (2),
-    and the     Jacobian says how fast it moves: $\dot x = J(q)\, \dot q$ with $J = \partial f /
-    \partial q$ (3).     The target moves aside by 15 cm. The controller looks for joint torques that
-    bring the hand there     while the hand keeps its orientation.
+    Seven joints $q$, one hand. Its position $x = f(q)$ is where the arm's geometry puts it (2), and
+    the Jacobian says how fast it moves: $\dot x = J(q)\, \dot q$ with $J = \partial f / \partial q$
+    (3). The target moves aside by 15 cm. The controller looks for joint torques that bring the hand
+    there while the hand keeps its orientation.
     """,
     do="Drag the target. Turn it, too.",
     why=r"""
-         All seven joints take part, although three would be enough to move a point. No joint is *for*
+    All seven joints take part, although three would be enough to move a point. No joint is *for*
     anything: the controller only compares where the hand is with where it should be.
     """,
     prediction=Choice(
@@ -71,15 +71,15 @@ FOLLOW = Step(
 ELBOW = Step(
     title="Drag the elbow",
     text=r"""
-         A hand has six coordinates, three for where and three for which way. Seven joints for six
-    coordinates: one motion is left over. It is the null space of $J$, the joint velocities with $J \dot
-    q = 0$. Joint 3 is asked to turn by 60°, as the last of three levels.
+    A hand has six coordinates, three for where and three for which way. Seven joints for six
+    coordinates: one motion is left over. It is the null space of $J$, the joint velocities with $J
+    \dot q = 0$. Joint 3 is asked to turn by 60°, as the last of three levels.
     """,
     do="Grab the posture's target and turn the elbow around. Then grab the hand's: which one wins?",
     why=r"""
-         The elbow swings around the line from shoulder to wrist; the hand stays. This is called
-    *self-motion*. It does not go the whole 60°: only the part of the wish that lies in the null space
-    is granted.
+    The elbow swings around the line from shoulder to wrist; the hand stays. This is called
+    *self-motion*. It does not go the whole 60°: only the part of the wish that lies in the null
+    space is granted.
     """,
     prediction=Choice(
         "The elbow turns by almost 30°. How far does the hand move on the way?",
@@ -118,15 +118,15 @@ ELBOW = Step(
 COUNT = Step(
     title="Count the freedom",
     text=r"""
-         The hand may now turn as it likes: the orientation level is off. Three coordinates are left for
-    seven joints, $7 - 3 = 4$ free motions instead of one. The same wish for joint 3. The ghost keeps
-    its orientation.
+    The hand may now turn as it likes: the orientation level is off. Three coordinates are left for
+    seven joints, $7 - 3 = 4$ free motions instead of one. The same wish for joint 3. The ghost
+    keeps its orientation.
     """,
     do="Switch levels on and off and feel how stiff the elbow becomes.",
     why=r"""
-         Joint 3 gets further, and the hand pays with a tilt nobody objects to. It is still where it
-    was:     every level takes away as many free motions as it has coordinates, and the next one has to
-    do with     the rest.
+    Joint 3 gets further, and the hand pays with a tilt nobody objects to. It is still where it was:
+    every level takes away as many free motions as it has coordinates, and the next one has to do
+    with the rest.
     """,
     prediction=Value(
         "Without the orientation level: by how many degrees does the hand tilt?",

@@ -26,17 +26,17 @@ PLOTS = (HAND, Signal("torque share", "%"), Signal("step_us", "µs"))
 LATE = Step(
     title="One tick late",
     text=r"""
-         Measure, solve, apply: all within $T_s = 1$ ms. A computer that takes a little more than that
-    misses     the deadline, the motors hold the previous torque, and the result acts one millisecond
-    late.     Time-delay estimation (8) lives on fresh values. How late the result is, is set here and
-    not     measured, so that every run is the same. The target moves by 13 cm in half a second.
+    Measure, solve, apply: all within $T_s = 1$ ms. A computer that takes a little more than that
+    misses the deadline, the motors hold the previous torque, and the result acts one millisecond
+    late. Time-delay estimation (8) lives on fresh values. How late the result is, is set here and
+    not measured, so that every run is the same. The target moves by 13 cm in half a second.
     """,
     do="Look at the time per step of your own machine. How long a horizon does it manage within 1 ms?",
     why=r"""
-         The error doubles. Each $\Delta\tau$ is meant as a change of the torque that acts now; when it
-    arrives, that torque is already the result of another $\Delta\tau$, so two corrections are made from
-    the same starting point and every other one is lost. One millisecond late is not a tenth of a per
-    cent of a second's motion: it is half of the feedback.
+    The error doubles. Each $\Delta\tau$ is meant as a change of the torque that acts now; when it
+    arrives, that torque is already the result of another $\Delta\tau$, so two corrections are made
+    from the same starting point and every other one is lost. One millisecond late is not a tenth of
+    a per cent of a second's motion: it is half of the feedback.
     """,
     prediction=Choice(
         "Everything arrives one millisecond late. The largest error of this half-second motion …",
@@ -69,15 +69,15 @@ LATE = Step(
 SLOWER = Step(
     title="Promise less, keep it",
     text=r"""
-         The other way out of the same trouble: ask only every 2 ms and be in time. The controller is
-    told,     so its prediction uses $T_s = 2$ ms. The ghost keeps asking every millisecond and is
-    always one     late.
+    The other way out of the same trouble: ask only every 2 ms and be in time. The controller is
+    told, so its prediction uses $T_s = 2$ ms. The ghost keeps asking every millisecond and is
+    always one late.
     """,
     do="Try 5 ms and 10 ms. Where does it stop to be usable?",
     why=r"""
-         The same error, with half the computing. A loop that misses every deadline by one tick is a
-    loop at     half the rate that does not know it. Error grows with the period (Remark 6): that is why
-    the paper     insists on 1 ms, and why its 8 ms per step on seven joints (Table VII) is a problem.
+    The same error, with half the computing. A loop that misses every deadline by one tick is a loop
+    at half the rate that does not know it. Error grows with the period (Remark 6): that is why the
+    paper insists on 1 ms, and why its 8 ms per step on seven joints (Table VII) is a problem.
     """,
     prediction=Value(
         "Every 2 ms and in time, against every 1 ms and one late: the ratio of the largest errors is …",
@@ -107,14 +107,14 @@ SLOWER = Step(
 REPAIR = Step(
     title="Buy it back",
     text=r"""
-         One tick late again. A small $\bar M$ and a late result have the same effect, corrections come
-    too     slowly. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
+    One tick late again. A small $\bar M$ and a late result have the same effect, corrections come
+    too slowly. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
     """,
     do="Now go on: 2.5, 3. And what if the computer becomes fast again?",
     why=r"""
-         The lost half is back: the errors are the same to the third digit. It was paid for with the
-    margin:     the cliff is where it was, between 2 and 2.5 times the old $\bar M$, and noise counts
-    double. Time is     bought with robustness, never for nothing.
+    The lost half is back: the errors are the same to the third digit. It was paid for with the
+    margin: the cliff is where it was, between 2 and 2.5 times the old $\bar M$, and noise counts
+    double. Time is bought with robustness, never for nothing.
     """,
     prediction=Choice(
         "One millisecond late, but M̄ doubled. Compared with an arm in time the error is …",

@@ -23,17 +23,17 @@ R_ON = Control("R_on", "What R weighs", choices=("torque", "acceleration"))
 FURTHER = Step(
     title="Twenty instead of one",
     text=r"""
-         The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps
-    of a     millisecond, and that the first of 20 torque changes is applied. The ghost looks one step
-    ahead     (HIQP). Remark 9 says: choose $N$ as large as the computer allows.
+    The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps
+    of a millisecond, and that the first of 20 torque changes is applied. The ghost looks one step
+    ahead (HIQP). Remark 9 says: choose $N$ as large as the computer allows.
     """,
     do="Go through N = 1, 2, 5, 10, 20. Watch the error and the time per step.",
     why=r"""
-         It gets worse. With $Q = 200$, $R = 10$ and this small an $\bar M$, the very first $\Delta\tau$
-    already removes nearly all of $e$: the controller is deadbeat, and there is nothing left to plan.
-    What a longer horizon adds are the errors of the prediction: Jacobians along an old plan (30), and
-    whatever time-delay estimation has not noticed yet. The paper's Table VI shows a gain; with the
-    weights as printed we cannot find it.
+    It gets worse. With $Q = 200$, $R = 10$ and this small an $\bar M$, the very first $\Delta\tau$
+    already removes nearly all of $e$: the controller is deadbeat, and there is nothing left to
+    plan. What a longer horizon adds are the errors of the prediction: Jacobians along an old plan
+    (30), and whatever time-delay estimation has not noticed yet. The paper's Table VI shows a gain;
+    with the weights as printed we cannot find it.
     """,
     prediction=Choice(
         "N = 20 instead of N = 1: the RMS error of the hand becomes …",
@@ -65,16 +65,16 @@ FURTHER = Step(
 REASON = Step(
     title="A reason to plan",
     text=r"""
-         Let $R$ weigh the change of acceleration that a torque change makes, $\lVert \bar M^{-1}
-    \Delta\tau     \rVert_R^2$. In these units $R = 10$ is no longer small beside $Q = 200$: it pays to
-    spread a     correction over several steps. Again $N = 20$, and the ghost has $N = 1$.
+    Let $R$ weigh the change of acceleration that a torque change makes, $\lVert \bar M^{-1}
+    \Delta\tau \rVert_R^2$. In these units $R = 10$ is no longer small beside $Q = 200$: it pays to
+    spread a correction over several steps. Again $N = 20$, and the ghost has $N = 1$.
     """,
     do="Switch back and forth between the two meanings of R at N = 1 and at N = 20.",
     why=r"""
-         Now the first step alone cannot do it all, and one that knows what the following steps will
-    contribute does better: about half the error, with smoother torques, which is the paper's trend. A
-    horizon is worth something where effects come later than one step. Ask that before you ask for a
-    faster computer.
+    Now the first step alone cannot do it all, and one that knows what the following steps will
+    contribute does better: about half the error, with smoother torques, which is the paper's trend.
+    A horizon is worth something where effects come later than one step. Ask that before you ask for
+    a faster computer.
     """,
     prediction=Value(
         "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",

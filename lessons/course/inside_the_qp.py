@@ -31,21 +31,21 @@ TIGHT = ("q1_amplitude_deg=60", "limits.torque_scale=0.04")
 ONE_TICK = Step(
     title="One tick",
     text=r"""
-         Three joints, $N = 5$ steps: $U$ stacks fifteen torque changes. Each level is a quadratic
-    program     (35),
+    Three joints, $N = 5$ steps: $U$ stacks fifteen torque changes. Each level is a quadratic
+    program (35),
 
-        $$\min_U \; U^\top \mathcal{Q}\, U + U^\top \mathcal{L} \quad \text{s.t.} \quad C U + D \le 0,
-    \;     \mathcal{H}(U) = 0$$
+    $$\min_U \; U^\top \mathcal{Q}\, U + U^\top \mathcal{L} \quad \text{s.t.} \quad C U + D \le 0,
+    \; \mathcal{H}(U) = 0$$
 
-        with bounds on position, speed and torque at every knot, and the equality (33) towards the
-    levels     above. Step by step with the pause key: one tick, one solution.
+    with bounds on position, speed and torque at every knot, and the equality (33) towards the
+    levels above. Step by step with the pause key: one tick, one solution.
     """,
     do="Pause, step tick by tick, and read off the active bounds.",
     why=r"""
-         A point is the solution if it satisfies the optimality conditions (KKT): feasible, multipliers
-    of     the right sign, gradient balanced. This residual is computed afresh for every point that is
-    applied,     whatever the solver says of itself. With room to spare no bound is active, and the
-    solution is that     of a linear system.
+    A point is the solution if it satisfies the optimality conditions (KKT): feasible, multipliers
+    of the right sign, gradient balanced. This residual is computed afresh for every point that is
+    applied, whatever the solver says of itself. With room to spare no bound is active, and the
+    solution is that of a linear system.
     """,
     prediction=Choice(
         "Nothing presses on the arm here. How many of the bounds are active, on average, at level 2?",
@@ -84,15 +84,15 @@ ONE_TICK = Step(
 BINDING = Step(
     title="Who feels the bound",
     text=r"""
-         Torque is short: 4 % of the limit. An active row has a multiplier $\mu > 0$, the price at which
-    a     little more of that bound would be bought. A joint can sit at its bound in both levels; what
-    differs     is the price each of them would pay, and so does the cost (31) that is left.
+    Torque is short: 4 % of the limit. An active row has a multiplier $\mu > 0$, the price at which
+    a little more of that bound would be bought. A joint can sit at its bound in both levels; what
+    differs is the price each of them would pay, and so does the cost (31) that is left.
     """,
     do="In the list of active bounds, compare the multipliers of level 1 and level 2.",
     why=r"""
-         Level 1 is served: its cost is practically zero. Level 2 leaves a hundred million times as much
-    on the table and would pay a lot for torque. The same row, seen by two levels: to one it is a fact,
-    to the other an obstacle.
+    Level 1 is served: its cost is practically zero. Level 2 leaves a hundred million times as much
+    on the table and would pay a lot for torque. The same row, seen by two levels: to one it is a
+    fact, to the other an obstacle.
     """,
     prediction=Value(
         "How many of the bounds at the five knots are active at level 2, on average?",
@@ -136,15 +136,15 @@ BINDING = Step(
 LEAK = Step(
     title="Measure the priority",
     text=r"""
-         Strict is a word; here is the number. The leak is what lower levels change about a higher one,
-    $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$, in m/s². By (33) it should be zero.
-    The circle again, and the tasks fight for torque.
+    Strict is a word; here is the number. The leak is what lower levels change about a higher one,
+    $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$, in m/s². By (33) it should be
+    zero. The circle again, and the tasks fight for torque.
     """,
     do="Switch to the weighted controller and read the leak meter.",
     why=r"""
-         Zero up to rounding, since (33) is a constraint and not a wish. It is zero with respect to
-    $\bar M$.     With the true $M$ a leak remains, the second meter: the arm is not made the way the
-    controller     thinks. That part is seen by time-delay estimation and corrected a millisecond later.
+    Zero up to rounding, since (33) is a constraint and not a wish. It is zero with respect to $\bar
+    M$. With the true $M$ a leak remains, the second meter: the arm is not made the way the
+    controller thinks. That part is seen by time-delay estimation and corrected a millisecond later.
     """,
     prediction=Choice(
         "With the arm's true inertia instead of M̄, the leak of the same torques is …",

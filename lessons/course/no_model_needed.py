@@ -25,22 +25,22 @@ M_BAR = Control("M_bar_scale", "M̄, factor", 0.1, 40.0, log=True)
 LOAD = Step(
     title="Pick up a kilogram",
     text=r"""
-         At 0.2 s one kilogram hangs at the hand. The controller is not told. It has no masses at all:
-    all it     does not know is collected in one term (6),
+    At 0.2 s one kilogram hangs at the hand. The controller is not told. It has no masses at all:
+    all it does not know is collected in one term (6),
 
-        $$\bar M \ddot q + H_q = \tau,$$
+    $$\bar M \ddot q + H_q = \tau,$$
 
-        and $H_q$ is taken to be what it was a millisecond ago (8): $H_q \approx \tau_0 - \bar M \ddot
-    q_0$,     from the torque that acted and the acceleration that came of it. So (13) only asks for the
-    *change*:     $\ddot x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of
-    the arm, but     not the load.
+    and $H_q$ is taken to be what it was a millisecond ago (8): $H_q \approx \tau_0 - \bar M \ddot
+    q_0$, from the torque that acted and the acceleration that came of it. So (13) only asks for the
+    *change*: $\ddot x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of
+    the arm, but not the load.
     """,
     do="Hang on more weight, and take it off again.",
     why=r"""
-         The hand dips by a few millimetres and comes back, to a hundredth of a millimetre: whatever the
-    load     does to the acceleration is measured, and in the next millisecond it is part of $H_q$. The
-    ghost's     model is exact and one kilogram wrong; its springs hold the rest, so it sags by
-    centimetres and     stays there.
+    The hand dips by a few millimetres and comes back, to a hundredth of a millimetre: whatever the
+    load does to the acceleration is measured, and in the next millisecond it is part of $H_q$. The
+    ghost's model is exact and one kilogram wrong; its springs hold the rest, so it sags by
+    centimetres and stays there.
     """,
     prediction=Choice(
         "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
@@ -83,16 +83,16 @@ LOAD = Step(
 SMALL = Step(
     title="M̄ too small",
     text=r"""
-         One thing must be chosen, the diagonal $\bar M$. It says how much torque a wanted acceleration
-    costs. Let it be 0.3 times what it was: the controller believes the arm to be that light, and gives
-    three tenths of the torque changes. The target moves aside by 13 cm.
+    One thing must be chosen, the diagonal $\bar M$. It says how much torque a wanted acceleration
+    costs. Let it be 0.3 times what it was: the controller believes the arm to be that light, and
+    gives three tenths of the torque changes. The target moves aside by 13 cm.
     """,
     do="Go down to 0.1, then up to 2, and watch the gauge.",
     why=r"""
-         The torque is right in the end, but it comes late: every millisecond only a part of the error
-    in     $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$, the share of
-    that     error which is left after each step (Remark 4 asks for its norm to be below 1). Close to 1
-    is safe     and slow.
+    The torque is right in the end, but it comes late: every millisecond only a part of the error in
+    $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$, the share of that
+    error which is left after each step (Remark 4 asks for its norm to be below 1). Close to 1 is
+    safe and slow.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",
@@ -130,16 +130,15 @@ SMALL = Step(
 LARGE = Step(
     title="M̄ too large",
     text=r"""
-         Twice the $\bar M$ halves the error, four times quarters it, six times is better still. Now it
-    is     eight times as large. Remark 4: for each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is
+    Twice the $\bar M$ halves the error, four times quarters it, six times is better still. Now it
+    is eight times as large. Remark 4: for each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is
     multiplied by $1 - \lambda$ in every step.
     """,
     do="Reset, go up from 4 in small steps, and read the gauge each time before you let it run.",
     why=r"""
-         $1 - \lambda$ has passed −1: each correction is more than twice too large, and every
-    millisecond the error comes back half as large again, with the opposite sign. Chatter, full torque,
-    gone. There is a     cliff, and the gauge shows it before the arm does. Start small and go up
-    (Remark 4).
+    $1 - \lambda$ has passed −1: each correction is more than twice too large, and every millisecond
+    the error comes back half as large again, with the opposite sign. Chatter, full torque, gone.
+    There is a cliff, and the gauge shows it before the arm does. Start small and go up (Remark 4).
     """,
     prediction=Choice(
         "M̄ × 2, × 4, × 6: always better. What does × 8 do?",
@@ -179,8 +178,8 @@ LARGE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-         Three kilograms this time, and at 0.8 s the target moves aside by 13 cm. Keep the hand within
-    10 mm     of it all along.
+    Three kilograms this time, and at 0.8 s the target moves aside by 13 cm. Keep the hand within 10
+    mm of it all along.
     """,
     goals=(
         Claim("The hand stays within 10 mm.", Measure(HAND), "at most", 10.0),

@@ -26,20 +26,20 @@ K_V = Control("tasks.position.K_v", "K_V, 1/s", 1.0, 60.0)
 SPRING = Step(
     title="A spring that is not there",
     text=r"""
-         The arm has one task: its hand stays on the target. What *staying* means is written down as a
-    wish     for the error $\tilde x = x - x_d$, equation (4) of the paper:
+    The arm has one task: its hand stays on the target. What *staying* means is written down as a
+    wish for the error $\tilde x = x - x_d$, equation (4) of the paper:
 
-        $$\ddot{\tilde x} + K_V \dot{\tilde x} + K_P \tilde x = 0$$
+    $$\ddot{\tilde x} + K_V \dot{\tilde x} + K_P \tilde x = 0$$
 
-        A mass on a spring $K_P$ with a damper $K_V$. Here $K_P = 100$ and $K_V = 20 = 2\sqrt{K_P}$. At
-    0.1     s the forearm is pushed with 10 N for 0.2 s.
+    A mass on a spring $K_P$ with a damper $K_V$. Here $K_P = 100$ and $K_V = 20 = 2\sqrt{K_P}$. At
+    0.1 s the forearm is pushed with 10 N for 0.2 s.
     """,
     do="Push the arm yourself, wherever you like.",
     why=r"""
-         Twice it is thrown off: when the push begins, and, to the other side, when it ends, because by
-    then     the torques had learned to push back. Each time it comes home within half a second and
-    without     swinging: with $K_V = 2\sqrt{K_P}$ the wish is critically damped. There is no spring in
-    the arm. The     controller looks for torques that make (4) true.
+    Twice it is thrown off: when the push begins, and, to the other side, when it ends, because by
+    then the torques had learned to push back. Each time it comes home within half a second and
+    without swinging: with $K_V = 2\sqrt{K_P}$ the wish is critically damped. There is no spring in
+    the arm. The controller looks for torques that make (4) true.
     """,
     prediction=Sketch(
         "Draw how far the hand is from its target, in mm. The push lasts from 0.1 s to 0.3 s.",
@@ -67,14 +67,14 @@ SPRING = Step(
 DAMPER = Step(
     title="Take the damper away",
     text=r"""
-         Now $K_V = 2$, a tenth of before. Equation (4) has become a weakly damped oscillator with
-    $\omega =     \sqrt{K_P} = 10$ rad/s, thus a period of 0.63 s. The arm, its motors and its links are
-    the same as     before.
+    Now $K_V = 2$, a tenth of before. Equation (4) has become a weakly damped oscillator with
+    $\omega = \sqrt{K_P} = 10$ rad/s, thus a period of 0.63 s. The arm, its motors and its links are
+    the same as before.
     """,
     do="Look for the smallest K_V without a swing to the other side. Then double K_P and look again.",
     why=r"""
-         The hand swings like the oscillator of (4), although nothing in the arm is springy. Gains do
-    not     describe torques here, they describe a motion.
+    The hand swings like the oscillator of (4), although nothing in the arm is springy. Gains do not
+    describe torques here, they describe a motion.
     """,
     claims=(
         Claim(
@@ -104,18 +104,17 @@ DAMPER = Step(
 PRICE = Step(
     title="The price of torque",
     text=r"""
-         Every millisecond the controller looks $N = 5$ steps ahead and minimises (31), summed over
-    them:
+    Every millisecond the controller looks $N = 5$ steps ahead and minimises (31), summed over them:
 
-        $$\lVert e \rVert_Q^2 + \lVert \Delta\tau \rVert_R^2, \qquad e = \ddot{\tilde x} + K_V
-    \dot{\tilde     x} + K_P \tilde x \quad (28)$$
+    $$\lVert e \rVert_Q^2 + \lVert \Delta\tau \rVert_R^2, \qquad e = \ddot{\tilde x} + K_V
+    \dot{\tilde x} + K_P \tilde x \quad (28)$$
 
-        $Q = 200$ is the price of not being on the wished curve, $R = 10$ that of *changing* the torque.
-    Now     $R$ is 1000, a hundred times as much.
+    $Q = 200$ is the price of not being on the wished curve, $R = 10$ that of *changing* the torque.
+    Now $R$ is 1000, a hundred times as much.
     """,
     do="Raise R further. From which value on can you see a difference?",
     why=r"""
-         Almost nothing happens. The torque that holds the arm costs nothing, only its change from one
+    Almost nothing happens. The torque that holds the arm costs nothing, only its change from one
     millisecond to the next does. And a small change goes a long way: $e$ moves by $J \bar M^{-1}
     \Delta\tau$ with $\bar M^{-1} = 30$ here, so that $Q \lVert J \bar M^{-1} \Delta\tau \rVert^2$
     outweighs $R$ by far. Only around $R = 10^5$ both terms count alike.
@@ -154,15 +153,15 @@ PRICE = Step(
 FREE = Step(
     title="What nobody asks for",
     text=r"""
-         Two coordinates of the hand, three joints: one direction of motion is nobody's task. $R$ weighs
-    changes of torque, so in that direction the torque just stays what it is. A short push, 10 N for 0.2
-    s on the middle link, and the last level, `damping`, is switched off.
+    Two coordinates of the hand, three joints: one direction of motion is nobody's task. $R$ weighs
+    changes of torque, so in that direction the torque just stays what it is. A short push, 10 N for
+    0.2 s on the middle link, and the last level, `damping`, is switched off.
     """,
     do="Switch damping on and push again.",
     why=r"""
-         Nothing asks that direction to stop. The torque that opposed the push is frozen there and goes
-    on     accelerating the elbow, the other way, after the push is over. A last level that wants $\ddot
-    q + K_V \dot q = 0$     brings it to rest and costs the hand nothing.
+    Nothing asks that direction to stop. The torque that opposed the push is frozen there and goes
+    on accelerating the elbow, the other way, after the push is over. A last level that wants $\ddot
+    q + K_V \dot q = 0$ brings it to rest and costs the hand nothing.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",
@@ -193,8 +192,8 @@ FREE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-         The same hit. Never let the hand get further than 3 mm from its target, and have it back within
-    0.5     mm at 0.6 s, 0.3 s after the push has ended.
+    The same hit. Never let the hand get further than 3 mm from its target, and have it back within
+    0.5 mm at 0.6 s, 0.3 s after the push has ended.
     """,
     goals=(
         Claim("The hand stays within 3 mm.", Measure(HAND), "at most", 3.0),

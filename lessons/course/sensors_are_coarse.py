@@ -27,16 +27,16 @@ COARSE = "plant.encoder_resolution_deg=0.005"
 ROUNDING = Step(
     title="Two differences",
     text=r"""
-         The encoders round to $\delta = 0.005°$: at the hand that is 0.08 mm. Velocity is the
-    difference of     two positions over $T_s$, acceleration the difference of two velocities over
-    $T_s$. One digit more     or less is an acceleration of $\delta / T_s^2$, and (13) answers with
-    $\bar M\,\delta / T_s^2$.
+    The encoders round to $\delta = 0.005°$: at the hand that is 0.08 mm. Velocity is the difference
+    of two positions over $T_s$, acceleration the difference of two velocities over $T_s$. One digit
+    more or less is an acceleration of $\delta / T_s^2$, and (13) answers with $\bar M\,\delta /
+    T_s^2$.
     """,
     do="Make the encoders finer until you cannot see the noise in the torque any more.",
     why=r"""
-         $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit,
-    of     the 4 N·m there are. The hand hardly moves, its mass is a filter; the gears will not last.
-    The paper     finds the same limit (Table VIII) and calls it chattering.
+    $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit,
+    of the 4 N·m there are. The hand hardly moves, its mass is a filter; the gears will not last.
+    The paper finds the same limit (Table VIII) and calls it chattering.
     """,
     prediction=Choice(
         "Without rounding the motion needs 4 % of the torque limit. With it, the largest demand is …",
@@ -76,14 +76,14 @@ ROUNDING = Step(
 SQUARE = Step(
     title="A square in the way",
     text=r"""
-         The digit stays as coarse as it is. The period becomes $T_s = 2$ ms instead of 1 ms; the ghost
-    keeps     1 ms. We know that a slower loop follows less well. What does it do to the noise?
+    The digit stays as coarse as it is. The period becomes $T_s = 2$ ms instead of 1 ms; the ghost
+    keeps 1 ms. We know that a slower loop follows less well. What does it do to the noise?
     """,
     do="Go to 4 ms. Then try M̄ instead: how much of it buys the same?",
     why=r"""
-         $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
-    the     error only doubles. Faster is not better when sensors are coarse. $\bar M$ enters once: it
-    trades     noise against accuracy one for one.
+    $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
+    the error only doubles. Faster is not better when sensors are coarse. $\bar M$ enters once: it
+    trades noise against accuracy one for one.
     """,
     prediction=Value(
         "T_s twice as long: the torque changes become how many times as large?",
@@ -119,8 +119,8 @@ SQUARE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-         Encoders of 0.005°. Bring the torque changes below 0.5 N·m RMS while the hand stays within half
-    a     millimetre of its circle.
+    Encoders of 0.005°. Bring the torque changes below 0.5 N·m RMS while the hand stays within half
+    a millimetre of its circle.
     """,
     goals=(
         Claim("Torque changes stay below 0.5 N·m RMS.", Measure(ROUGH, "rms"), "at most", 0.5),

@@ -30,19 +30,19 @@ N = Control("horizon", "N", 1, 40)
 PRINTED = Step(
     title="Five milliseconds",
     text=r"""
-         Joint 2 may turn to 150°. Its target is put 22° beyond, and it comes at 57°/s. The paper bounds
-    the     predicted positions (32d),
+    Joint 2 may turn to 150°. Its target is put 22° beyond, and it comes at 57°/s. The paper bounds
+    the predicted positions (32d),
 
-        $$q_{\min} \le q_{k+j+1} \le q_{\max}, \qquad j = 0 \dots N-1,$$
+    $$q_{\min} \le q_{k+j+1} \le q_{\max}, \qquad j = 0 \dots N-1,$$
 
-        with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. That is where the
-    controller     first hears of the limit.
+    with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. That is where the
+    controller first hears of the limit.
     """,
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
-         To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s², more than the motor
-    can do.     The problem has no solution, a fallback takes over, the torque hits its limit and the
-    joint overruns     its range. The row is true to the letter and comes too late.
+    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s², more than the motor can
+    do. The problem has no solution, a fallback takes over, the torque hits its limit and the joint
+    overruns its range. The row is true to the letter and comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -82,13 +82,13 @@ PRINTED = Step(
 LONGER = Step(
     title="Look further?",
     text=r"""
-         The same rows with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and
-    the     distance $v^2/2a$: at 1 rad/s and the 20 rad/s² this arm is rated for, 50 ms and 1.4°.
+    The same rows with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and the
+    distance $v^2/2a$: at 1 rad/s and the 20 rad/s² this arm is rated for, 50 ms and 1.4°.
     """,
     do="Raise N to 40. How far must one look to brake gently, and what does a step cost then?",
     why=r"""
-         The joint stays within its range, just so, with full torque: 20 ms are enough for an emergency
-    stop,     not for a gentle one. A horizon that sees the whole braking distance would have 50 steps.
+    The joint stays within its range, just so, with full torque: 20 ms are enough for an emergency
+    stop, not for a gentle one. A horizon that sees the whole braking distance would have 50 steps.
     """,
     claims=(
         Claim(
@@ -118,19 +118,19 @@ LONGER = Step(
 VIABLE = Step(
     title="A speed from which one can stop",
     text=r"""
-         Instead of the position, bound the speed by what can still be stopped before the limit, at any
+    Instead of the position, bound the speed by what can still be stopped before the limit, at any
     distance:
 
-        $$\dot q \le a\left(-T_s + \sqrt{T_s^2 + 2\,(q_{\max} - q)/a}\right)$$
+    $$\dot q \le a\left(-T_s + \sqrt{T_s^2 + 2\,(q_{\max} - q)/a}\right)$$
 
-        A state that satisfies it is called viable: there is a future that keeps the limit. Again $N =
+    A state that satisfies it is called viable: there is a future that keeps the limit. Again $N =
     5$.
     """,
     do="Make the joint come as fast as you can.",
     why=r"""
-         Now the very next step already knows the whole braking distance. The torque hardly shows the
-    stop,     and no QP is without a solution. What a short horizon cannot see must be put into its
-    bounds. It is     this lab's default and a deliberate departure from (32d).
+    Now the very next step already knows the whole braking distance. The torque hardly shows the
+    stop, and no QP is without a solution. What a short horizon cannot see must be put into its
+    bounds. It is this lab's default and a deliberate departure from (32d).
     """,
     prediction=Choice(
         "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",
@@ -176,7 +176,7 @@ VIABLE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-         With the printed rows only: bring joint 2 to 149° and beyond without overrunning its range, and
+    With the printed rows only: bring joint 2 to 149° and beyond without overrunning its range, and
     brake with less than 90 % of the torque.
     """,
     goals=(

@@ -22,15 +22,15 @@ SMOOTH = Control("smooth", "Start gently", choices=(False, True))
 INVERSE = Step(
     title="The wall of reach",
     text=r"""
-         The arm starts straight, and the circle starts sideways at the very edge of its reach. All
-    three     columns of $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1}
-    J^\top$     loses its rank. Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
+    The arm starts straight, and the circle starts sideways at the very edge of its reach. All three
+    columns of $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1} J^\top$
+    loses its rank. Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
     """,
     do="Try TDEOSF, then HQP and HIMPC.",
     why=r"""
-         In the first instant almost no torque would be enough, since the circle runs along what the arm
-    can     do. But rounding leaves a trace of error in the direction that cannot be served, and the
-    inverse     magnifies it many million times. Motors clip that nonsense, and it depends on luck what
+    In the first instant almost no torque would be enough, since the circle runs along what the arm
+    can do. But rounding leaves a trace of error in the direction that cannot be served, and the
+    inverse magnifies it many million times. Motors clip that nonsense, and it depends on luck what
     is left.
     """,
     prediction=Choice(
@@ -62,15 +62,15 @@ INVERSE = Step(
 REGULAR = Step(
     title="No inverse, no singularity",
     text=r"""
-         HIMPC asks a softer question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
-    \Delta\tau     \rVert^2$ small? Where $J$ loses a direction, the first term does not care and the
-    second says: then     do nothing there. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive
-    definite whatever $J$     is (Lemma 1).
+    HIMPC asks a softer question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
+    \Delta\tau \rVert^2$ small? Where $J$ loses a direction, the first term does not care and the
+    second says: then do nothing there. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive
+    definite whatever $J$ is (Lemma 1).
     """,
     do="Make R smaller by a factor of a million. Is it still calm?",
     why=r"""
-         The torque never leaves its bounds, and after a few tenths of a second the hand is on its
-    circle. No     case distinction, no damping factor to tune, no special treatment of singular poses.
+    The torque never leaves its bounds, and after a few tenths of a second the hand is on its
+    circle. No case distinction, no damping factor to tune, no special treatment of singular poses.
     """,
     claims=(
         Claim(
@@ -98,13 +98,13 @@ REGULAR = Step(
 BLAME = Step(
     title="Who is to blame?",
     text=r"""
-         There was an error of some millimetres right at the start. Is the singularity to blame, or the
-    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts gently,
-    at the same singular pose. The ghost starts with the jump.
+    There was an error of some millimetres right at the start. Is the singularity to blame, or the
+    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts
+    gently, at the same singular pose. The ghost starts with the jump.
     """,
     do="Look at 8 s: straight again, and the circles change there.",
     why=r"""
-         Nearly all of it was the jump: an arm cannot change its velocity in no time. In a singular pose
+    Nearly all of it was the jump: an arm cannot change its velocity in no time. In a singular pose
     HIMPC follows what can be followed. An experiment that shows two causes at once shows neither.
     """,
     prediction=Choice(

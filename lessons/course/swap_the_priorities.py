@@ -27,14 +27,14 @@ DEMOTE = (2.6, MoveLevel("posture", 2))
 LAST = Step(
     title="A wish without freedom",
     text=r"""
-         Three levels: position, then orientation, then posture. The posture's target changes: shoulder
-    25°     further, elbow 20° straighter. The one motion that level 1 and 2 leave free turns the elbow
-    about     the line from shoulder to wrist, and this wish has no part along it.
+    Three levels: position, then orientation, then posture. The posture's target changes: shoulder
+    25° further, elbow 20° straighter. The one motion that level 1 and 2 leave free turns the elbow
+    about the line from shoulder to wrist, and this wish has no part along it.
     """,
     do="Ask for a turn of joint 1 or 3 instead: that has a part in the free direction.",
     why=r"""
-         Nothing moves at all. Level 3 may only use torques that satisfy (33), and among those none
-    brings it     nearer. A strict hierarchy is not polite: the posture's error of 32° counts for
+    Nothing moves at all. Level 3 may only use torques that satisfy (33), and among those none
+    brings it nearer. A strict hierarchy is not polite: the posture's error of 32° counts for
     nothing.
     """,
     prediction=Choice(
@@ -74,13 +74,13 @@ LAST = Step(
 FIRST = Step(
     title="First shall be last",
     text=r"""
-         At 1.2 s the posture becomes level 1, while the arm is under way. Only the order of the
-    problems     changes; target, gains and weights stay.
+    At 1.2 s the posture becomes level 1, while the arm is under way. Only the order of the problems
+    changes; target, gains and weights stay.
     """,
     do="Put the posture in the middle. Who gets what?",
     why=r"""
-         All seven joints are now spoken for by level 1: it is served to a hundredth of a degree.
-    Position     and orientation, an instant ago inviolable, get nothing.
+    All seven joints are now spoken for by level 1: it is served to a hundredth of a degree.
+    Position and orientation, an instant ago inviolable, get nothing.
     """,
     prediction=Value(
         "The posture ranks first from 1.2 s on. How far is the hand from its target at the end?",
@@ -115,14 +115,14 @@ FIRST = Step(
 BACK = Step(
     title="And back",
     text=r"""
-         At 2.6 s the old order is restored. Between the two orders lies a jump in what the controller
-    wants,     but not in what it knows: $\tau_0$, $\ddot x_0$ and the last plan stay.
+    At 2.6 s the old order is restored. Between the two orders lies a jump in what the controller
+    wants, but not in what it knows: $\tau_0$, $\ddot x_0$ and the last plan stay.
     """,
     do="Swap levels as fast as you can click. Try to make the arm jump.",
     why=r"""
-         Nothing is forgotten and nothing broken. The controller only computes a change $\Delta\tau$ of
-    the     torque that acts anyway (12), bounds on speed and torque hold throughout, so any order can
-    take over     at any time.
+    Nothing is forgotten and nothing broken. The controller only computes a change $\Delta\tau$ of
+    the torque that acts anyway (12), bounds on speed and torque hold throughout, so any order can
+    take over at any time.
     """,
     claims=(
         Claim(

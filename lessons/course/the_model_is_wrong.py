@@ -30,15 +30,15 @@ EXACT = (
 EXACTLY = Step(
     title="If only",
     text=r"""
-         OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here it is told the
-    exact     masses, inertias and viscous friction, and the dry friction is taken out of the arm. Its
-    model (19)     is the arm. The ghost is HIMPC, which has no model and lives on what happened a
+    OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here it is told the
+    exact masses, inertias and viscous friction, and the dry friction is taken out of the arm. Its
+    model (19) is the arm. The ghost is HIMPC, which has no model and lives on what happened a
     millisecond ago.
     """,
     do="Put a little dry friction back in.",
     why=r"""
-         A perfect model wins by far: it knows what is going to happen, time-delay estimation only what
-    has     happened. The question is how long such a model stays perfect.
+    A perfect model wins by far: it knows what is going to happen, time-delay estimation only what
+    has happened. The question is how long such a model stays perfect.
     """,
     prediction=Choice(
         "Exact model against no model at all. OSF's error is …",
@@ -70,15 +70,15 @@ EXACTLY = Step(
 REALITY = Step(
     title="As identified",
     text=r"""
-         Now as in a laboratory: all masses and inertias of the model are 20 % light, and it knows no
+    Now as in a laboratory: all masses and inertias of the model are 20 % light, and it knows no
     friction. What the model gets wrong, (24), acts like a disturbance all the time:
 
-        $$\beta = J M_n^{-1} ( \tilde M \ddot q + \tilde N + \tau_d )$$
+    $$\beta = J M_n^{-1} ( \tilde M \ddot q + \tilde N + \tau_d )$$
     """,
     do="Remove the friction, then correct the masses. Which of the two errors mattered?",
     why=r"""
-         The springs of (4) must hold against whatever the model does not explain; here that is mostly
-    the     friction. HIMPC never had an opinion about friction: it has measured what the torque of a
+    The springs of (4) must hold against whatever the model does not explain; here that is mostly
+    the friction. HIMPC never had an opinion about friction: it has measured what the torque of a
     millisecond ago did.
     """,
     prediction=Value(
@@ -108,15 +108,15 @@ REALITY = Step(
 HEAVIER = Step(
     title="Half as heavy again",
     text=r"""
-         HIMPC, and every link 50 % heavier than before. Nothing is told, nothing is retuned; $\bar M$
-    stays.     Table V of the paper disturbs the inertias by ±20 % and finds level 1 changed by about 2
-    % at most. The ghost has     the old links.
+    HIMPC, and every link 50 % heavier than before. Nothing is told, nothing is retuned; $\bar M$
+    stays. Table V of the paper disturbs the inertias by ±20 % and finds level 1 changed by about 2
+    % at most. The ghost has the old links.
     """,
     do="Go down to half the mass. Why is that the dangerous direction?",
     why=r"""
-         The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower;
-    lighter ones bring the gauge towards its cliff. What matters is only that $\lVert I - M^{-1}\bar M
-    \rVert$ stays below 1, and that holds for a wide range of arms (Remark 4).
+    The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower;
+    lighter ones bring the gauge towards its cliff. What matters is only that $\lVert I - M^{-1}\bar
+    M \rVert$ stays below 1, and that holds for a wide range of arms (Remark 4).
     """,
     prediction=Choice(
         "Links 50 % heavier, not told. HIMPC's largest error grows …",

@@ -23,16 +23,16 @@ SWING = "q1_amplitude_deg=60"
 ENOUGH = Step(
     title="Enough for all",
     text=r"""
-         The hand follows its circle and joint 1 swings by 60°, one round in 8 s. Every torque must stay
+    The hand follows its circle and joint 1 swings by 60°, one round in 8 s. Every torque must stay
     within its limit, now and over the whole horizon (32f):
 
-        $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
+    $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
 
-        The motors could give 4 N·m. Six per cent of that are allowed here.
+    The motors could give 4 N·m. Six per cent of that are allowed here.
     """,
     do="Lower the limit until something changes. What is it that changes first?",
     why=r"""
-         A slow motion needs little: three quarters of the 0.24 N·m. A bound that is not met does
+    A slow motion needs little: three quarters of the 0.24 N·m. A bound that is not met does
     nothing.
     """,
     prediction=Value(
@@ -69,14 +69,14 @@ ENOUGH = Step(
 SHORT = Step(
     title="A third less",
     text=r"""
-         Four per cent of the torque are left, 0.16 N·m. It is not enough for both wishes any more.
-    Every     level is solved under the same bounds, level 1 first; level 2 chooses among what leaves
-    level 1 as     it is (34).
+    Four per cent of the torque are left, 0.16 N·m. It is not enough for both wishes any more. Every
+    level is solved under the same bounds, level 1 first; level 2 chooses among what leaves level 1
+    as it is (34).
     """,
     do="Open the list of active bounds: which level feels the torque limit?",
     why=r"""
-         Level 2 goes without: joint 1 falls behind by ten degrees and more while the hand does not
-    notice.     The bound is felt by the level that is still hungry.
+    Level 2 goes without: joint 1 falls behind by ten degrees and more while the hand does not
+    notice. The bound is felt by the level that is still hungry.
     """,
     prediction=Choice(
         "Both tasks together need more torque than there is. The hand's largest error …",
@@ -122,13 +122,13 @@ SHORT = Step(
 LESS = Step(
     title="Not even enough for one",
     text=r"""
-         Three per cent, 0.12 N·m. Now the circle by itself is too much. The ghost has     the task of
-    joint 1 switched off.
+    Three per cent, 0.12 N·m. Now the circle by itself is too much. The ghost has the task of joint
+    1 switched off.
     """,
     do="Find the least torque with which the hand is still served.",
     why=r"""
-         The hand leaves its circle, since physics ranks above level 1. But it leaves it no further than
-    without any level 2. The levels below get only what level 1     has no use for.
+    The hand leaves its circle, since physics ranks above level 1. But it leaves it no further than
+    without any level 2. The levels below get only what level 1 has no use for.
     """,
     prediction=Choice(
         "Compared with the ghost, which has no second task: how much larger is the hand's error?",

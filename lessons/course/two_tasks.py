@@ -26,8 +26,8 @@ WEIGHT = Control("levels.q1.Q", "Q of level 2", 0.01, 1000.0, log=True)
 BOTH = Step(
     title="Enough for both",
     text=r"""
-         Level 1: the hand follows a circle, two coordinates. Level 2: joint 1 swings by 20°, one
-    coordinate.     Three joints, three wishes: it works out exactly.
+    Level 1: the hand follows a circle, two coordinates. Level 2: joint 1 swings by 20°, one
+    coordinate. Three joints, three wishes: it works out exactly.
     """,
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
     why="As long as all wishes can be granted together, priorities do not matter at all.",
@@ -58,16 +58,16 @@ BOTH = Step(
 WEIGHTED = Step(
     title="Weigh them",
     text=r"""
-         Now joint 1 is to swing to −120° and back. From there the links cannot reach the circle. The
+    Now joint 1 is to swing to −120° and back. From there the links cannot reach the circle. The
     controller puts both wishes into one cost with equal weights, $Q_1 = Q_2 = 200$:
 
-        $$\min_{\Delta\tau} \; \lVert e_1 \rVert_{Q_1}^2 + \lVert e_2 \rVert_{Q_2}^2 + \lVert \Delta\tau
+    $$\min_{\Delta\tau} \; \lVert e_1 \rVert_{Q_1}^2 + \lVert e_2 \rVert_{Q_2}^2 + \lVert \Delta\tau
     \rVert_R^2$$
     """,
     do="Make Q of level 2 smaller until the hand is where you want it. What does it cost?",
     why=r"""
-         A sum is a trade: a metre of the hand against a radian of joint 1. Both lose, and the hand
-    leaves     its circle by a quarter of a metre. No unit tells you the right weights.
+    A sum is a trade: a metre of the hand against a radian of joint 1. Both lose, and the hand
+    leaves its circle by a quarter of a metre. No unit tells you the right weights.
     """,
     prediction=Choice(
         "Equal weights for hand and joint 1: how far from its circle does the hand get?",
@@ -99,16 +99,16 @@ WEIGHTED = Step(
 STRICT = Step(
     title="Rank them",
     text=r"""
-         HIMPC solves one problem per level. The second may choose among the torques that leave the
-    first as     it is, and that is what (33) says:
+    HIMPC solves one problem per level. The second may choose among the torques that leave the first
+    as it is, and that is what (33) says:
 
-        $$\hat J_p \bar M^{-1} \Delta\tau_p^* = \hat J_p \bar M^{-1} \Delta\tau_i, \qquad p < i$$
+    $$\hat J_p \bar M^{-1} \Delta\tau_p^* = \hat J_p \bar M^{-1} \Delta\tau_i, \qquad p < i$$
 
-        Level 2 is granted what is left. The ghost is the weighted controller.
+    Level 2 is granted what is left. The ghost is the weighted controller.
     """,
     do="Set Q of level 2 to 1000. Does the hand notice? And with the weighted controller?",
     why=r"""
-         Joint 1 pays alone: it goes no further than the circle lets it. The hand keeps its circle to a
+    Joint 1 pays alone: it goes no further than the circle lets it. The hand keeps its circle to a
     millimetre, and no weight of level 2 can change that.
     """,
     prediction=Choice(
@@ -147,17 +147,17 @@ STRICT = Step(
 LIMIT = Step(
     title="Is a large weight a priority?",
     text=r"""
-         Weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The ghost is
+    Weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The ghost is
     strict.
     """,
     do=r"""
-         Make Q of level 2 ten and a hundred times smaller still. Then look at level 2 on the easy
+    Make Q of level 2 ten and a hundred times smaller still. Then look at level 2 on the easy
     circle.
     """,
     why=r"""
-         Better, and still several times the error of a strict priority. In the limit the weighted
-    solution     becomes the strict one, but level 2 then weighs less than $R$ and is not followed any
-    more even     where it could be.
+    Better, and still several times the error of a strict priority. In the limit the weighted
+    solution becomes the strict one, but level 2 then weighs less than $R$ and is not followed any
+    more even where it could be.
     """,
     prediction=Choice(
         "The hand counts 200 times as much as joint 1. Its largest error is …",
@@ -188,9 +188,9 @@ LIMIT = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-         The start is weighted with equal weights. Keep the hand within 5 mm of its circle while joint 1
-    still gets as close to its reference as it can (within 80°), with no torque change rougher than 0.1
-    N·m RMS.
+    The start is weighted with equal weights. Keep the hand within 5 mm of its circle while joint 1
+    still gets as close to its reference as it can (within 80°), with no torque change rougher than
+    0.1 N·m RMS.
     """,
     goals=(
         Claim("The hand stays within 5 mm.", Measure(HAND), "at most", 5.0),

@@ -24,17 +24,17 @@ AMPLITUDE = Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 20.0)
 PROJECTION = Step(
     title="Project and invert",
     text=r"""
-         The classical way to rank tasks: project task 2 into the null space of task 1, $J_{2|1} = J_2
-    P_1$,     and compute the force it takes there. That needs the inverse of $J_{2|1} M^{-1}
-    J_{2|1}^\top$. Here     the hand follows its circle and joint 1 swings to −120°, beyond what the
-    circle allows. At about 1.4     s the two motions need exactly the same joints: $J_{2|1}$ vanishes.
-    Its controller (OSF) has a model     that is 20 % light. The torque limit of the motors is only
+    The classical way to rank tasks: project task 2 into the null space of task 1, $J_{2|1} = J_2
+    P_1$, and compute the force it takes there. That needs the inverse of $J_{2|1} M^{-1}
+    J_{2|1}^\top$. Here the hand follows its circle and joint 1 swings to −120°, beyond what the
+    circle allows. At about 1.4 s the two motions need exactly the same joints: $J_{2|1}$ vanishes.
+    Its controller (OSF) has a model that is 20 % light. The torque limit of the motors is only
     measured here, not enforced.
     """,
     do="Switch to HIMPC in good time, and back, while the arm moves.",
     why=r"""
-         Dividing by almost nothing gives almost infinity: the demanded torque reaches a thousand times
-    the     limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
+    Dividing by almost nothing gives almost infinity: the demanded torque reaches a thousand times
+    the limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
     singularity is made by the algorithm, and is called algorithmic for that.
     """,
     prediction=Choice(
@@ -74,13 +74,13 @@ PROJECTION = Step(
 BETTER_MODEL = Step(
     title="Would a better model help?",
     text=r"""
-         TDEOSF replaces the model by time-delay estimation, as HIMPC does, and keeps the projection:
-    $(J_{2|1} \bar M^{-1} J_{2|1}^\top)^{-1}$. Until the conflict it is     far more accurate than OSF.
+    TDEOSF replaces the model by time-delay estimation, as HIMPC does, and keeps the projection:
+    $(J_{2|1} \bar M^{-1} J_{2|1}^\top)^{-1}$. Until the conflict it is far more accurate than OSF.
     """,
     do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
     why=r"""
-         It knows the arm better and fails at the same place, for the same reason. The trouble is not
-    what     the model says, it is the inverse.
+    It knows the arm better and fails at the same place, for the same reason. The trouble is not
+    what the model says, it is the inverse.
     """,
     prediction=Choice(
         "Estimated dynamics instead of a wrong model. At the conflict the arm …",
@@ -118,15 +118,15 @@ BETTER_MODEL = Step(
 EQUALITY = Step(
     title="A constraint instead of a projection",
     text=r"""
-         HIMPC never forms $J_{2|1}$. Level 2 is a problem of its own with the equality (34g), which
-    keeps     what level 1 decided. If nothing is left for level 2, that problem is still solvable:
-    $\Delta\tau_2     = \Delta\tau_1$ satisfies everything (Theorem 2), and its Hessian is positive
-    definite because of     $R$ (Lemma 1).
+    HIMPC never forms $J_{2|1}$. Level 2 is a problem of its own with the equality (34g), which
+    keeps what level 1 decided. If nothing is left for level 2, that problem is still solvable:
+    $\Delta\tau_2 = \Delta\tau_1$ satisfies everything (Theorem 2), and its Hessian is positive
+    definite because of $R$ (Lemma 1).
     """,
     do="Watch joint 1 at 1.4 s and again where it comes back.",
     why=r"""
-         Level 2 wants something it cannot have. It presses against the edge of what level 1 leaves,
-    within the     bounds on speed and torque; the torque stays small because a large one would buy
+    Level 2 wants something it cannot have. It presses against the edge of what level 1 leaves,
+    within the bounds on speed and torque; the torque stays small because a large one would buy
     nothing.
     """,
     claims=(

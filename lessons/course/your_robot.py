@@ -31,19 +31,18 @@ HEAVY = ("plant.mass_scale=1.5", "plant.inertia_scale=1.5")
 LOAD = Step(
     title="Load it",
     text=r"""
-         This is a desk lamp, `lamp.urdf`, a file as they are found in the field. `himpc-lab robots
-    --check     lamp.urdf` says what is missing: a joint without end stops, a head without inertia, a
-    joint without     a speed limit. What is filled in is reported, what cannot be is refused. The stack
-    is made for any     robot: position, then orientation, then posture. $\bar M$ is suggested from the
-    masses in the file,     on the safe side, and the gains from how fast that $\bar M$ lets the loop
+    This is a desk lamp, `lamp.urdf`, a file as they are found in the field. `himpc-lab robots
+    --check lamp.urdf` says what is missing: a joint without end stops, a head without inertia, a
+    joint without a speed limit. What is filled in is reported, what cannot be is refused. The stack
+    is made for any robot: position, then orientation, then posture. $\bar M$ is suggested from the
+    masses in the file, on the safe side, and the gains from how fast that $\bar M$ lets the loop
     follow.
     """,
     do="Load a URDF of your own: Robot, Load URDF, or himpc-lab --urdf FILE.",
     why=r"""
-         Five joints for six coordinates of the head: no freedom is left, one coordinate is even
-    missing. The     hierarchy settles it without being asked: the position is reached, the orientation
-    as far as five     joints can, the posture goes without. A weighted sum gives up the position
-    instead.
+    Five joints for six coordinates of the head: no freedom is left, one coordinate is even missing.
+    The hierarchy settles it without being asked: the position is reached, the orientation as far as
+    five joints can, the posture goes without. A weighted sum gives up the position instead.
     """,
     prediction=Choice(
         "The head is moved by 11 cm. It has five joints. In the end …",
@@ -81,14 +80,14 @@ LOAD = Step(
 WRONG = Step(
     title="The file is wrong",
     text=r"""
-         Masses in such files are guesses. Suppose the real lamp is 50 % heavier than its file says, in
-    every     link. The ghost is the model-based HQP with the masses of the file.
+    Masses in such files are guesses. Suppose the real lamp is 50 % heavier than its file says, in
+    every link. The ghost is the model-based HQP with the masses of the file.
     """,
     do="Try 0.7 times and twice the mass, with both controllers.",
     why=r"""
-         Nothing in HIMPC depended on those masses but the suggestion for $\bar M$, and that had room.
-    The     ghost believes the file: what it does not know of the weight, the springs must carry, and
-    the head     hangs low for good.
+    Nothing in HIMPC depended on those masses but the suggestion for $\bar M$, and that had room.
+    The ghost believes the file: what it does not know of the weight, the springs must carry, and
+    the head hangs low for good.
     """,
     prediction=Choice(
         "The lamp is half as heavy again as its file says. Where is the head in the end?",
@@ -124,15 +123,15 @@ WRONG = Step(
 TUNE = Step(
     title="Make it yours",
     text=r"""
-         The suggested $\bar M$ must be safe wherever the lamp may go. Yours need only be safe where it
+    The suggested $\bar M$ must be safe wherever the lamp may go. Yours need only be safe where it
     works. Twice as much here; the ghost keeps the suggestion. Then take it home: *export* writes a
     Python script of twenty lines that runs this very stack, `load_robot("lamp.urdf")`,
     `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, `step` once a millisecond.
     """,
     do="Go on to 3 and read the gauge. Then export, and run the script.",
     why=r"""
-         Less than half the error. At three times the suggestion the gauge passes 1 and the lamp is
-    lost: you     have found your margin. `himpc-lab tune` does the same search step by step.
+    Less than half the error. At three times the suggestion the gauge passes 1 and the lamp is lost:
+    you have found your margin. `himpc-lab tune` does the same search step by step.
     """,
     claims=(
         Claim(

@@ -88,6 +88,14 @@ def test_equations_can_be_rendered(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", COURSE)
+def test_no_text_is_shown_as_code(name: str) -> None:
+    """Markdown takes an indented paragraph for code: an equation in it would not be rendered."""
+    for step in load_lesson(name).steps:
+        for text in (step.text, step.do, step.why):
+            assert not any(line.startswith(" ") or "  " in line for line in text.splitlines())
+
+
+@pytest.mark.parametrize("name", COURSE)
 def test_controls_and_plots_exist_in_the_scene(name: str) -> None:
     """Each control's path is a setting whose value the control can show; each signal is recorded."""
     lesson = load_lesson(name)
