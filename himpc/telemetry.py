@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,7 @@ __all__ = [
     "RUNGS",
     "Layout",
     "TaskInfo",
+    "arranged",
     "layout_of",
     "write_plan",
 ]
@@ -87,6 +89,29 @@ class Layout:
 
 def layout_of(robot: Robot, stack: Stack) -> Layout:
     """The layout for a robot and all levels of a stack, whatever their order; damping comes last."""
+    ordered = tuple(sorted(stack, key=lambda level: level.name))
+    levels = (*(level.name for level in ordered), DAMPING_LEVEL.name)
+    return arranged(robot, ordered, levels, _SCALARS, _PER_JOINT, _PER_LEVEL)
+
+
+def arranged(
+    robot: Robot,
+    stack: Stack,
+    levels: tuple[str, ...],
+    scalars: Sequence[str],
+    per_joint: Sequence[str],
+    per_level: Sequence[str],
+    per_task: Sequence[str] = (),
+) -> Layout:
+    """Fields side by side in this order: scalars, joints, tasks, levels.
+
+    Args:
+        robot: gives the width of joint fields.
+        stack: gives the tasks.
+        levels: names of the levels.
+        scalars, per_joint, per_level: names of the fields of each kind.
+        per_task: names of further fields of one number per task.
+    """
     fields: dict[str, slice] = {}
     size = 0
 
@@ -95,13 +120,13 @@ def layout_of(robot: Robot, stack: Stack) -> Layout:
         fields[name] = slice(size, size + width)
         size += width
 
-    for name in _SCALARS:
+    for name in scalars:
         add(name, 1)
-    for name in _PER_JOINT:
+    for name in per_joint:
         add(name, robot.n)
     tasks = []
     probe = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
-    for level in sorted(stack, key=lambda level: level.name):
+    for level in stack:
         for task in level.tasks:
             coordinates = task.coordinates(robot)
             tasks.append(TaskInfo(task.name, level.name, coordinates, task.unit))
@@ -110,9 +135,10 @@ def layout_of(robot: Robot, stack: Stack) -> Layout:
             add(f"x_d/{task.name}", width)
             for name in ("error", "v_d", "a_d"):
                 add(f"{name}/{task.name}", len(coordinates))
-    levels = (*(level.name for level in sorted(stack, key=lambda level: level.name)), DAMPING_LEVEL.name)
+            for name in per_task:
+                add(f"{name}/{task.name}", 1)
     for level in levels:
-        for name in _PER_LEVEL:
+        for name in per_level:
             add(f"{name}/{level}", 1)
     return Layout(size, fields, tuple(tasks), levels, robot.joint_names)
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.htmpc import VelocityPlan
 from himpc.stack import Stack
-from himpc.telemetry import Layout, TaskInfo
+from himpc.telemetry import Layout, arranged
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -36,34 +35,8 @@ def layout_of(robot: Robot, roles: Stack) -> Layout:
     place in the window (NaN: it is not in it). Per level of the stack cost, kkt, rung, time_us, the accepted
     line-search step and the number of active constraints.
     """
-    fields: dict[str, slice] = {}
-    size = 0
-
-    def add(name: str, width: int) -> None:
-        nonlocal size
-        fields[name] = slice(size, size + width)
-        size += width
-
-    for name in _SCALARS:
-        add(name, 1)
-    for name in _PER_JOINT:
-        add(name, robot.n)
-    tasks = []
-    probe = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
-    for level in roles:
-        for task in level.tasks:
-            coordinates = task.coordinates(robot)
-            tasks.append(TaskInfo(task.name, level.name, coordinates, task.unit))
-            width = 4 if task.value(probe).ndim == 2 else len(coordinates)
-            add(f"x/{task.name}", width)
-            add(f"x_d/{task.name}", width)
-            for name in ("error", "v_d", "a_d"):
-                add(f"{name}/{task.name}", len(coordinates))
-            add(f"level/{task.name}", 1)
-    for level in roles:
-        for name in _PER_LEVEL:
-            add(f"{name}/{level.name}", 1)
-    return Layout(size, fields, tuple(tasks), tuple(level.name for level in roles), robot.joint_names)
+    levels = tuple(level.name for level in roles)
+    return arranged(robot, roles, levels, _SCALARS, _PER_JOINT, _PER_LEVEL, per_task=("level",))
 
 
 RUNGS = ("solve", "widened", "keep")
