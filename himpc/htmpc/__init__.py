@@ -5,7 +5,7 @@ from himpc.htmpc.htmpc import HTMPC
 from himpc.htmpc.kinematics import G, base_joints
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.settings import FORMULATIONS, LEXICOGRAPHIC, Bounds, HTMPCSettings, MotionLimits, bounds
-from himpc.htmpc.stmpc import HTMPC_WPT, STMPC, Decoupled
+from himpc.htmpc.stmpc import HTMPC_WPT, STMPC
 
 __all__ = [
     "FORMULATIONS",
@@ -15,7 +15,6 @@ __all__ = [
     "LEXICOGRAPHIC",
     "STMPC",
     "Bounds",
-    "Decoupled",
     "G",
     "HTMPCSettings",
     "LevelEvidence",

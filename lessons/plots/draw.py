@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -24,6 +25,8 @@ _DECADES = 300
 """A logarithmic axis that spans less than this factor has ticks at 1, 2, 5."""
 _TALL = 50
 """Bars whose heights differ by more than this factor get a logarithmic axis."""
+_NAME = 10
+"""Characters in a line of a name below an axis."""
 _STYLES = {"line": "-", "dashed": (0, (5, 2)), "dots": "", "steps": "-"}
 
 
@@ -83,6 +86,10 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         margin = 0.08 * (high - low or abs(high) or 1.0)
         bottom, top = axes.get_ylim()
         axes.set_ylim(min(bottom, low - margin), max(top, high + margin))
+    if panel.x_names:
+        wrapped = [textwrap.fill(name, _NAME, break_long_words=False) for name in panel.x_names]
+        axes.set_xticks(range(len(wrapped)), wrapped, fontsize=7)
+        axes.grid(visible=False, axis="x")
     if panel.x_label == "time (s)":
         axes.margins(x=0.01)
 

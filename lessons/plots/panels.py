@@ -42,6 +42,7 @@ class Panel:
         log_x, log_y: logarithmic axes.
         equal: one metre is as long in x as in y.
         y_range: fixed range of y; what leaves it is cut, and the picture's caption says so.
+        x_names: what stands at x = 0, 1, … instead of numbers.
     """
 
     y_label: str
@@ -53,6 +54,7 @@ class Panel:
     log_y: bool = False
     equal: bool = False
     y_range: tuple[float, float] | None = None
+    x_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

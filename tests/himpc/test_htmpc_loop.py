@@ -15,7 +15,6 @@ from himpc.htmpc import (
     HTMPC,
     HTMPC_WPT,
     STMPC,
-    Decoupled,
     HTMPCSettings,
     MotionLimits,
     VelocityPlan,
@@ -387,25 +386,6 @@ def test_single_task_ignores_lower_levels(robot: Robot) -> None:
     plan = controller.step(robot.home, np.zeros(9), previews(references, 0.0, controller.settings))
     assert [level.name for level in plan.levels] == ["ee"]
     assert np.abs(plan.u).max() < 1e-6
-
-
-def test_decoupled_moves_one_at_a_time(robot: Robot) -> None:
-    ee, base = mobile_stack()
-    references = {"ee": Hold(point(robot, robot.home) + np.array([-0.2, 0.1, 0.1])), "base": Hold(NEAR)}
-    controller = Decoupled(robot, mobile_settings(stack=(base, ee)))
-
-    def switch(tick: int) -> None:
-        if tick == 40:
-            controller.configure(mobile_settings(stack=(ee, base)))
-
-    plans, path = closed_loop(controller, references, robot.home, 9.0, switch)
-    np.testing.assert_allclose(path[:41, 3:], np.tile(robot.home[3:], (41, 1)), atol=1e-9)
-    assert np.linalg.norm(path[40, :2] - NEAR) < 0.02
-    stopped = next(k for k in range(40, 90) if np.abs(plans[k].v[0, :3]).max() < 1e-3)
-    assert stopped < 55
-    assert np.abs(path[stopped + 5 :, :3] - path[stopped + 5, :3]).max() < 1e-3
-    assert np.linalg.norm(point(robot, path[-1]) - references["ee"].value) < 5e-3
-    assert sum(plan.unsolved for plan in plans) == 0
 
 
 def test_htidkc_keeps_its_order_and_bounds(robot: Robot) -> None:

@@ -175,12 +175,12 @@ def collinear(job: Job) -> bool:
 
 def _strip(title: str, values: dict[str, Array]) -> Panel:
     curves = []
-    for place, (words, each) in enumerate(values.items()):
+    for place, each in enumerate(values.values()):
         if np.isfinite(each).all() and np.ptp(each) > 0:
             curves.append(_violin(place, each))
-        curves.append(Curve(np.full(len(each), float(place)), each, words, str(place), "dots"))
+        curves.append(Curve(np.full(len(each), float(place)), each, "", str(place), "dots"))
         curves.append(Curve(np.array([place - 0.2, place + 0.2]), np.full(2, each.mean()), "", str(place)))
-    return Panel("base error (1)", tuple(curves), "method", title=title)
+    return Panel("base error (1)", tuple(curves), "", title=title, x_names=tuple(values))
 
 
 def _violin(place: int, values: Array) -> Curve:
@@ -188,7 +188,8 @@ def _violin(place: int, values: Array) -> Curve:
     y = np.linspace(values.min(), values.max(), 60)
     density = gaussian_kde(values)(y)
     half = 0.4 * density / density.max()
-    return Curve(np.append(place - half, (place + half)[::-1]), np.append(y, y[::-1]), "", str(place))
+    x, y = np.append(place - half, (place + half)[::-1]), np.append(y, y[::-1])
+    return Curve(np.append(x, x[0]), np.append(y, y[0]), "", str(place))
 
 
 def _fig_7(results: Results, quick: bool) -> Section:

@@ -1,0 +1,37 @@
+"""The decoupled architecture of the delivery scene: the base drives or the arm reaches, never both."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from himpc.htmpc import base_joints
+from lessons.kinds import find_scene, prepared
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.session import MobileSession
+
+SETTLED = 12
+"""Ticks after a new task in which what must rest may still be braking."""
+
+
+def test_base_and_arm_take_turns() -> None:
+    scene = prepared(find_scene("ridgeback-ur10-delivery"), None, ("architecture=decoupled",))
+    assert isinstance(scene, MobileScene)
+    session = MobileSession(scene)
+    base = list(base_joints(session.robot))
+    arm = [joint for joint in range(session.robot.n) if joint not in base]
+    since, place, driven, reached = 0, -1, 0.0, 0.0
+    for _ in range(150):
+        session.tick()
+        since = since + 1 if session.progress.place == place else 0
+        place = session.progress.place
+        if session.progress.done or since < SETTLED:
+            continue
+        speed = np.abs(session.plant.v)
+        if session.progress.window[0].task.role == "base":
+            assert speed[arm].max() < 1e-3
+            driven = max(driven, float(speed[base[:2]].max()))
+        else:
+            assert speed[base[:2]].max() < 1e-3
+            reached = max(reached, float(speed[arm].max()))
+    assert driven > 0.2
+    assert reached > 0.05
