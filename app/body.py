@@ -8,7 +8,6 @@ import pinocchio as pin
 
 from app.block import Block
 from app.messages import (
-    BindingRow,
     Command,
     Load,
     Play,
@@ -21,16 +20,11 @@ from app.messages import (
     Speed,
     Status,
     Step,
-    TaskView,
 )
-from himpc.tasks import Task
+from app.runs import start
 from lessons.events import Reset
-from lessons.scenes import load_scene
-from lessons.session import Session
-from lessons.settings import SceneSettings
-from robots import InputError, convergence_gauge
-
-_LISTED = 24  # binding rows sent to the page: more cannot be read in a tenth of a second
+from lessons.kinds import AnySession, AnySettings, find_scene
+from robots import InputError
 
 
 class Body:
@@ -45,12 +39,12 @@ class Body:
         self.resets = 0
         self._seed = seed
         self._steps = 0
-        self._sent: SceneSettings | None = None
+        self._sent: AnySettings | None = None
         self._enter(choice)
 
     def _enter(self, choice: SceneChoice) -> None:
-        scene = load_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text)
-        self.session = Session(scene, seed=self._seed)
+        scene = find_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text)
+        self.run = start(scene, self._seed)
         self.scene, self.choice = scene, choice
         robot = self.session.robot
         self._data = robot.model.createData()
@@ -66,27 +60,33 @@ class Body:
         self.resets += 1
         self._sent = None
 
+    @property
+    def session(self) -> AnySession:
+        return self.run.session
+
     # ---------------------------------------------------------------- commands
 
     def handle(self, command: Command) -> Report | None:
         """Obeys a command; the answer, if it has one, goes to the page."""
         match command:
             case Post(Reset() as event):
-                self.session.post(event)
+                self.run.post(event)
                 self.resets += 1
                 if not self.running:
                     self._steps = max(self._steps, 1)  # a reset must show while paused, too
             case Post(event):
-                self.session.post(event)
+                self.run.post(event)
             case Play(running):
                 self.running, self._steps = running, 0
+                self._finish_period()
             case Step(ticks):
                 self.running = False
+                self._finish_period()
                 self._steps += ticks
             case Speed(factor):
                 self.speed = factor
             case ResetAll():
-                self.session = Session(self.scene, seed=self._seed)
+                self.run = start(self.scene, self._seed)
                 self._fresh_start()
                 self.running, self.speed = True, 1.0
                 self.write_poses()
@@ -115,12 +115,25 @@ class Body:
 
     def tick(self, ticks: int = 1) -> None:
         """Runs control periods and writes their telemetry."""
-        session, block = self.session, self.block
         for _ in range(ticks):
-            row = session.tick()
-            block.write(row)
-            self.ticks += 1
-            self.over_budget += bool(row[self._step_us] > 1e6 * session.settings.T_s)
+            while not self.advance():
+                pass
+
+    def advance(self) -> bool:
+        """One step of the run; whether a control period ended with it, and its telemetry was written."""
+        row = self.run.advance()
+        if row is None:
+            return False
+        self.block.write(row)
+        self.ticks += 1
+        self.over_budget += bool(row[self._step_us] > 1e6 * self.session.settings.T_s)
+        return True
+
+    def _finish_period(self) -> None:
+        # A pause stands between two control periods: what is changed meanwhile takes effect at once, and
+        # where the same events strike again a recording of the run comes out the same.
+        if not self.running and self.run.between:
+            self.tick()
 
     def settle(self) -> None:
         """While paused: what was asked for takes effect at once, though no time passes."""
@@ -148,39 +161,17 @@ class Body:
             robot=session.robot,
             layout=session.layout,
             settings=session.settings,
-            tasks=tuple(
-                self._view(task, level.name) for level in session.settings.levels for task in level.tasks
-            ),
-        )
-
-    def _view(self, task: Task, level: str) -> TaskView:
-        target = self.session.target(task.name)
-        axes = str(getattr(task, "axes", ""))
-        kind = "joints" if not axes else "orientation" if task.unit == "rad" else "position"
-        return TaskView(
-            name=task.name,
-            level=level,
-            kind=kind,
-            unit=task.unit,
-            frame=str(getattr(task, "frame", "")) or self.session.robot.tip,
-            axes=axes,
-            raw=None if target is None else np.array(target.raw),
-            path=self.session.reference_path(task.name),
-            speed_cap=float("nan") if target is None else target.caps.speed,
+            tasks=self.run.tasks(),
+            room=self.run.room(),
         )
 
     def status(self, real_time_factor: float = 0.0, capped: bool = False) -> Status:
-        session = self.session
+        run, session = self.run, self.session
         notices = tuple(session.notices)
         session.notices.clear()
         settings = session.settings
         changed = settings is not self._sent
         self._sent = settings
-        targets: dict[str, np.ndarray] = {}
-        for task in session.layout.tasks:
-            target = session.target(task.name)
-            if target is not None:
-                targets[task.name] = np.array(target.raw)
         ran = self.ticks > 0
         return Status(
             t=session.t,
@@ -191,20 +182,14 @@ class Body:
             capped=capped,
             over_budget=self.over_budget,
             resets=self.resets,
-            targets=targets,
-            path=np.array(session.predicted_path()) if ran else np.zeros((0, 3)),
-            binding=tuple(BindingRow(*row) for row in session.binding()[:_LISTED]) if ran else (),
+            targets=run.targets(),
+            path=run.path() if ran else np.zeros((0, 3)),
+            binding=run.binding() if ran else (),
             notices=notices,
             settings=settings if changed else None,
-            gauge=None if self.running else self._gauge(),
+            gauge=None if self.running else run.gauge(),
+            mission=run.mission(),
         )
-
-    def _gauge(self) -> tuple[float, float] | None:
-        session = self.session
-        if not np.isfinite(session.plant.q).all():
-            return None
-        M_bar = np.array(session.settings.M_bar) * session.settings.M_bar_scale
-        return convergence_gauge(session.plant.mass_matrix(), M_bar)
 
     def close(self) -> None:
         """Frees the memory; for use without a page, which otherwise does it."""

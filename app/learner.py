@@ -12,7 +12,7 @@ from app.history import BUCKETS, History
 from app.messages import Command, Failed, Load, Ready, Refused, Report, ResetAll, SceneChoice, Status
 from app.process import Process, Spares
 from himpc.telemetry import Layout
-from lessons.settings import SceneSettings
+from lessons.kinds import AnySettings
 
 WINDOW = 8.0  # s of simulated time in the plots
 T = TypeVar("T")
@@ -29,7 +29,7 @@ class Learner:
         self.left_at = time.monotonic()
         self.ready: Ready | None = None
         self.status: Status | None = None
-        self.settings: SceneSettings | None = None
+        self.settings: AnySettings | None = None
         self.failure: str | None = None
         self.changed = 0
         self._refusals: list[str] = []

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from himpc.telemetry import Layout
-from lessons.events import Event
-from lessons.settings import SceneSettings
+from lessons.kinds import AnyEvent, AnySettings
 from robots import Robot
 
 
@@ -29,7 +29,7 @@ class SceneChoice:
 class Post:
     """An event for the session's mailbox."""
 
-    event: Event
+    event: AnyEvent
 
 
 @dataclass(frozen=True)
@@ -98,14 +98,16 @@ class TaskView:
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A scene is loaded and its first tick can run."""
+    """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
+    besides the robot."""
 
     choice: SceneChoice
     block: str  # name of the shared memory
     robot: Robot
     layout: Layout
-    settings: SceneSettings
+    settings: AnySettings
     tasks: tuple[TaskView, ...]
+    room: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,40 @@ class BindingRow:
     slack: float
 
 
+@dataclass(frozen=True)
+class MissionRow:
+    """A task of a mission. goal: m, None for a given trajectory; hold: s at the goal, None: until released;
+    there_s: for how long it has been at its goal; done_at: s, when it was completed."""
+
+    name: str
+    role: str
+    goal: tuple[float, ...] | None
+    tolerance: float
+    hold: float | None
+    state: Literal["done", "active", "ahead"]
+    there_s: float | None
+    done_at: float | None
+
+
+@dataclass(frozen=True)
+class Person:
+    """hand: m, where a ball is handed over; place: m on the floor; balls: how many were received."""
+
+    hand: tuple[float, float, float]
+    place: tuple[float, float]
+    balls: int
+
+
+@dataclass(frozen=True, eq=False)
+class MissionView:
+    """How far a mission is. paths: per role the predicted path, (N + 1, 3) m."""
+
+    rows: tuple[MissionRow, ...]
+    done: bool
+    paths: dict[str, np.ndarray]
+    people: tuple[Person, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Status:
     """What is not worth sending every tick; about ten times a second.
@@ -129,7 +165,7 @@ class Status:
     over_budget: ticks whose control step took longer than T_s; resets: how often the scene was reset (the
     page then puts its gizmo back); targets: raw targets by task; path: (N + 1, 3) predicted tip, m;
     settings: only after a change; gauge: norm and spectral radius of I − M⁻¹M̄ while paused, when no row of
-    telemetry tells them.
+    telemetry tells them; mission: for scenes that have one.
     """
 
     t: float
@@ -144,8 +180,9 @@ class Status:
     path: np.ndarray
     binding: tuple[BindingRow, ...]
     notices: tuple[str, ...] = ()
-    settings: SceneSettings | None = field(default=None)
+    settings: AnySettings | None = field(default=None)
     gauge: tuple[float, float] | None = None
+    mission: MissionView | None = None
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def _simulate(pipe: Connection, body: Body) -> None:
         pacer.speed = body.speed
         now = time.perf_counter()
         if body.running:
-            due = pacer.due(now, body.session.settings.T_s)
+            due = pacer.due(now, body.run.step_s)
             _run(body, pacer, due, until=now + _CHUNK)
         else:
             pacer.rest(now)
@@ -99,9 +99,9 @@ def _simulate(pipe: Connection, body: Body) -> None:
 
 def _run(body: Body, pacer: Pacer, due: int, until: float) -> None:
     for _ in range(due):
-        T_s = body.session.settings.T_s
-        body.tick()
-        pacer.ran(1, T_s)
+        step_s = body.run.step_s
+        body.advance()
+        pacer.ran(1, step_s)
         if time.perf_counter() > until:
             return
 

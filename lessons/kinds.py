@@ -7,29 +7,41 @@ from dataclasses import replace
 from typing import Any
 
 from himpc.controllers import CONTROLLERS
+from lessons.events import Event
+from lessons.mobile.events import MobileEvent
 from lessons.mobile.run import mobile_run
 from lessons.mobile.scene import MobileScene
-from lessons.mobile.settings import VELOCITY_CONTROLLERS
+from lessons.mobile.session import MobileSession
+from lessons.mobile.settings import VELOCITY_CONTROLLERS, MobileSettings
 from lessons.mobile.settings import changed as changed_mobile
 from lessons.mobile.settings import paths as mobile_paths
 from lessons.mobile.summary import MobileRecording, mobile_arrays, mobile_summary
 from lessons.run import parse_assignment, run, with_assignments
 from lessons.scene import Scene
-from lessons.scenes import load_scene
+from lessons.scenes import SCENES, load_scene
 from lessons.scenes.mobile import MOBILE_SCENES, mobile_scene
-from lessons.settings import changed, paths
+from lessons.session import Session
+from lessons.settings import SceneSettings, changed, paths
 from lessons.summary import Recording, arrays, summary
 from robots import InputError
 
 AnyScene = Scene | MobileScene
+AnySession = Session | MobileSession
+AnySettings = SceneSettings | MobileSettings
+AnyEvent = Event | MobileEvent
 AnyRecording = Recording | MobileRecording
 
+ALL_SCENES: dict[str, str] = SCENES | MOBILE_SCENES
+"""One line per scene of either kind."""
 
-def find_scene(name: str, urdf: str | None = None, tip: str | None = None) -> AnyScene:
+
+def find_scene(
+    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
+) -> AnyScene:
     """A scene of either kind by its name. Raises InputError like `load_scene`."""
     if name not in MOBILE_SCENES:
-        return load_scene(name, urdf, tip)
-    if urdf is not None or tip is not None:
+        return load_scene(name, urdf, tip, urdf_text)
+    if urdf is not None or urdf_text is not None or tip is not None:
         raise InputError(f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf and --tip")
     return mobile_scene(name)
 

@@ -11,7 +11,6 @@ def scenes(json: str | None = None) -> int:
     Args:
         json: write JSON to this file, or to standard output for "-".
     """
-    from lessons.scenes import SCENES
-    from lessons.scenes.mobile import MOBILE_SCENES
+    from lessons.kinds import ALL_SCENES
 
-    return print_list("Scenes", "scene", SCENES | MOBILE_SCENES, json)
+    return print_list("Scenes", "scene", ALL_SCENES, json)

@@ -11,8 +11,7 @@ from typing import Any, Generic, TypeVar
 import viser
 from viser import _messages
 
-from lessons.events import Event
-from lessons.settings import SceneSettings
+from lessons.kinds import AnyEvent, AnySettings
 
 HOLD = 0.8
 """s during which a control that was just touched is not overwritten: the session's answer is on its way."""
@@ -22,8 +21,9 @@ REMIND = 2.0
 tab and drops all but the latest: of two controls changed at once (or while the browser stutters) one may
 never arrive, and would go on showing what the session does not have."""
 
-Post = Callable[[Event], None]
+Post = Callable[[AnyEvent], None]
 T = TypeVar("T")
+S = TypeVar("S", bound=AnySettings)
 
 
 class Wish(Generic[T]):
@@ -45,13 +45,13 @@ class Wish(Generic[T]):
 
 
 @dataclass
-class _Mirror:
+class _Mirror(Generic[S]):
     handle: viser.GuiInputHandle[Any]
-    read: Callable[[SceneSettings], Any]
+    read: Callable[[S], Any]
     touched: float = -float("inf")
 
 
-class Bindings:
+class Bindings(Generic[S]):
     """Two ways: a control posts an event, and settings that changed otherwise (a reset, a hotkey, an event
     that was refused) move the control. Callbacks only post: they never touch the simulation.
 
@@ -64,15 +64,15 @@ class Bindings:
         """loop: the server's, on which viser handles what browsers send."""
         self.post = post
         self._loop = loop
-        self._mirrors: list[_Mirror] = []
+        self._mirrors: list[_Mirror[S]] = []
         self._reminded = -float("inf")
         self._closed = False
 
     def bind(
         self,
         handle: viser.GuiInputHandle[Any],
-        read: Callable[[SceneSettings], Any],
-        event: Callable[[Any], Event],
+        read: Callable[[S], Any],
+        event: Callable[[Any], AnyEvent],
     ) -> None:
         """`read` gives the control's value for some settings, `event` the event for a value."""
         mirror = _Mirror(handle, read)
@@ -85,7 +85,7 @@ class Bindings:
             mirror.touched = time.monotonic()
             self.post(event(handle.value))
 
-    def refresh(self, settings: SceneSettings) -> None:
+    def refresh(self, settings: S) -> None:
         """Shows what the session has. Returns at once; the event loop does it."""
         self._loop.call_soon_threadsafe(self._write, settings)
 
@@ -93,7 +93,7 @@ class Bindings:
         """The controls are about to be removed: writes nothing any more."""
         self._closed = True
 
-    def _write(self, settings: SceneSettings) -> None:
+    def _write(self, settings: S) -> None:
         if self._closed:
             return
         now = time.monotonic()

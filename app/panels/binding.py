@@ -7,6 +7,7 @@ import viser
 from app.palette import RGB
 from app.panels.snapshot import Snapshot
 from app.text import block, esc, swatch
+from lessons.kinds import AnySettings
 
 _HEAD = '<tr style="text-align:left">{}</tr>'
 
@@ -25,7 +26,7 @@ class BindingPanel:
         with gui.add_folder("Time at bounds since the reset"):
             self._times = gui.add_html("")
 
-    def update(self, now: Snapshot) -> None:
+    def update(self, now: Snapshot[AnySettings]) -> None:
         rows = "".join(
             f"<tr><td>{swatch(self._colours.get(row.level, (139, 149, 161)))}{esc(row.level)}</td>"
             f"<td>{esc(row.joint)}</td><td>{esc(row.kind)} {esc(row.side)}</td>"

@@ -18,14 +18,16 @@ from robots import Robot
 class ControllerPanel:
     """Everything about the controller that can be changed while it runs."""
 
-    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings, robot: Robot) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
+    ) -> None:
         self._choice(gui, bindings, settings)
         self._horizon(gui, bindings, settings)
         self._inertia(gui, bindings, settings, robot)
         self._limits(gui, bindings, settings)
         self._solver(gui, bindings, settings)
 
-    def _choice(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
+    def _choice(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         with gui.add_folder("Which controller"):
             menu = gui.add_dropdown(
                 "Controller",
@@ -38,7 +40,7 @@ class ControllerPanel:
         self._shown = settings.controller
         bindings.bind(menu, lambda s: s.controller, lambda name: Set("controller", str(name)))
 
-    def _horizon(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
+    def _horizon(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         with gui.add_folder("Horizon"):
             knots = gui.add_slider(
                 "N",
@@ -62,7 +64,9 @@ class ControllerPanel:
             period, lambda s: round(1e3 * s.T_s, 6), lambda value: Set("T_s", round(1e-3 * float(value), 9))
         )
 
-    def _inertia(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings, robot: Robot) -> None:
+    def _inertia(
+        self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
+    ) -> None:
         with gui.add_folder("Inertia guess M̄"):
             self._gauge = gui.add_html("")
             with gui.add_folder(None):
@@ -88,7 +92,7 @@ class ControllerPanel:
                     )
         bindings.bind(scale, lambda s: float(s.M_bar_scale), lambda value: Set("M_bar_scale", float(value)))
 
-    def _limits(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
+    def _limits(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         limits = settings.limits
         with gui.add_folder("Limits"):
             torque = gui.add_checkbox("Torque", limits.torque)
@@ -122,7 +126,7 @@ class ControllerPanel:
             lambda value: Set("limits.velocity_scale", float(value)),
         )
 
-    def _solver(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings) -> None:
+    def _solver(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         with gui.add_folder("Solver", expand_by_default=False):
             for label, path, options, hint in (
                 ("Route", "route", ("structured", "explicit"), "Two ways to the same torque"),
@@ -146,7 +150,7 @@ class ControllerPanel:
                 + formula(r"\rho(I - M^{-1} \bar M) < 1")
             )  # fmt: skip
 
-    def update(self, now: Snapshot) -> None:
+    def update(self, now: Snapshot[SceneSettings]) -> None:
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller
             self._what.content = block(esc(CONTROLLERS[self._shown]))

@@ -44,7 +44,9 @@ _UNIT = {"encoder_resolution_deg": 1e3}
 class PlantPanel:
     """Sliders of the plant's settings."""
 
-    def __init__(self, gui: viser.GuiApi, bindings: Bindings, settings: SceneSettings, robot: Robot) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
+    ) -> None:
         gui.add_html(block("This is the truth in the simulation. The controller sees none of it."))
         for label, field, low, high, step, hint in _SLIDERS:
             unit = _UNIT.get(field, 1.0)
@@ -73,7 +75,7 @@ class PlantPanel:
 
 def _per_link(
     gui: viser.GuiApi,
-    bindings: Bindings,
+    bindings: Bindings[SceneSettings],
     settings: SceneSettings,
     robot: Robot,
     field: str,

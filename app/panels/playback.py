@@ -15,6 +15,7 @@ from app.panels.bind import HOLD, Wish
 from app.panels.snapshot import Snapshot
 from app.text import badge, block, stopped
 from lessons.events import Reset
+from lessons.kinds import AnySettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 
@@ -22,7 +23,10 @@ _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Rese
 class PlaybackPanel:
     """Buttons and a status line."""
 
-    def __init__(self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop, fastest: float
+    ) -> None:
+        """fastest: the highest speed that can be asked for, simulated seconds per second."""
         self._learner, self._loop = learner, loop
         self._running: Wish[bool] = Wish()
         self._closed = False
@@ -37,7 +41,7 @@ class PlaybackPanel:
         self._speed = gui.add_slider(
             "Speed",
             min=0.1,
-            max=1.0,
+            max=fastest,
             step=0.1,
             initial_value=1.0,
             hint="Simulated seconds per second",
@@ -97,7 +101,7 @@ class PlaybackPanel:
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 
-    def update(self, now: Snapshot) -> None:
+    def update(self, now: Snapshot[AnySettings]) -> None:
         status = now.status
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:

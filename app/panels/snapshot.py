@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from app.messages import Ready, Status
-from lessons.settings import SceneSettings
+from lessons.kinds import AnySettings
+
+S_co = TypeVar("S_co", bound=AnySettings, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot:
+class Snapshot(Generic[S_co]):
     """latest: the last telemetry row; bound_seconds (n, 3): s each joint spent at its torque, velocity and
     position bound since the last reset."""
 
     ready: Ready
-    settings: SceneSettings
+    settings: S_co
     status: Status
     latest: np.ndarray
     bound_seconds: np.ndarray

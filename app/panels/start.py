@@ -13,6 +13,7 @@ from app.panels.bind import Post
 from app.panels.snapshot import Snapshot
 from app.text import block, esc, quantity
 from lessons.events import Push
+from lessons.kinds import AnySettings
 
 _DIRECTIONS = {
     "→ +x": (1, 0, 0),
@@ -96,7 +97,7 @@ class StartPanel:
             text += " This orientation cannot be met there: the lower level gives way."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: Snapshot) -> None:
+    def update(self, now: Snapshot[AnySettings]) -> None:
         del now
 
 

@@ -24,7 +24,7 @@ class TasksPanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings,
+        bindings: Bindings[SceneSettings],
         settings: SceneSettings,
         colours: dict[str, RGB],
         current: Callable[[], SceneSettings],
@@ -76,7 +76,7 @@ class TasksPanel:
             self._order.ask(tuple(names))
             self._post(MoveLevel(name, to))
 
-    def update(self, now: Snapshot) -> None:
+    def update(self, now: Snapshot[SceneSettings]) -> None:
         for place, level in enumerate(now.settings.levels):
             for card in self._cards:
                 if card.name == level.name:
@@ -101,7 +101,7 @@ class _Card:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings,
+        bindings: Bindings[SceneSettings],
         level: Level,
         colours: dict[str, RGB],
         place: int,
@@ -153,7 +153,7 @@ class _Card:
     @staticmethod
     def _slider(
         gui: viser.GuiApi,
-        bindings: Bindings,
+        bindings: Bindings[SceneSettings],
         label: str,
         path: str,
         span: tuple[float, float, float],
@@ -167,7 +167,7 @@ class _Card:
         )
         bindings.bind(slider, read, lambda number: Set(path, float(number)))
 
-    def update(self, now: Snapshot, level: Level, place: int) -> None:
+    def update(self, now: Snapshot[SceneSettings], level: Level, place: int) -> None:
         title = _title(place, level.name)
         if self._folder.label != title:
             self._folder.label = title

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,23 +14,21 @@ from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
 from himpc.missions import Progress, advanced, insert, move, release, remove, reorder
 from himpc.plan import Binding
 from himpc.references import Reference
-from himpc.rotation import quaternion
 from himpc.stack import Level, Stack
 from himpc.telemetry import Layout
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.mobile.commands import Commands, command_step
 from lessons.mobile.control import VelocityController, make_velocity_controller
 from lessons.mobile.events import Appear, InsertTask, MobileEvent, Release, RemoveTask
 from lessons.mobile.scene import MobileScene
 from lessons.mobile.settings import MobileSettings, changed
-from lessons.mobile.telemetry import layout_of, write_plan
+from lessons.mobile.telemetry import layout_of, write_bounds, write_plan, write_truth
 from robots import InputError, VelocityPlant
 from robots.collision import CollisionModel
 from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
 
-COMMAND_HZ = 100.0
-"""How often the servos get a new velocity, as on the authors' robot."""
 CLEARANCE_WITHIN = 1.0
 """m: obstacles farther away than this are not measured."""
 LOST_SPEED = 20.0
@@ -39,7 +36,7 @@ LOST_SPEED = 20.0
 
 
 class MobileSession:
-    """One learner's run at velocity level. `tick` advances one control period.
+    """One learner's run at velocity level. `tick` advances one control period, `advance` one command of it.
 
     Attributes:
         scene: what it started from.
@@ -89,11 +86,13 @@ class MobileSession:
         self.plan: VelocityPlan | None = None
         self.controller: VelocityController | None = None
         self.diverged_at: float | None = None
+        self._commands: Commands | None = None
         self._commanded = self._input = np.zeros(self.robot.n)
+        self._nearest = math.inf
         self._script = deque(self.scene.events)
 
     def post(self, event: MobileEvent) -> None:
-        """Puts an event in the mailbox; it takes effect at the next tick, or leaves a notice."""
+        """Puts an event in the mailbox; it takes effect at the next control step, or leaves a notice."""
         self._mailbox.append(event)
 
     def drain(self) -> None:
@@ -181,8 +180,40 @@ class MobileSession:
 
     # ---------------------------------------------------------------- one tick
 
+    @property
+    def between(self) -> bool:
+        """Whether a control period has begun and is not over: what is posted now has to wait for its end."""
+        return self._commands is not None
+
+    @property
+    def step_s(self) -> float:
+        """Simulated time of the next `advance`, s."""
+        return command_step(self.settings.T_s)[1] if self._commands is None else self._commands.h
+
     def tick(self) -> Array:
         """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it)."""
+        row = self.advance()
+        while row is None:
+            row = self.advance()
+        return row
+
+    def advance(self) -> Array | None:
+        """One command to the servos, after planning if a control period begins; the row of `tick` when the
+        period is over, else None."""
+        if self._commands is None:
+            self._commands = self._decide()
+            self._nearest = self._clearance()
+        commands = self._commands
+        self.plant.step(commands.next(), commands.h)
+        self._nearest = min(self._nearest, self._clearance())
+        if not commands.done:
+            return None
+        self._commands = None
+        self._finish(self._row, commands)
+        return self._row
+
+    def _decide(self) -> Commands:
+        """From events and state to a plan; writes what is known at the period's start."""
         self.drain()
         settings = self.settings
         t, q, v = self.t, self.plant.q, self.plant.v
@@ -201,13 +232,24 @@ class MobileSession:
         fields = self.layout.fields
         row[fields["t"]], row[fields["q"]], row[fields["v"]] = t, q, v
         row[fields["place"]] = self.progress.place
-        write_plan(row, self.layout, plan)
-        self._write_truth(row, t, q, v, references)
-        self._command(row, plan)
+        write_plan(row, self.layout, plan, settings.lexicographic_delta)
+        at = Configuration(self.robot, self._data, q, v)
+        places = {level.name: place for place, level in enumerate(self._stack, start=1)}
+        write_truth(row, self.layout, at, self.roles, places, references)
+        return Commands(plan, htmpc.period, self._commanded)
+
+    def _finish(self, row: Array, commands: Commands) -> None:
+        """What the period brought."""
+        fields, U = self.layout.fields, commands.plan.motion.U
+        row[fields["tau"]] = row[fields["tau_demand"]] = commands.last
+        row[fields["acceleration"]], row[fields["clearance"]] = commands.sharpest, self._nearest
+        row[fields["jerk"]] = (U[0] - self._input) / min(commands.period, self.settings.htmpc.dt)
+        write_bounds(row, self.layout)
+        self._commanded, self._input = commands.last, U[0]
         if self.diverged_at is None and self._lost(row):
+            t = float(row[fields["t"]][0])
             self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
             self.diverged_at = t
-        return row
 
     def _direct(self) -> tuple[VelocityController, dict[str, Reference]]:
         """The controller, with the window as its stack, and the references of its tasks by name."""
@@ -238,45 +280,6 @@ class MobileSession:
         points = {name: task.value(at) for name, task in self.roles.items()}
         speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ v)) for name, task in self.roles.items()}
         return points, speeds
-
-    def _write_truth(
-        self, row: Array, t: float, q: Array, v: Array, references: Mapping[str, Reference]
-    ) -> None:
-        """Where the points really are, what is asked of them, and how far apart the two are."""
-        fields = self.layout.fields
-        at = Configuration(self.robot, self._data, q, v)
-        places = {level.name: place for place, level in enumerate(self._stack, start=1)}
-        for name, task in self.roles.items():
-            value = task.value(at)
-            row[fields[f"x/{name}"]] = quaternion(value) if value.ndim == 2 else value
-            if name not in references:
-                continue
-            wanted = references[name].preview(t, 1e-3, 0)
-            row[fields[f"x_d/{name}"]] = quaternion(wanted.value) if value.ndim == 2 else wanted.value
-            row[fields[f"v_d/{name}"]] = wanted.velocity[0]
-            row[fields[f"a_d/{name}"]] = wanted.acceleration[0]
-            row[fields[f"error/{name}"]] = task.error(value, wanted.value)
-            row[fields[f"level/{name}"]] = places[name]
-
-    def _command(self, row: Array, plan: VelocityPlan) -> None:
-        """Sends the plan to the servos as velocity commands at COMMAND_HZ, for one control period."""
-        period = self.settings.htmpc.period
-        count = max(1, round(period * COMMAND_HZ))
-        h = period / count
-        before = self._commanded
-        sharpest, clearance = np.zeros(self.robot.n), self._clearance()
-        for k in range(count):
-            command = plan.motion.velocity((k + 1) * h)
-            acceleration = (command - before) / h
-            sharpest = np.maximum(sharpest, np.abs(acceleration))
-            before = command
-            self.plant.step(command, h)
-            clearance = min(clearance, self._clearance())
-        fields = self.layout.fields
-        row[fields["tau"]] = row[fields["tau_demand"]] = before
-        row[fields["acceleration"]], row[fields["clearance"]] = sharpest, clearance
-        row[fields["jerk"]] = (plan.motion.U[0] - self._input) / min(period, self.settings.htmpc.dt)
-        self._commanded, self._input = before, plan.motion.U[0]
 
     def _lost(self, row: Array) -> bool:
         """Not finite or far too fast. A large error is no sign here: missions send the robot metres away."""

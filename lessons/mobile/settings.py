@@ -51,6 +51,27 @@ class MobileSettings:
         if self.controller not in VELOCITY_CONTROLLERS:
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
 
+    @property
+    def levels(self) -> Stack:
+        """One level per role."""
+        return self.htmpc.stack
+
+    @property
+    def horizon(self) -> int:
+        """N, knots."""
+        return self.htmpc.horizon
+
+    @property
+    def T_s(self) -> float:
+        """Control period, s."""
+        return self.htmpc.period
+
+    @property
+    def lexicographic_delta(self) -> float | None:
+        """δ of (12), m (or rad); None if levels below are held by something else."""
+        by_error = self.controller in ("htmpc", "htmpc_wpt") and self.htmpc.lexicographic == "per_coordinate"
+        return self.htmpc.delta_m if by_error else None
+
 
 _PARTS = ("limits", "plant")
 _OWN = ("controller", "compensate_delay")

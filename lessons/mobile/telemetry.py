@@ -2,38 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc import VelocityPlan
+from himpc.configuration import Configuration
+from himpc.htmpc import VelocityPlan, base_joints
+from himpc.references import Reference
+from himpc.rotation import quaternion
 from himpc.stack import Stack
-from himpc.telemetry import Layout, arranged
+from himpc.tasks import Task
+from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY, Layout, arranged
 from robots import Robot
 
 Array = NDArray[np.float64]
 
-_SCALARS = ("t", "step_us", "priority_leak", "unsolved", "place", "clearance")
+AT_ACCELERATION = AT_TORQUE
+"""Bit of `at_bound`: at velocity level the acceleration is what the torque is at torque level, the input."""
+_AT = 1e-3
+"""A value this share of its bound away from it is at the bound."""
+
+_SCALARS = ("t", "step_us", "priority_leak", "unsolved", "place", "clearance", "manipulability")
 _PER_JOINT = (
     "q",
     "v",
     "tau",
     "tau_demand",
     "v_limit",
+    "a_limit",
     "q_lower",
     "q_upper",
+    "at_bound",
     "acceleration",
     "jerk",
 )
-_PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active")
+_PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
 
 
 def layout_of(robot: Robot, roles: Stack) -> Layout:
     """Where each field of a row lies.
 
     Per joint besides the usual ones: `tau` is the velocity commanded from that tick on, `tau_demand` the
-    same, `acceleration` and `jerk` the command's. Per role the fields of a task and `level/<role>`, its
-    place in the window (NaN: it is not in it). Per level of the stack cost, kkt, rung, time_us, the accepted
-    line-search step and the number of active constraints.
+    same, `acceleration` and `jerk` the command's, `at_bound` the bits AT_ACCELERATION, AT_VELOCITY and
+    AT_POSITION. Per role the fields of a task and `level/<role>`, its place in the window (NaN: it is not in
+    it). Per level of the stack cost, kkt, rung, time_us, the accepted line-search step, the number of active
+    constraints and `bound`, see `write_plan`. `manipulability` is w = √det(J Jᵀ) of the hand's position under
+    the arm's joints alone, m³.
     """
     levels = tuple(level.name for level in roles)
     return arranged(robot, roles, levels, _SCALARS, _PER_JOINT, _PER_LEVEL, per_task=("level",))
@@ -43,14 +58,22 @@ RUNGS = ("solve", "widened", "keep")
 """What was needed to solve a level, in the order of need; see `himpc.htmpc.plan.LevelEvidence`."""
 
 
-def write_plan(row: Array, layout: Layout, plan: VelocityPlan) -> None:
-    """Writes what a plan knows into a row filled with NaN; a level that is no role's is left out."""
+def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
+    """Writes what a plan knows into a row filled with NaN; a level that is no role's is left out.
+
+    delta: δ of (12), m (or rad). It gives `bound`, what the levels below leave of a level's error at knot 1:
+    ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such bound.
+    """
     fields = layout.fields
     row[fields["step_us"]] = plan.step_us
     row[fields["priority_leak"]] = np.nan if plan.leak is None else plan.leak
     row[fields["unsolved"]] = plan.unsolved
-    row[fields["v_limit"]] = plan.bounds.v
+    row[fields["v_limit"]], row[fields["a_limit"]] = plan.bounds.v, plan.bounds.a
     row[fields["q_lower"]], row[fields["q_upper"]] = plan.bounds.q_lower, plan.bounds.q_upper
+    if delta is not None:
+        for level in plan.levels[:-1]:
+            if level.name in layout.levels:
+                row[fields[f"bound/{level.name}"]] = float(np.linalg.norm(np.abs(level.best[0]) + delta))
     for level in plan.levels:
         role = level.name
         if role in layout.levels:
@@ -60,3 +83,51 @@ def write_plan(row: Array, layout: Layout, plan: VelocityPlan) -> None:
             row[fields[f"time_us/{role}"]] = level.time_us
             row[fields[f"step/{role}"]] = float(np.mean(level.steps)) if level.steps else np.nan
             row[fields[f"active/{role}"]] = len(level.binding)
+
+
+def write_truth(
+    row: Array,
+    layout: Layout,
+    at: Configuration,
+    roles: Mapping[str, Task],
+    places: Mapping[str, int],
+    references: Mapping[str, Reference],
+) -> None:
+    """Writes where the points really are, what is asked of them now, and how far apart the two are.
+
+    places: of the roles in the window, 1 the first; references: of the same roles.
+    """
+    fields = layout.fields
+    t = float(row[fields["t"]][0])
+    for name, task in roles.items():
+        value = task.value(at)
+        row[fields[f"x/{name}"]] = quaternion(value) if value.ndim == 2 else value
+        if name not in references:
+            continue
+        wanted = references[name].preview(t, 1e-3, 0)
+        row[fields[f"x_d/{name}"]] = quaternion(wanted.value) if value.ndim == 2 else wanted.value
+        row[fields[f"v_d/{name}"]] = wanted.velocity[0]
+        row[fields[f"a_d/{name}"]] = wanted.acceleration[0]
+        row[fields[f"error/{name}"]] = task.error(value, wanted.value)
+        row[fields[f"level/{name}"]] = places[name]
+    row[fields["manipulability"]] = manipulability(at)
+
+
+def manipulability(at: Configuration) -> float:
+    """w = √det(J Jᵀ) with J (3, k) of the tip's position under the joints that are not the base's, m³."""
+    arm = [joint for joint in range(at.robot.n) if joint not in base_joints(at.robot)]
+    J = at.frame_jacobians()[0, :3, arm].T
+    return float(np.sqrt(max(0.0, np.linalg.det(J @ J.T))))
+
+
+def write_bounds(row: Array, layout: Layout) -> None:
+    """Writes which joints are at a bound: their command, its acceleration, or their position."""
+    fields = layout.fields
+    q, lower, upper = row[fields["q"]], row[fields["q_lower"]], row[fields["q_upper"]]
+    near = 1.0 - _AT
+    with np.errstate(invalid="ignore"):
+        room = np.where(np.isfinite(upper - lower), _AT * (upper - lower), 0.0)
+        marks = AT_ACCELERATION * (row[fields["acceleration"]] >= near * row[fields["a_limit"]])
+        marks = marks + AT_VELOCITY * (np.abs(row[fields["tau"]]) >= near * row[fields["v_limit"]])
+        marks = marks + AT_POSITION * ((q <= lower + room) | (q >= upper - room))
+    row[fields["at_bound"]] = marks

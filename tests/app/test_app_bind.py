@@ -16,7 +16,8 @@ from viser import _messages
 
 from app.panels import bind
 from app.panels.bind import Bindings, Wish
-from lessons.events import Event, Set
+from lessons.events import Set
+from lessons.kinds import AnyEvent
 from lessons.scenes import load_scene
 from lessons.settings import SceneSettings, changed
 
@@ -37,7 +38,7 @@ class Panel:
     """One slider of N with its bindings, and a browser that changes it through viser's own handler."""
 
     def __init__(self, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.posted: list[Event] = []
+        self.posted: list[AnyEvent] = []
         self.gui, self.loop = server.gui, server.get_event_loop()
         monkeypatch.setattr(self.gui, "_resolve_client", lambda _: object())
         self.slider = self.gui.add_slider("N", min=1, max=30, step=1, initial_value=5)

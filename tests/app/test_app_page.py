@@ -34,6 +34,7 @@ from app.learner import Learner
 from app.messages import Load, SceneChoice
 from app.process import wait_until
 from app.server import PageServer
+from lessons.settings import SceneSettings
 from robots import CATALOG
 
 
@@ -140,7 +141,10 @@ def test_N_and_M_bar_change_while_it_runs(page: Page, learner: Learner) -> None:
     set_number(page, "M̄ scale", 1.5)
     settings = learner.settings
     assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 10)
-    assert eventually(page, lambda: learner.settings is not None and learner.settings.M_bar_scale == 1.5)
+    assert eventually(
+        page,
+        lambda: isinstance(learner.settings, SceneSettings) and learner.settings.M_bar_scale == 1.5,
+    )
     assert settings is not None and learner.failure is None
     expect(page.get_by_text("spectral radius")).to_be_visible()
     tab(page, "Plant")

@@ -1,0 +1,129 @@
+"""The face of a torque-level scene: one draggable target, a stack of levels, M̄, and a plant with dynamics."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import viser
+
+from app.faces.face import Context
+from app.hand import Hand
+from app.messages import Status
+from app.palette import LEVELS
+from app.panels.controller import ControllerPanel
+from app.panels.joints import JointPlots
+from app.panels.plant import PlantPanel
+from app.panels.plots import LevelPlots
+from app.panels.snapshot import Snapshot
+from app.panels.start import StartPanel
+from app.panels.tasks import TasksPanel
+from app.view.coordinates import draggable
+from app.view.robot import camera_for
+from app.view.target import Frames
+from app.view.trails import Trails
+from lessons.events import Set
+from lessons.settings import SceneSettings
+
+
+class TorqueFace:
+    """See `app.faces.face.Face`."""
+
+    fastest: ClassVar[float] = 1.0
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+
+    # ---------------------------------------------------------------- building
+
+    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+        context = self._context
+        ready, bindings, settings = context.ready, context.bindings, context.settings
+        by_hand = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
+        with tabs.add_tab("Start"):
+            self._start = StartPanel(gui, context.post, ready.robot.joint_names, by_hand, context.dark)
+        with tabs.add_tab("Tasks"):
+            self._tasks = TasksPanel(gui, bindings, settings, context.colours, lambda: context.settings)
+        with tabs.add_tab("Control"):
+            self._controller = ControllerPanel(gui, bindings, settings, ready.robot)
+        with tabs.add_tab("Plant"):
+            PlantPanel(gui, bindings, settings, ready.robot)
+        self._start.on_theme = context.theme
+        self._start.on_recall = self._recall
+
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+        with plots.add_tab("Errors"):
+            self._level_plots = LevelPlots(gui, self._context.ready, self._context.colours)
+        with plots.add_tab("Joints"):
+            self._joint_plots = JointPlots(gui, self._context.ready.robot)
+
+    def add_scene(self, scene: viser.SceneApi) -> None:
+        context, ready = self._context, self._context.ready
+        poses = context.poses()
+        tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
+        status = context.learner.status
+        reach = camera_for(ready.robot)[2]
+        self._frames = Frames(scene)
+        self._hand = Hand(
+            scene,
+            ready,
+            context.colours,
+            {} if status is None else status.targets,
+            tip,
+            float(np.clip(0.2 * reach, 0.12, 0.4)),
+            context.post,
+            lambda: bool(self._start.clamp.value),
+            self._start.dragged,
+        )
+        curves = [
+            (task.path, context.colours[task.level])
+            for task in ready.tasks
+            if task.kind == "position" and task.path is not None
+        ]
+        position = draggable(ready.tasks)[0]
+        self._trails = Trails(
+            scene, curves, LEVELS[0] if position is None else context.colours[position.level]
+        )
+
+    # ---------------------------------------------------------------- events out
+
+    def toggle(self, place: int) -> Set | None:
+        return self._tasks.toggle(place)
+
+    def _recall(self) -> None:
+        poses = self._context.poses()
+        if poses is not None:
+            self._hand.recall(poses[-1])
+
+    # ---------------------------------------------------------------- following
+
+    def follow(self, status: Status, poses: np.ndarray) -> None:
+        self._frames.actual(poses[-1])
+        self._trails.add(status.t, poses[-1, :3])
+
+    def after_reset(self, status: Status) -> None:
+        self._trails.clear()
+        self._hand.after_reset(status.targets)
+
+    def draw(self, status: Status) -> None:
+        context = self._context
+        learner, settings = context.learner, context.settings
+        self._frames.show(bool(self._start.frames.value))
+        self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
+        latest = learner.read(lambda _, history: history.latest)
+        self._hand.show(self._frames, settings, latest, context.ready.layout.fields)
+        self._trails.draw(status.path, settings.T_s)
+        learner.read(lambda _, history: self._level_plots.draw(history, settings.T_s))
+        learner.read(lambda _, history: self._joint_plots.draw(history, settings.T_s))
+
+    def write(self, now: Snapshot[SceneSettings]) -> None:
+        if now.status.gauge is not None:
+            fields = now.ready.layout.fields
+            # The snapshot's row is its own copy.
+            now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
+        self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
+        self._tasks.update(now)
+        self._controller.update(now)
+
+    def close(self) -> None:
+        self._hand.close()

@@ -1,0 +1,52 @@
+"""The velocity commands of one control period, as the servos get them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc import VelocityPlan
+
+Array = NDArray[np.float64]
+
+COMMAND_HZ = 100.0
+"""How often the servos get a new velocity, as on the authors' robot."""
+
+
+def command_step(period: float) -> tuple[int, float]:
+    """(commands in a control period, s between two)."""
+    count = max(1, round(period * COMMAND_HZ))
+    return count, period / count
+
+
+class Commands:
+    """A plan on its way to the servos.
+
+    Attributes:
+        plan: the plan.
+        period: s, for which it is carried out.
+        h: s between two commands.
+        last: the last command given, (n,) rad/s (m/s).
+        sharpest: the largest |acceleration| so far, (n,) rad/s² (m/s²).
+    """
+
+    def __init__(self, plan: VelocityPlan, period: float, before: Array) -> None:
+        """before: the command given last, (n,)."""
+        self.plan, self.period = plan, period
+        self._count, self.h = command_step(period)
+        self._given = 0
+        self.last = before
+        self.sharpest = np.zeros_like(before)
+
+    def next(self) -> Array:
+        """The next command, (n,)."""
+        self._given += 1
+        command = self.plan.motion.velocity(self._given * self.h)
+        self.sharpest = np.maximum(self.sharpest, np.abs((command - self.last) / self.h))
+        self.last = command
+        return command
+
+    @property
+    def done(self) -> bool:
+        """Whether all commands of the period were given."""
+        return self._given == self._count
