@@ -23,40 +23,42 @@ from app.messages import (
 )
 from app.runs import start
 from lessons.events import Reset
-from lessons.kinds import AnySession, AnySettings, find_scene
+from lessons.kinds import AnyScene, AnySession, AnySettings, find_scene, prepared
 from robots import InputError
 
 
 class Body:
     """A session, whether it plays and how fast, and the memory its telemetry goes to."""
 
-    def __init__(self, choice: SceneChoice, seed: int = 0) -> None:
+    def __init__(self, choice: SceneChoice) -> None:
         """Raises InputError for a scene or robot that cannot be loaded."""
         self.running = True
         self.speed = 1.0
         self.ticks = 0
         self.over_budget = 0
+        self.late = 0
         self.resets = 0
-        self._seed = seed
         self._steps = 0
         self._sent: AnySettings | None = None
         self._enter(choice)
 
     def _enter(self, choice: SceneChoice) -> None:
-        scene = find_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text)
-        self.run = start(scene, self._seed)
+        scene = scene_of(choice)
+        self.run = start(scene, choice.seed)
         self.scene, self.choice = scene, choice
         robot = self.session.robot
         self._data = robot.model.createData()
         self._tip = robot.frame_id(robot.tip)
         self._poses = np.zeros((robot.n + 1, 7))
-        self._step_us = self.session.layout.fields["step_us"].start
+        fields = self.session.layout.fields
+        self._step_us = fields["step_us"].start
+        self._late = fields["late"].start if "late" in fields else None
         self.block = Block.for_robot(robot, self.session.layout.size)
         self._fresh_start()
         self.write_poses()
 
     def _fresh_start(self) -> None:
-        self.ticks = self.over_budget = self._steps = 0
+        self.ticks = self.over_budget = self.late = self._steps = 0
         self.resets += 1
         self._sent = None
 
@@ -86,7 +88,7 @@ class Body:
             case Speed(factor):
                 self.speed = factor
             case ResetAll():
-                self.run = start(self.scene, self._seed)
+                self.run = start(self.scene, self.choice.seed)
                 self._fresh_start()
                 self.running, self.speed = True, 1.0
                 self.write_poses()
@@ -127,6 +129,7 @@ class Body:
         self.block.write(row)
         self.ticks += 1
         self.over_budget += bool(row[self._step_us] > 1e6 * self.session.settings.T_s)
+        self.late += self._late is not None and bool(row[self._late])
         return True
 
     def _finish_period(self) -> None:
@@ -181,6 +184,7 @@ class Body:
             real_time_factor=real_time_factor,
             capped=capped,
             over_budget=self.over_budget,
+            late=self.late,
             resets=self.resets,
             targets=run.targets(),
             path=run.path() if ran else np.zeros((0, 3)),
@@ -194,6 +198,11 @@ class Body:
     def close(self) -> None:
         """Frees the memory; for use without a page, which otherwise does it."""
         self.block.close(unlink=True)
+
+
+def scene_of(choice: SceneChoice) -> AnyScene:
+    """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
+    return prepared(find_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text), None, choice.set)
 
 
 def _pose(placement: pin.SE3) -> np.ndarray:

@@ -14,12 +14,15 @@ from robots import Robot
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """Which scene to load, and for `hold` which robot."""
+    """Which scene to load, for `hold` which robot, and with which settings and seed: assignments
+    "PATH=VALUE" on top of the scene's own."""
 
     name: str
     urdf: str | None = None
     tip: str | None = None
     urdf_text: str | None = None
+    set: tuple[str, ...] = ()
+    seed: int = 0
 
 
 # ------------------------------------------------------------------ page → simulation
@@ -162,10 +165,10 @@ class Status:
     """What is not worth sending every tick; about ten times a second.
 
     real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
-    over_budget: ticks whose control step took longer than T_s; resets: how often the scene was reset (the
-    page then puts its gizmo back); targets: raw targets by task; path: (N + 1, 3) predicted tip, m;
-    settings: only after a change; gauge: norm and spectral radius of I − M⁻¹M̄ while paused, when no row of
-    telemetry tells them; mission: for scenes that have one.
+    over_budget: ticks whose control step took longer than T_s; late: ticks that missed their deadline;
+    resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
+    path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
+    I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one.
     """
 
     t: float
@@ -175,6 +178,7 @@ class Status:
     real_time_factor: float
     capped: bool
     over_budget: int
+    late: int
     resets: int
     targets: dict[str, np.ndarray]
     path: np.ndarray

@@ -17,24 +17,25 @@ from urllib.parse import urlsplit
 import viser
 from viser import _messages, infra
 
+from app.body import scene_of
 from app.messages import SceneChoice
 from app.page import Page
+from app.runs import start
 from app.sessions import GRACE, Sessions
 from app.text import block
-from lessons.scenes import load_scene
 from robots import InputError
 from robots.shapes import link_shapes
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
+FIRST = SceneChoice("iiwa14-hold")
+"""What the page shows if nothing else is asked for."""
 
 
 def serve(
+    choice: SceneChoice = FIRST,
     *,
-    scene: str = "iiwa14-hold",
-    urdf: str | None = None,
-    tip: str | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
     max_sessions: int = 4,
@@ -42,7 +43,7 @@ def serve(
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host or port that
     cannot be used."""
-    server = PageServer(SceneChoice(scene, urdf, tip), host, port, max_sessions)
+    server = PageServer(choice, host, port, max_sessions)
     stop = threading.Event()
     try:
         with _ended_by_signals(stop):
@@ -85,7 +86,7 @@ class PageServer:
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         # Loaded here once, so that a wrong name or file is one sentence on the terminal, not in a page.
-        robot = load_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text).robot
+        robot = start(scene_of(choice), choice.seed).session.robot
         _check_address(host, port)
         # A tab may close between two lines of ours; that is no news for the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)

@@ -44,6 +44,7 @@ _SCALARS = (
     "gauge_radius",
     "unsolved",
     "iterations",
+    "late",
 )
 _PER_JOINT = (
     "q",

@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 from himpc.controllers import CONTROLLERS
-from lessons.events import Event
-from lessons.mobile.events import MobileEvent
+from lessons.events import Event, MoveLevel, Set
+from lessons.levels import moved
+from lessons.mobile.events import Appear, MobileEvent
 from lessons.mobile.run import mobile_run
 from lessons.mobile.scene import MobileScene
 from lessons.mobile.session import MobileSession
-from lessons.mobile.settings import VELOCITY_CONTROLLERS, MobileSettings
+from lessons.mobile.settings import VELOCITY_CONTROLLERS, MobileSettings, with_obstacle
 from lessons.mobile.settings import changed as changed_mobile
 from lessons.mobile.settings import paths as mobile_paths
 from lessons.mobile.summary import MobileRecording, mobile_arrays, mobile_summary
@@ -71,6 +72,33 @@ def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]
     return replace(scene, settings=mobile)
 
 
+def changed_any(settings: AnySettings, path: str, value: Any) -> AnySettings:
+    """The settings of either kind with the value at a path replaced. Raises InputError like `changed`."""
+    if isinstance(settings, SceneSettings):
+        return changed(settings, path, value)
+    return changed_mobile(settings, path, value)
+
+
+def settings_after(settings: AnySettings, events: Iterable[AnyEvent]) -> AnySettings:
+    """The settings that events leave behind when the run is reset.
+
+    Args:
+        settings: before.
+        events: that took effect, in order. Most change the run alone, which a reset undoes.
+    """
+    for event in events:
+        match event:
+            case Set(path, value):
+                settings = changed_any(settings, path, value)
+            case MoveLevel(name, to) if isinstance(settings, SceneSettings):
+                settings = replace(settings, levels=moved(settings.levels, name, to))
+            case Appear() if isinstance(settings, MobileSettings):
+                settings = with_obstacle(settings, event.ball())
+            case _:
+                pass
+    return settings
+
+
 def paths_of(scene: AnyScene) -> list[str]:
     """Every path that `prepared` takes for a scene."""
     return paths(scene.settings) if isinstance(scene, Scene) else mobile_paths(scene.settings)
@@ -86,11 +114,12 @@ def run_scene(
     duration: float | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
+    to_the_end: bool = False,
 ) -> AnyRecording:
     """Runs a scene headless; see `lessons.run.run` and `lessons.mobile.run.mobile_run`."""
     if isinstance(scene, Scene):
-        return run(scene, duration, seed, progress)
-    return mobile_run(scene, duration, seed, progress)
+        return run(scene, duration, seed, progress, to_the_end)
+    return mobile_run(scene, duration, seed, progress, to_the_end)
 
 
 def summary_of(recording: AnyRecording) -> dict[str, Any]:

@@ -30,7 +30,11 @@ def parse_assignment(text: str) -> tuple[str, Any]:
         raise InputError(f"--set {text}: write it as PATH=VALUE, e.g. --set horizon=10")
     try:
         return path, json.loads(value, parse_constant=_refuse_constant(text))
-    except json.JSONDecodeError:
+    except RecursionError:
+        raise InputError(f"--set {path}: the list is nested too deeply; give a number or a list") from None
+    except InputError:
+        raise
+    except ValueError:
         if value.lower() in ("nan", "inf", "-inf", "infinity", ""):
             raise InputError(
                 f"--set {text}: '{value}' is no finite number; give one, e.g. {path}=1"
@@ -57,6 +61,7 @@ def run(
     duration: float | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
+    to_the_end: bool = False,
 ) -> Recording:
     """Runs a scene from its start.
 
@@ -65,14 +70,18 @@ def run(
         duration: simulated seconds; None: the scene's own.
         seed: seed of the run.
         progress: called now and then with the share that is done.
+        to_the_end: go on after control was lost, as the page does; otherwise the run ends there.
 
     Returns:
-        the rows. A run that loses control ends there.
+        the rows.
     """
     seconds = checked_duration(scene.duration if duration is None else duration)
     session = Session(scene, seed)
-    ticks = max(1, round(seconds / session.settings.T_s))
-    rows, wall_s = repeated(session.tick, ticks, lambda: session.diverged_at is not None, progress)
+
+    def ended() -> bool:
+        return session.diverged_at is not None and not to_the_end
+
+    rows, wall_s = repeated(session.tick, lambda: session.settings.T_s, seconds, ended, progress)
     return Recording(session, rows, wall_s)
 
 
@@ -85,17 +94,32 @@ def checked_duration(seconds: float) -> float:
 
 def repeated(
     tick: Callable[[], Array],
-    ticks: int,
+    period: Callable[[], float],
+    seconds: float,
     ended: Callable[[], bool],
     progress: Callable[[float], None] | None = None,
 ) -> tuple[list[Array], float]:
-    """Copies of the rows of so many ticks, fewer if the run ends by itself, and the wall time in s."""
-    rows = []
+    """Ticks for so many simulated seconds, at least once.
+
+    Args:
+        tick: one control period; its row is a buffer.
+        period: s, the period in force: it may change on the way.
+        seconds: how long.
+        ended: whether the run ends by itself.
+        progress: called now and then with the share that is done.
+
+    Returns:
+        copies of the rows, and the wall time in s.
+    """
+    rows: list[Array] = []
+    elapsed = 0.0
     started = perf_counter()
-    for k in range(ticks):
+    # Half a period's tolerance: a sum of periods carries rounding.
+    while not rows or elapsed < seconds - 0.5 * period():
         rows.append(tick().copy())
+        elapsed += period()
         if ended():
             break
-        if progress is not None and k % 200 == 0:
-            progress(k / ticks)
+        if progress is not None and len(rows) % 200 == 1:
+            progress(elapsed / seconds)
     return rows, perf_counter() - started

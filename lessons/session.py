@@ -18,14 +18,15 @@ from himpc.rotation import quaternion
 from himpc.stack import Stack
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import Layout, layout_of, write_plan
+from lessons.deadline import Outbox
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.handover import Handover, settled
+from lessons.levels import moved
 from lessons.scene import Scene
 from lessons.settings import SceneSettings, changed
 from lessons.targets import move_target, target_at
 from lessons.truth import dynamic_leak
 from robots import InputError, Plant, convergence_gauge
-from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
 
@@ -87,6 +88,7 @@ class Session:
         self._script = deque(scene.events)
         self._push_until = math.inf
         self._ticks = 0
+        self._outbox = Outbox()
         self._hands = _hands(self.settings.levels)
         self._truth = (math.nan, math.nan, math.nan)
 
@@ -129,7 +131,7 @@ class Session:
             case Set(path, value):
                 self._adopt(changed(self.settings, path, value))
             case MoveLevel(level, to):
-                self._adopt(replace(self.settings, levels=_moved(self.settings.levels, level, to)))
+                self._adopt(replace(self.settings, levels=moved(self.settings.levels, level, to)))
             case MoveTarget(task, value):
                 tasks = {each.name: each for each in _tasks(self.settings.levels)}
                 move_target(tasks, self.references, task, value)
@@ -182,7 +184,9 @@ class Session:
         self._write_references(row, previews)
         self._write_truth(row, plan, q)
         self.plan = plan
-        row[fields["tau"]] = plant.step(plan.tau, T_s)
+        late = settings.is_late(1e-3 * plan.step_us)
+        row[fields["late"]] = late
+        row[fields["tau"]] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
@@ -261,16 +265,3 @@ def _hands(stack: Stack) -> tuple[str, ...]:
     """Names of the position tasks of the first level that is on."""
     first = next((level.tasks for level in stack if level.enabled), ())
     return tuple(task.name for task in first if isinstance(task, FramePosition))
-
-
-def _moved(stack: Stack, name: str, to: int) -> Stack:
-    names = [level.name for level in stack]
-    if name not in names:
-        raise unknown_name("level", name, names)
-    if not 0 <= to < len(stack):
-        raise InputError(
-            f"level '{name}' cannot go to place {to}: the stack has places 0 to {len(stack) - 1}"
-        )
-    levels = list(stack)
-    levels.insert(to, levels.pop(names.index(name)))
-    return tuple(levels)

@@ -11,6 +11,7 @@ from himpc.controllers import CONTROLLERS, Settings
 from himpc.limits import Limits
 from himpc.references import Reference
 from himpc.stack import Level, Stack
+from lessons.levels import ordered
 from lessons.values import number, typed, weight
 from robots import InputError, NominalSettings, PlantSettings, Robot
 from robots.errors import unknown_name
@@ -38,6 +39,10 @@ class SceneSettings:
         M_bar: diagonal of M̄ before scaling.
         M_bar_scale: factor on all of it.
         nominal: what model-based controllers believe the plant to be.
+        deadline_ms: a torque that is found later than this after its tick began acts one tick later; see
+            `lessons.deadline`. 0: lockstep, time stands still while the controller computes.
+        solve_ms_per_knot: how long the computer is assumed to take for each of the N knots, so that runs are
+            the same everywhere. 0: the time it really takes, and then no two runs are the same.
         plant: what the plant really is.
         options: the scene's own choices, if it has any.
     """
@@ -52,6 +57,8 @@ class SceneSettings:
     route: Literal["structured", "explicit"] = "structured"
     solver: Literal["daqp", "proxqp", "qpoases"] = "daqp"
     damping: bool = True
+    deadline_ms: float = 0.0
+    solve_ms_per_knot: float = 0.1
     limits: Limits = field(default_factory=Limits)
     nominal: NominalSettings = field(default_factory=NominalSettings)
     plant: PlantSettings = field(default_factory=PlantSettings)
@@ -63,6 +70,9 @@ class SceneSettings:
             raise unknown_name("controller", self.controller, CONTROLLERS)
         if not (math.isfinite(self.M_bar_scale) and self.M_bar_scale > 0):
             raise InputError(f"M_bar_scale is {self.M_bar_scale}: give a finite number above 0, e.g. 1")
+        for name in ("deadline_ms", "solve_ms_per_knot"):
+            if not 0.0 <= getattr(self, name) <= MAX_MS:
+                raise InputError(f"{name} is {getattr(self, name)}: give a number from 0 to {MAX_MS:g}")
         return Settings(
             stack=self.levels,
             M_bar=tuple(float(value) * self.M_bar_scale for value in self.M_bar),
@@ -76,6 +86,15 @@ class SceneSettings:
             nominal=self.nominal,
         )
 
+    def is_late(self, measured_ms: float) -> bool:
+        """Whether a torque that took so long to compute misses its deadline."""
+        assumed = self.solve_ms_per_knot * self.horizon
+        # N times a decimal fraction must not miss a deadline that it exactly meets.
+        return 0.0 < self.deadline_ms < (assumed or measured_ms) - 1e-9
+
+
+MAX_MS = 1e3
+"""Largest deadline and time per knot."""
 
 _LEVEL_KEYS = ("Q", "R", "horizon", "enabled", "K_p", "K_v")
 _TASK_KEYS = ("K_p", "K_v")
@@ -86,7 +105,8 @@ _PARTS = ("limits", "nominal", "plant")
 def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
     """The settings with the value at a path replaced.
 
-    Paths: a field ("horizon", "M_bar", …); "Q" or "R" for all levels (one number, or one per level);
+    Paths: a field ("horizon", "M_bar", …); "order", the names of all levels, highest priority first
+    ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
     "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p, K_v
     (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY"; the fields of
     the scene's options. Where a value holds one number per joint ("M_bar", "plant.inertia_scale", …), a place
@@ -101,6 +121,8 @@ def changed(settings: SceneSettings, path: str, value: Any) -> SceneSettings:
         return changed(settings, whole, _one_joint(settings, path, whole, int(place), value))
     if head in _EVERY_LEVEL and not rest:
         return _every_level(settings, head, value)
+    if path == "order":
+        return replace(settings, levels=ordered(settings.levels, value))
     if head == "levels":
         return _in_level(settings, path, rest, value)
     if head == "tasks":
@@ -127,6 +149,7 @@ def paths(settings: SceneSettings) -> list[str]:
     return [
         *_plain_fields(),
         *_option_fields(settings),
+        "order",
         *_EVERY_LEVEL,
         *(f"levels.{place}.{key}" for place in range(1, len(settings.levels) + 1) for key in _LEVEL_KEYS),
         *(f"levels.{level.name}.{key}" for level in settings.levels for key in _LEVEL_KEYS),
@@ -138,6 +161,22 @@ def paths(settings: SceneSettings) -> list[str]:
         ),
         *(f"{part}.{f.name}" for part in _PARTS for f in fields(getattr(settings, part))),
     ]
+
+
+def value_at(settings: SceneSettings, path: str) -> Any:
+    """The value at one of `paths`, but for "Q" and "R" of all levels and the gains of a level."""
+    head, _, rest = path.partition(".")
+    if path == "order":
+        return tuple(level.name for level in settings.levels)
+    if head == "levels":
+        name, _, key = rest.rpartition(".")
+        return next(getattr(level, key) for level in settings.levels if level.name == name)
+    if head == "tasks":
+        name, _, key = rest.rpartition(".")
+        tasks = (task for level in settings.levels for task in level.tasks)
+        return next(getattr(task, key) for task in tasks if task.name == name)
+    owner = settings.options if path in _option_fields(settings) else settings
+    return getattr(getattr(settings, head), rest) if rest else getattr(owner, path)
 
 
 def _per_joint(settings: SceneSettings) -> list[str]:

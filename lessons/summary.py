@@ -89,6 +89,7 @@ def summary(recording: Recording) -> dict[str, Any]:
             "p99": float(np.percentile(step_ms, 99)),
             "max": float(step_ms.max()),
         },
+        "late_ticks": int(recording["late"].sum()),
         "real_time_factor": recording.duration / recording.wall_s,
     }
     return finite(data)

@@ -23,9 +23,13 @@ def number(path: str, value: Any) -> float:
     """A finite number. Raises InputError, naming the path, for anything else."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InputError(f"{path} is {value!r}: give a number")
-    if not math.isfinite(value):
+    try:
+        finite_number = float(value)
+    except OverflowError:
+        raise InputError(f"{path} has {len(str(abs(value)))} digits: give a smaller number") from None
+    if not math.isfinite(finite_number):
         raise InputError(f"{path} is {value}: give a finite number")
-    return float(value)
+    return finite_number
 
 
 def typed(path: str, old: Any, value: Any) -> Any:
@@ -43,9 +47,12 @@ def typed(path: str, old: Any, value: Any) -> Any:
         if whole != int(whole):
             raise InputError(f"{path} is {value}: give a whole number")
         return int(whole)
+    per_joint = path.startswith(("nominal.", "plant."))
+    if isinstance(old, float) and not per_joint:
+        return number(path, value)
     if isinstance(old, tuple) and not isinstance(value, (list, tuple, np.ndarray)):
         number(path, value)
-        if path.startswith(("nominal.", "plant.")):
+        if per_joint:
             return float(value)
         raise InputError(f"{path} is {value!r}: give a list of {len(old)} numbers, e.g. {list(old)}")
     return weight(path, value)

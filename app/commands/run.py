@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -10,14 +11,18 @@ from app.commands.output import print_table, write_json
 from app.commands.progress import progress_bar
 from robots import InputError
 
+if TYPE_CHECKING:
+    from lessons.state import State
+
 
 def run(
-    scene: tyro.conf.Positional[str],
+    scene: tyro.conf.Positional[str | None] = None,
     urdf: str | None = None,
     tip: str | None = None,
     controller: str | None = None,
     duration: float | None = None,
-    seed: int = 0,
+    seed: int | None = None,
+    state: str | None = None,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
     json: str | None = None,
     npz: str | None = None,
@@ -25,30 +30,54 @@ def run(
     """Run a scene headless, as fast as it goes.
 
     Args:
-        scene: name of a scene; see himpc-lab scenes.
+        scene: name of a scene; see himpc-lab scenes. Not with --state.
         urdf: URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
         controller: which controller instead of the scene's own; see himpc-lab controllers.
         duration: simulated seconds; the scene's own by default.
-        seed: seed of the run.
+        seed: seed of the run; 0, or the state's, by default.
+        state: a state code, as the page shows it: its scene, robot, settings and seed.
         set: change a setting, e.g. --set horizon=10 --set plant.payload_kg=2 --set levels.2.enabled=false.
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
-    from lessons.kinds import arrays_of, find_scene, prepared, run_scene, summary_of
+    from lessons.kinds import arrays_of, prepared, run_scene, summary_of
 
-    loaded = prepared(find_scene(scene, urdf, tip), controller, set)
-    with progress_bar(f"{scene} …", json is None) as progress:
-        recording = run_scene(loaded, duration, seed, progress)
+    given = _given(scene, urdf, tip, state)
+    given = replace(given, seed=given.seed if seed is None else seed)
+    loaded = prepared(given.prepared(), controller, set)
+    with progress_bar(f"{given.scene} …", json is None) as progress:
+        recording = run_scene(loaded, duration, given.seed, progress)
     result = summary_of(recording)
     if npz is not None:
-        how = {"scene": scene, "urdf": urdf, "tip": tip, "controller": result["controller"], "seed": seed}
-        _save(npz, arrays_of(recording, {**how, "duration": recording.duration, "set": list(set)}))
+        how = {
+            "scene": given.scene,
+            "urdf": given.urdf,
+            "tip": given.tip,
+            "controller": result["controller"],
+            "seed": given.seed,
+            "duration": recording.duration,
+            "set": [*given.set, *set],
+        }
+        _save(npz, arrays_of(recording, how))
     if json is not None:
         write_json(result, json)
     else:
         _show(result)
     return 0
+
+
+def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> State:
+    """What to run: the scene that was named, or the state of a code."""
+    from lessons.state import State, decode
+
+    if code is None:
+        if scene is None:
+            raise InputError("run needs a scene, e.g. himpc-lab run iiwa14-hold, or --state CODE")
+        return State(scene, urdf, tip)
+    if (scene, urdf, tip) != (None, None, None):
+        raise InputError("--state brings its own scene and robot: leave out the scene, --urdf and --tip")
+    return decode(code)
 
 
 def _save(path: str, data: dict[str, Any]) -> None:

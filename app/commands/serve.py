@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from robots import InputError
+
 
 def serve(
     scene: str | None = None,
     urdf: str | None = None,
     tip: str | None = None,
+    state: str | None = None,
     max_sessions: int = 4,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -18,17 +21,27 @@ def serve(
         scene: scene to start with; iiwa14-hold by default, hold with --urdf.
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
+        state: a state code, as the page shows it: its scene, robot, settings and seed.
         max_sessions: how many people may use it at once.
         host: address to listen on; only this machine can reach the default.
         port: port to listen on.
         no_browser: do not open a browser.
     """
+    from app.messages import SceneChoice
+    from app.server import FIRST
     from app.server import serve as serve_page
 
+    if state is None:
+        choice = SceneChoice(scene or ("hold" if urdf else FIRST.name), urdf, tip)
+    else:
+        from lessons.state import decode
+
+        if (scene, urdf, tip) != (None, None, None):
+            raise InputError("--state brings its own scene and robot: leave out --scene, --urdf and --tip")
+        given = decode(state)
+        choice = SceneChoice(given.scene, given.urdf, given.tip, set=given.set, seed=given.seed)
     return serve_page(
-        scene=scene or ("hold" if urdf else "iiwa14-hold"),
-        urdf=urdf,
-        tip=tip,
+        choice,
         host=host,
         port=port,
         max_sessions=max_sessions,

@@ -76,11 +76,35 @@ class ArchitectureOptions(MobileOptions):
 
 
 @dataclass(frozen=True)
-class Stay(MobileOptions):
+class OrderOptions(MobileOptions):
+    """Scenes whose tasks last for the whole run, so that one may choose which comes first.
+
+    Attributes:
+        order: the roles, highest priority first; empty: as the scene has them.
+    """
+
+    order: tuple[str, ...] = ()
+
+    def in_order(self, tasks: Mission) -> Mission:
+        """The tasks by the priorities of their roles. Raises InputError if a role is missing or unknown."""
+        if not self.order:
+            return tasks
+        by_role = {task.role: task for task in tasks}
+        if sorted(self.order) != sorted(by_role):
+            raise InputError(
+                f"order is {list(self.order)}: give every role once, e.g. order={','.join(by_role)}"
+            )
+        return tuple(by_role[role] for role in self.order)
+
+
+@dataclass(frozen=True)
+class Stay(OrderOptions):
     """Both targets stay where they are until somebody drags them."""
 
     def mission(self, home: Home) -> Mission:
-        return tuple(MissionTask(role, role, _staying(point), hold=None) for role, point in home.items())
+        return self.in_order(
+            tuple(MissionTask(role, role, _staying(point), hold=None) for role, point in home.items())
+        )
 
 
 def _staying(point: Array) -> Go | Follow:
@@ -88,7 +112,7 @@ def _staying(point: Array) -> Go | Follow:
 
 
 @dataclass(frozen=True)
-class SquareOptions(MobileOptions):
+class SquareOptions(OrderOptions):
     """Section V-A: the EE holds its home position while the base is sent to a peak and back.
 
     Attributes:
@@ -113,9 +137,11 @@ class SquareOptions(MobileOptions):
 
     def mission(self, home: Home) -> Mission:
         wave = SquareWave(np.array(self.peak), home["base"], self.half_period, waves=1)
-        return (
-            MissionTask("ee", "ee", Follow(Hold(home["ee"]))),
-            MissionTask("base", "base", Follow(wave)),
+        return self.in_order(
+            (
+                MissionTask("ee", "ee", Follow(Hold(home["ee"]))),
+                MissionTask("base", "base", Follow(wave)),
+            )
         )
 
 
@@ -173,6 +199,9 @@ SEATS: tuple[tuple[tuple[float, float, float], tuple[float, float]], ...] = (
 )
 """(hand of the person, place of the base), m, anticlockwise from (2.5, 1)."""
 
+MAX_VISITS = 100
+"""Per round, and rounds: a mission is a list of all its tasks."""
+
 
 @dataclass(frozen=True)
 class DeliveryOptions(ArchitectureOptions):
@@ -194,8 +223,10 @@ class DeliveryOptions(ArchitectureOptions):
         super().__post_init__()
         if not self.seats or any(seat not in range(len(SEATS)) for seat in self.seats):
             raise InputError(f"seats are {list(self.seats)}: give whole numbers from 0 to {len(SEATS) - 1}")
-        if self.rounds < 1:
-            raise InputError(f"rounds is {self.rounds}: give 1 or more")
+        if len(self.seats) > MAX_VISITS:
+            raise InputError(f"seats has {len(self.seats)} entries: give at most {MAX_VISITS}")
+        if not 1 <= self.rounds <= MAX_VISITS:
+            raise InputError(f"rounds is {self.rounds}: give 1 to {MAX_VISITS}")
 
     def mission(self, home: Home) -> Mission:
         tasks: list[MissionTask] = []

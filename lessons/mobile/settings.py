@@ -8,9 +8,11 @@ from typing import Any, get_type_hints
 
 from himpc.htmpc import HTMPCSettings
 from himpc.stack import Level, Stack
+from lessons.levels import ordered
 from lessons.mobile.options import MobileOptions, Stay
 from lessons.values import fitting, typed, weight
 from robots import InputError, VelocityPlantSettings
+from robots.collision import Ball, Obstacle
 from robots.errors import unknown_name
 
 VELOCITY_CONTROLLERS: dict[str, str] = {
@@ -83,17 +85,22 @@ def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
     """The settings with the value at a path replaced.
 
     Paths: a field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
-    "compensate_delay", the fields of the scene's options ("peak", "seats", …), "limits.KEY", "plant.KEY",
-    "Q" for all levels (a new formulation brings its own), and "levels.NAME.Q|enabled" with the level's name
-    or its place 1 … r.
+    "compensate_delay", the fields of the scene's options ("peak", "seats", …; "order" takes effect when a
+    run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation brings its own),
+    "levels.NAME.Q|enabled" with the level's name or its place 1 … r, and "obstacles.NAME" for a ball
+    [x, y, z, radius], new or instead of the obstacle of that name.
 
     Raises:
         InputError: unknown path (naming the nearest), or a value of the wrong type or range.
     """
-    if path not in paths(settings):
-        raise unknown_name("setting", path, paths(settings))
     head, _, rest = path.partition(".")
     htmpc = settings.htmpc
+    if head == "obstacles" and rest:
+        return with_obstacle(settings, _ball(path, rest, value))
+    if path not in paths(settings):
+        raise unknown_name("setting", path, paths(settings))
+    if path == "order":
+        value = [level.name for level in ordered(htmpc.stack, value)]
     if head == "Q":
         values = value if isinstance(value, (list, tuple)) else [value] * len(htmpc.stack)
         if len(values) != len(htmpc.stack):
@@ -139,6 +146,33 @@ def paths(settings: MobileSettings) -> list[str]:
         "Q",
         *(f"levels.{name}.{key}" for name in names for key in _LEVEL_KEYS),
     ]
+
+
+def value_at(settings: MobileSettings, path: str) -> Any:
+    """The value at one of `paths`, but for "Q" of all levels."""
+    head, _, rest = path.partition(".")
+    if head == "levels":
+        name, _, key = rest.rpartition(".")
+        return next(getattr(level, key) for level in settings.htmpc.stack if level.name == name)
+    if rest:
+        return getattr(settings.plant if head == "plant" else settings.htmpc.limits, rest)
+    if head in _OWN:
+        return getattr(settings, head)
+    return getattr(settings.options if head in _names(settings.options) else settings.htmpc, head)
+
+
+def with_obstacle(settings: MobileSettings, obstacle: Obstacle) -> MobileSettings:
+    """The settings with an obstacle more, or instead of the one of its name."""
+    others = (each for each in settings.htmpc.obstacles if each.name != obstacle.name)
+    return replace(settings, htmpc=replace(settings.htmpc, obstacles=(*others, obstacle)))
+
+
+def _ball(path: str, name: str, value: Any) -> Ball:
+    numbers = weight(path, value)
+    if not isinstance(numbers, tuple) or len(numbers) != 4:
+        raise InputError(f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]")
+    x, y, z, radius = numbers
+    return Ball(name, (x, y, z), radius)
 
 
 def _names(part: Any) -> list[str]:

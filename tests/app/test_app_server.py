@@ -66,9 +66,9 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
     with pytest.raises(InputError, match="Port 70000"):
         serve(port=70_000, open_browser=False)
     with pytest.raises(InputError, match="iiwa14-hold"):
-        serve(scene="iiwa14-hodl", open_browser=False)
+        serve(SceneChoice("iiwa14-hodl"), open_browser=False)
     with pytest.raises(InputError):
-        serve(scene="hold", urdf="/nowhere.urdf", open_browser=False)
+        serve(SceneChoice("hold", "/nowhere.urdf"), open_browser=False)
     with pytest.raises(InputError, match="1 or more"):
         serve(max_sessions=0, open_browser=False)
 

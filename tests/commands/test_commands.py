@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
+from lessons.jobs import TIMING_KEYS
+from lessons.state import State, command_line, encode
 from robots import CATALOG
 
 ROOT = Path(__file__).parents[2]
@@ -49,6 +52,12 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "wrong plant length": (["run", "iiwa14-hold", "--set", "plant.friction=[1,2]"], "friction"),
     "duration 0": (["run", "iiwa14-hold", "--duration", "0"], "duration"),
     "duration nan": (["run", "iiwa14-hold", "--duration", "nan"], "duration"),
+    "no scene and no state": (["run"], "--state"),
+    "a scene and a state": (["run", "planar3-hold", "--state", "hl1-x"], "leave out"),
+    "a bad code": (["run", "--state", "hl1-x"], "copy all of it"),
+    "a bad code for the page": (["--state", "hl1-x"], "copy all of it"),
+    "a scene and a state for the page": (["--scene", "planar3-hold", "--state", "hl1-x"], "leave out"),
+    "a negative deadline": (["run", "planar3-hold", "--set", "deadline_ms=-1"], "deadline_ms"),
     "json nowhere": (["run", "planar3-hold", "--duration", "0.01", "--json", "/nowhere/x.json"], "--json"),
     "npz nowhere": (["run", "planar3-hold", "--duration", "0.01", "--npz", "/nowhere/x.npz"], "--npz"),
     "check a missing file": (["robots", "--check", "/nowhere/arm.urdf"], "/nowhere/arm.urdf"),
@@ -215,3 +224,23 @@ def test_the_example_of_the_readme_runs() -> None:
     printed = re.findall(r"[-+\d.e]+", done.stdout)
     assert printed
     assert float(printed[-1]) < 5.0
+
+
+def test_a_state_code_runs_like_its_command_line(capfd: pytest.CaptureFixture[str]) -> None:
+    """`run --state CODE` is the run that the code's command line names; more options go on top."""
+    state = State("planar3-hold", set=("controller=tdeosf", "plant.payload_kg=0.4"), seed=2)
+    results = []
+    for given in (["run", "--state", encode(state)], shlex.split(command_line(state))[1:]):
+        assert main([*given, "--set", "T_s=0.002", "--duration", "0.05", "--json", "-"]) == 0
+        result: dict[str, Any] = json.loads(capfd.readouterr().out)
+        results.append({key: value for key, value in result.items() if key not in TIMING_KEYS})
+    assert results[0] == results[1]
+    assert (results[0]["controller"], results[0]["seed"]) == ("tdeosf", 2)
+
+
+def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
+    """An assumed computer of 0.3 ms per knot misses 1 ms with N = 4 at every tick, with N = 3 never."""
+    for horizon, late in ((3, 0), (4, 50)):
+        given = ["--set", "deadline_ms=1", "--set", "solve_ms_per_knot=0.3", "--set", f"horizon={horizon}"]
+        assert main(["run", "planar3-hold", *given, "--duration", "0.05", "--json", "-"]) == 0
+        assert json.loads(capfd.readouterr().out)["late_ticks"] == late

@@ -374,3 +374,22 @@ def test_collinear_waves_are_those_on_the_line_through_hand_and_home() -> None:
     assert collinear(square("htmpc", tuple(behind.tolist())))
     assert collinear(square("htmpc", tuple((HOME + 2.2 * HOME / np.linalg.norm(HOME)).tolist())))
     assert not collinear(square("htmpc", tuple(side.tolist())))
+
+
+def test_priorities_can_be_a_setting() -> None:
+    """`order` is taken up when a run starts; what it must be is said."""
+    drag = scene("ridgeback-ur10-drag", "order=base,ee")
+    session = MobileSession(drag)
+    session.tick()
+    assert [active.task.role for active in session.progress.window] == ["base", "ee"]
+    session.post(Set("order", ["ee", "base"]))
+    session.tick()
+    assert [active.task.role for active in session.progress.window] == ["base", "ee"]
+    session.post(Reset())
+    session.tick()
+    assert [active.task.role for active in session.progress.window] == ["ee", "base"]
+    for wrong in ("base", "base,base", "base,nose", 3):
+        with pytest.raises(InputError, match="every level once"):
+            changed(drag.settings, "order", wrong)
+    with pytest.raises(InputError, match="order"):
+        changed(scene("ridgeback-ur10-delivery").settings, "order", "base,ee")

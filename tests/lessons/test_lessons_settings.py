@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lessons.run import parse_assignment, with_assignments
 from lessons.scenes import load_scene
-from lessons.settings import SceneSettings, changed, paths
+from lessons.settings import SceneSettings, changed, paths, value_at
 from robots import InputError
 
 START = load_scene("iiwa14-circle").settings
@@ -82,7 +82,7 @@ def test_every_listed_path_is_taken(start: SceneSettings) -> None:
         if head in ("levels", "tasks", "Q", "R"):
             value: Any = {"enabled": True, "horizon": 3}.get(rest.rpartition(".")[2], 7.0)
         else:
-            value = getattr(getattr(start, head), rest) if rest else getattr(start, head)
+            value = value_at(start, path)
         assert isinstance(changed(start, path, value), SceneSettings)
 
 
@@ -197,3 +197,14 @@ def test_later_assignments_build_on_earlier_ones(start: SceneSettings) -> None:
     assert [level.Q for level in new.levels] == [5.0, 7.0, 5.0]
     assert (new.limits.velocity_scale, new.limits.position) == (2.0, "off")
     np.testing.assert_array_equal(new.for_controller().M_bar, start.M_bar)
+
+
+def test_the_order_is_a_setting_of_its_own(start: SceneSettings) -> None:
+    """All levels by name, in one word or a list; anything else names what it should be."""
+    names = [level.name for level in start.levels]
+    turned = changed(start, "order", ",".join(reversed(names)))
+    assert [level.name for level in turned.levels] == names[::-1]
+    assert changed(turned, "order", names) == start
+    for wrong in ("", names[0], [*names, names[0]], names[:2], 3, None):
+        with pytest.raises(InputError, match="every level once"):
+            changed(start, "order", wrong)

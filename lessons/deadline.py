@@ -1,0 +1,40 @@
+"""Deadlines: what a tick applies when the controller's torque is not ready in time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Outbox:
+    """Where a late torque waits for the next tick: a queue of one.
+
+    A tick whose torque is in time applies it, and what waited is thrown away: nothing old ever acts after
+    something newer. A tick whose torque is late applies what waits, or, if nothing does, holds the torque of
+    the tick before; its own torque then waits. So one late tick costs one tick of holding, and of two late
+    ones in a row the second applies the first one's torque: a controller that is always late acts exactly
+    like one whose torque is delayed by one tick. However late it is, it waits no longer than one tick.
+    """
+
+    def __init__(self) -> None:
+        self._held: Array | None = None
+        self._waiting: Array | None = None
+
+    def applied(self, tau: Array, late: bool, before: Array) -> Array:
+        """The torque that this tick applies, (n,) N·m.
+
+        Args:
+            tau: what the controller found for this tick, (n,) N·m.
+            late: whether it found it after the deadline.
+            before: the torque that acted until now, (n,) N·m; held if this is the first tick.
+        """
+        if not late:
+            taken, self._waiting = tau, None
+        else:
+            held = before if self._held is None else self._held
+            taken = held if self._waiting is None else self._waiting
+            self._waiting = tau
+        self._held = taken
+        return taken

@@ -1,0 +1,44 @@
+"""The order of levels, changed by name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from himpc.stack import Stack
+from robots import InputError
+from robots.errors import unknown_name
+
+
+def ordered(stack: Stack, names: Any) -> Stack:
+    """The levels in another order.
+
+    Args:
+        stack: the levels.
+        names: of all of them, highest priority first: "a,b,c" or a list.
+
+    Raises:
+        InputError: a name is missing, unknown or there twice.
+    """
+    levels = {level.name: level for level in stack}
+    given = names.split(",") if isinstance(names, str) else names
+    if not isinstance(given, (list, tuple)) or sorted(map(str, given)) != sorted(levels):
+        raise InputError(f"order is {names!r}: give every level once, e.g. order={','.join(levels)}")
+    return tuple(levels[str(name)] for name in given)
+
+
+def moved(stack: Stack, name: str, to: int) -> Stack:
+    """The levels with one of them at another place, 0 being the highest priority.
+
+    Raises:
+        InputError: no level of that name, or no such place.
+    """
+    names = [level.name for level in stack]
+    if name not in names:
+        raise unknown_name("level", name, names)
+    if not 0 <= to < len(stack):
+        raise InputError(
+            f"level '{name}' cannot go to place {to}: the stack has places 0 to {len(stack) - 1}"
+        )
+    levels = list(stack)
+    levels.insert(to, levels.pop(names.index(name)))
+    return tuple(levels)

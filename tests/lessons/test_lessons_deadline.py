@@ -1,0 +1,102 @@
+"""Deadline mode: a late torque acts one tick later, and headless no clock decides what is late."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from session_rows import value
+
+from lessons.deadline import Outbox
+from lessons.events import MoveTarget, Reset, Set
+from lessons.run import run, with_assignments
+from lessons.scene import Scene
+from lessons.scenes import load_scene
+from lessons.session import Session
+from lessons.settings import changed
+
+ASIDE = ((0.01, MoveTarget("position", (0.6, 0.3))),)
+
+
+@pytest.fixture(scope="module")
+def planar() -> Scene:
+    return replace(load_scene("planar3-hold"), events=ASIDE)
+
+
+def with_settings(scene: Scene, *assignments: str) -> Scene:
+    return replace(scene, settings=with_assignments(scene.settings, assignments))
+
+
+@pytest.mark.parametrize(
+    ("late", "applied"),
+    [
+        ([0, 0, 0], [1, 2, 3]),
+        ([1, 0, 0], [0, 2, 3]),  # held; the late torque is overtaken by the next one
+        ([0, 1, 0], [1, 1, 3]),
+        ([0, 1, 1, 0], [1, 1, 2, 4]),  # the second late tick applies the first one's torque
+        ([1, 1, 1, 1], [0, 1, 2, 3]),  # always late: one tick of delay
+        ([0, 1, 1, 0, 1], [1, 1, 2, 4, 4]),  # what waited was thrown away
+    ],
+)
+def test_a_queue_of_one(late: list[int], applied: list[int]) -> None:
+    """Tick k finds the torque k + 1; before the first tick the torque 0 acts."""
+    outbox = Outbox()
+    found = [
+        float(outbox.applied(np.array([k + 1.0]), bool(missed), np.zeros(1))[0])
+        for k, missed in enumerate(late)
+    ]
+    assert found == applied
+
+
+def test_always_late_is_one_tick_of_delay(planar: Scene) -> None:
+    """The same torques to the last bit as from a plant whose motors get them 1 ms later."""
+    late = run(with_settings(planar, "deadline_ms=1", "solve_ms_per_knot=0.3"), 0.2)
+    delayed = run(with_settings(planar, "plant.delay_ms=1"), 0.2)
+    assert late["late"].all()
+    assert not delayed["late"].any()
+    np.testing.assert_array_equal(late["q"], delayed["q"])
+    np.testing.assert_array_equal(late["tau_demand"], delayed["tau_demand"])
+
+
+def test_in_time_is_lockstep(planar: Scene) -> None:
+    """A deadline that is met exactly changes nothing."""
+    plain, met = run(planar, 0.2), run(with_settings(planar, "deadline_ms=0.5"), 0.2)
+    assert not met["late"].any()
+    np.testing.assert_array_equal(plain["tau"], met["tau"])
+
+
+def test_the_horizon_decides_what_is_late(planar: Scene) -> None:
+    """A longer horizon set on the way misses the deadline from that tick on; back in time, it does not."""
+    session = Session(with_settings(planar, "deadline_ms=1"))
+    late = []
+    for horizon in (10, 11, 10):
+        session.post(Set("horizon", horizon))
+        late += [bool(value(session, session.tick(), "late")[0]) for _ in range(3)]
+    assert late == [False] * 3 + [True] * 3 + [False] * 3
+
+
+def test_a_reset_forgets_what_waits(planar: Scene) -> None:
+    scene = with_settings(planar, "deadline_ms=0.1")
+    session = Session(scene)
+    first = session.tick().copy()
+    for _ in range(60):
+        session.tick()
+    session.post(Reset())
+    again = session.tick().copy()
+    assert value(session, first, "late")[0] == 1.0
+    np.testing.assert_array_equal(value(session, again, "tau"), value(session, first, "tau"))
+    np.testing.assert_array_equal(value(session, first, "tau"), session_holding(scene))
+
+
+def session_holding(scene: Scene) -> np.ndarray:
+    return Session(scene).plant.tau
+
+
+def test_the_clock_decides_only_if_asked_to(planar: Scene) -> None:
+    """With no assumed time the measured one counts: more than a nanosecond, less than a second."""
+    measured = changed(planar.settings, "solve_ms_per_knot", 0)
+    assert replace(measured, deadline_ms=1e-6).is_late(0.5)
+    assert not replace(measured, deadline_ms=1e3).is_late(0.5)
+    assert not measured.is_late(0.5)
+    assert not replace(planar.settings, deadline_ms=0.5).is_late(1e9)

@@ -1,0 +1,232 @@
+"""State codes: a whole setting in a line of text, equal to the last bit, and harmless whoever sends it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shlex
+import zlib
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lessons.assignments import differences
+from lessons.events import MoveLevel, Set
+from lessons.kinds import AnyScene, changed_any, find_scene, paths_of, prepared, run_scene, settings_after
+from lessons.mobile.events import Appear, MobileEvent
+from lessons.scene import Scene
+from lessons.state import MAX_CODE, State, command_line, decode, encode, state_of
+from robots import InputError
+
+find = cache(find_scene)
+
+NUMBERS = st.one_of(
+    st.integers(0, 30),
+    st.floats(1e-6, 50.0),
+    st.sampled_from([0.1, 1.0, 1e-3, 0.3]),
+)
+WORDS = st.sampled_from(
+    ["himpc", "hiqp", "hqp", "htmpc", "htidkc", "paper", "proximal", "cost", "explicit", "proxqp", "off"]
+) | st.sampled_from(["acceleration", "viability", "servo", "single_task", "decoupled", "yes"])
+
+
+def values(n: int) -> st.SearchStrategy[Any]:
+    lists = st.sampled_from((2, 3, n)).flatmap(lambda k: st.lists(NUMBERS, min_size=k, max_size=k))
+    return st.one_of(NUMBERS, st.booleans(), WORDS, st.none(), lists)
+
+
+@st.composite
+def events(draw: st.DrawFn, scene: AnyScene) -> MobileEvent:
+    kind = draw(st.sampled_from(["Set", "Set", "Set", "Set", "MoveLevel", "order", "Appear"]))
+    stack = scene.settings.levels if isinstance(scene, Scene) else scene.settings.htmpc.stack
+    names = [level.name for level in stack]
+    if kind == "MoveLevel":
+        return MoveLevel(draw(st.sampled_from(names)), draw(st.integers(0, len(names) - 1)))
+    if kind == "order":
+        return Set("order", draw(st.permutations(names)))
+    if kind == "Appear":
+        centre = draw(st.tuples(NUMBERS, NUMBERS, NUMBERS))
+        return Appear(draw(st.sampled_from(["visitor", "bin", "lamp"])), centre, draw(st.floats(0.1, 1.0)))
+    return Set(draw(st.sampled_from(paths_of(scene))), draw(values(scene.robot.n)))
+
+
+@pytest.mark.parametrize(
+    "name", ["iiwa14-hold", "planar3-conflict", "ridgeback-ur10-square", "ridgeback-ur10-cluttered"]
+)
+@given(data=st.data())
+@settings(max_examples=60)
+def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
+    """Settings reached by random events → code → the same settings, also from the command line's words."""
+    scene = find(name)
+    reached = scene.settings
+    for _ in range(data.draw(st.integers(0, 12))):
+        try:
+            reached = settings_after(reached, [data.draw(events(scene))])
+        except InputError:
+            continue
+    seed = data.draw(st.integers(0, 2**40))
+    state = State(name, set=differences(scene, reached), seed=seed, lesson="two-tasks", step=2)
+    assert decode(encode(state)) == state
+    assert prepared(scene, None, decode(encode(state)).set).settings == reached
+    words = shlex.split(command_line(state))
+    assert words[:3] == ["himpc-lab", "run", name]
+    told = [after for before, after in pairwise(words) if before == "--set"]
+    controller = words[words.index("--controller") + 1] if "--controller" in words else None
+    assert prepared(scene, controller, told).settings == reached
+
+
+def test_a_code_says_only_what_differs() -> None:
+    """The scene as it is gives a code of a few signs; a controller's own rate is not told."""
+    plain = state_of("iiwa14-hold", find("iiwa14-hold").settings)
+    assert plain.set == ()
+    assert len(encode(plain)) < 50
+    scene = find("ridgeback-ur10-square")
+    assert state_of(scene.name, changed_any(scene.settings, "controller", "htidkc")).set == (
+        "controller=htidkc",
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        (
+            "planar3-conflict",
+            ("order=q1,position", "plant.friction=[0.1,0.2,0.3]", "controller=hqp", "q1_amplitude_deg=-60.3"),
+        ),
+        (
+            "ridgeback-ur10-drag",
+            ("order=base,ee", "plant.position_noise=1e-4", "obstacles.a=[2,0,0.5,0.3]"),
+        ),
+    ],
+)
+def test_a_run_from_a_code_is_equal_to_the_last_bit(name: str, changes: tuple[str, ...]) -> None:
+    scene = prepared(find(name), None, changes)
+    state = state_of(name, scene.settings, seed=5)
+    again = decode(encode(state))
+    recording, repeated = run_scene(scene, 0.4, 5), run_scene(again.prepared(), 0.4, again.seed)
+    for field in ("t", "q", "v", "tau"):
+        np.testing.assert_array_equal(recording[field], repeated[field])
+    assert np.abs(np.diff(recording["q"], axis=0)).max() > 0
+
+
+GOOD = encode(State("planar3-hold", set=("horizon=7", "levels.position.Q=150.5")))
+
+
+def test_a_code_that_was_cut_or_changed_never_becomes_another_state() -> None:
+    """Refused, but for the few bits of padding that mean nothing."""
+    refused = 0
+    for place in range(len(GOOD)):
+        with pytest.raises(InputError):
+            decode(GOOD[:place])
+        other = "A" if GOOD[place] != "A" else "B"
+        try:
+            assert decode(GOOD[:place] + other + GOOD[place + 1 :]) == decode(GOOD)
+        except InputError as error:
+            assert "\n" not in str(error)
+            refused += 1
+    assert refused >= len(GOOD) - 2
+    # A mail program may break lines and add blanks.
+    assert decode(f"  {GOOD[:20]}\n{GOOD[20:]} ") == decode(GOOD)
+
+
+def packed(data: Any) -> str:
+    text = data if isinstance(data, bytes) else json.dumps(data).encode()
+    return "hl1-" + base64.urlsafe_b64encode(zlib.compress(text)).decode().rstrip("=")
+
+
+BAD: dict[str, tuple[str, str]] = {
+    "nothing": ("", "no state code"),
+    "words": ("give me a robot", "no state code"),
+    "a link": ("https://example.org/?state=" + GOOD, "no state code"),
+    "of the future": ("hl2" + GOOD[3:], "newer"),
+    "of the past": ("hl0" + GOOD[3:], "format 0"),
+    "too long": ("hl1-" + "A" * MAX_CODE, "characters"),
+    "a bomb": (packed(b'{"s":"' + b"A" * 5_000_000 + b'"}'), "incomplete"),
+    "no JSON": (packed(b"import os"), "incomplete"),
+    "nested": (packed(b"[" * 50_000), "incomplete"),
+    "a list": (packed([1, 2]), "something else"),
+    "a stranger's key": (packed({"s": "planar3-hold", "x": 1}), "something else"),
+    "NaN": (packed(b'{"s":"planar3-hold","n":NaN}'), "incomplete"),
+    "no scene": (packed({}), "no scene"),
+    "an unknown scene": (packed({"s": "planar4-hold"}), "planar3-hold"),
+    "a scene that is no text": (packed({"s": ["planar3-hold"]}), "scene in the code"),
+    "a file": (packed({"s": "hold", "r": "/etc/passwd"}), "may not open files"),
+    "a file beside it": (packed({"s": "hold", "r": "arm.urdf"}), "may not open files"),
+    "a tip that is no name": (packed({"s": "hold", "r": "panda", "t": "a\nb"}), "tip in the code"),
+    "settings that are no list": (packed({"s": "planar3-hold", "a": "horizon=7"}), "list of settings"),
+    "settings that are no text": (packed({"s": "planar3-hold", "a": [7]}), "list of settings"),
+    "too many settings": (packed({"s": "planar3-hold", "a": ["horizon=7"] * 501}), "number or length"),
+    "a long setting": (packed({"s": "planar3-hold", "a": ["Q=" + "1" * 5000]}), "number or length"),
+    "a fraction of a seed": (packed({"s": "planar3-hold", "n": 1.5}), "seed"),
+    "true as a seed": (packed({"s": "planar3-hold", "n": True}), "seed"),
+    "a huge seed": (packed({"s": "planar3-hold", "n": 10**400}), "seed"),
+    "an unknown lesson": (packed({"s": "planar3-hold", "l": "two-taks"}), "two-tasks"),
+    "a step before the first": (packed({"s": "planar3-hold", "p": -1}), "step"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_codes_are_refused_in_one_sentence(case: str) -> None:
+    code, says = BAD[case]
+    with pytest.raises(InputError, match=says) as caught:
+        decode(code)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 400 + 40 * len(paths_of(find("planar3-hold")))
+
+
+@pytest.mark.parametrize(
+    "assignment",
+    [
+        "nothing=1",
+        "horizon=" + "9" * 400,
+        "horizon=__import__('os')",
+        "levels.1.Q=" + "[" * 1500,
+        "plant.payload_kg=1e999",
+        "M_bar_scale=" + "1" * 1900,
+        "levels.1.__class__=1",
+        "plant.__init__=1",
+        "order=position,position,posture",
+        "=3",
+        "horizon",
+    ],
+)
+def test_settings_of_a_stranger_are_refused_when_prepared(assignment: str) -> None:
+    """They are names and numbers that go the way of --set: one sentence, whatever they are."""
+    with pytest.raises(InputError) as caught:
+        decode(packed({"s": "planar3-hold", "a": [assignment]})).prepared()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "assignment", ["rounds=1000000000", f"seats={[0] * 900}", "obstacles.x=[1,2]", "obstacles.x=[1,2,3,-1]"]
+)
+def test_a_mission_of_a_stranger_cannot_fill_the_memory(assignment: str) -> None:
+    with pytest.raises(InputError):
+        decode(packed({"s": "ridgeback-ur10-delivery", "a": [assignment]})).prepared()
+
+
+def test_what_a_code_cannot_carry_is_said() -> None:
+    with pytest.raises(InputError, match="from a file"):
+        encode(State("hold", urdf="/home/me/arm.urdf"))
+    with pytest.raises(InputError, match="too long"):
+        encode(State("planar3-hold", set=tuple(f"M_bar.1={k}" for k in range(501))))
+    hold = find("planar3-hold")
+    assert isinstance(hold, Scene)
+    first, *others = hold.settings.levels
+    narrow = replace(first, tasks=(replace(first.tasks[0], axes="x"),))  # pyright: ignore[reportCallIssue]
+    other = replace(hold.settings, levels=(narrow, *others))
+    with pytest.raises(InputError, match="cannot be told"):
+        state_of("planar3-hold", other)
+
+
+def test_the_command_line_is_quoted_for_a_shell() -> None:
+    state = State("hold", urdf="my robot.urdf", tip="tool", set=("controller=hqp", "Q=[1,2,3]"), seed=3)
+    assert command_line(state) == (
+        "himpc-lab run hold --urdf 'my robot.urdf' --tip tool --controller hqp --seed 3 --set 'Q=[1,2,3]'"
+    )
