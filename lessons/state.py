@@ -9,15 +9,19 @@ import re
 import shlex
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lessons.assignments import differences
 from lessons.course import COURSE
 from lessons.kinds import AnyScene, AnySettings, find_scene, prepared
+from lessons.mobile.options import OrderOptions
+from lessons.mobile.session import MobileSession
 from lessons.run import parse_assignment
 from lessons.scenes import SCENES
 from lessons.scenes.mobile import MOBILE_SCENES
+from lessons.session import Session
+from lessons.settings import SceneSettings
 from robots import CATALOG, InputError
 from robots.errors import unknown_name
 
@@ -82,6 +86,21 @@ def state_of(
     """
     own = find_scene(scene, urdf, tip)
     return State(scene, urdf, tip, differences(own, settings), seed, lesson, step)
+
+
+def settings_now(session: Session | MobileSession) -> AnySettings:
+    """The settings in force in a session. At velocity level priorities belong to the run: where a scene can
+    begin with others, those of now stand among the settings."""
+    settings = session.settings
+    if isinstance(settings, SceneSettings) or not isinstance(settings.options, OrderOptions):
+        return settings
+    assert isinstance(session, MobileSession)
+    names = [task.name for task in session.progress.mission]
+    order = tuple(name for name in names if name in session.roles)
+    if len(order) < len(session.roles):
+        return settings
+    own = () if order == tuple(session.roles) and not settings.options.order else order
+    return replace(settings, options=replace(settings.options, order=own))
 
 
 def command_line(state: State) -> str:

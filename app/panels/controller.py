@@ -6,6 +6,7 @@ import viser
 
 from app.palette import BAD, GOOD
 from app.panels.bind import Bindings
+from app.panels.deadline import DeadlineFolder
 from app.panels.snapshot import Snapshot
 from app.text import bar, block, esc, formula
 from himpc.controllers import CONTROLLERS
@@ -23,6 +24,7 @@ class ControllerPanel:
     ) -> None:
         self._choice(gui, bindings, settings)
         self._horizon(gui, bindings, settings)
+        self._deadline = DeadlineFolder(gui, bindings, settings)
         self._inertia(gui, bindings, settings, robot)
         self._limits(gui, bindings, settings)
         self._solver(gui, bindings, settings)
@@ -151,6 +153,7 @@ class ControllerPanel:
             )  # fmt: skip
 
     def update(self, now: Snapshot[SceneSettings]) -> None:
+        self._deadline.update(now)
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller
             self._what.content = block(esc(CONTROLLERS[self._shown]))

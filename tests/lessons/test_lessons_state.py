@@ -20,8 +20,11 @@ from lessons.assignments import differences
 from lessons.events import MoveLevel, Set
 from lessons.kinds import AnyScene, changed_any, find_scene, paths_of, prepared, run_scene, settings_after
 from lessons.mobile.events import Appear, MobileEvent
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.session import MobileSession
 from lessons.scene import Scene
-from lessons.state import MAX_CODE, State, command_line, decode, encode, state_of
+from lessons.session import Session
+from lessons.state import MAX_CODE, State, command_line, decode, encode, settings_now, state_of
 from robots import InputError
 
 find = cache(find_scene)
@@ -230,3 +233,22 @@ def test_the_command_line_is_quoted_for_a_shell() -> None:
     assert command_line(state) == (
         "himpc-lab run hold --urdf 'my robot.urdf' --tip tool --controller hqp --seed 3 --set 'Q=[1,2,3]'"
     )
+
+
+def test_priorities_of_now_are_part_of_a_state() -> None:
+    """Swapped by a hand at velocity level they belong to the run; a code passes them on all the same."""
+    scene = find("ridgeback-ur10-drag")
+    assert isinstance(scene, MobileScene)
+    session = MobileSession(scene)
+    session.tick()
+    assert settings_now(session) == scene.settings
+    session.post(MoveLevel("base", 0))
+    session.tick()
+    state = state_of(scene.name, settings_now(session))
+    assert state.set == ("order=base,ee",)
+    again = MobileSession(prepared(scene, None, decode(encode(state)).set))  # pyright: ignore[reportArgumentType]
+    again.tick()
+    assert [active.task.role for active in again.progress.window] == ["base", "ee"]
+    assert settings_now(again) == again.settings
+    torque = Session(find("planar3-hold"))  # pyright: ignore[reportArgumentType]
+    assert settings_now(torque) is torque.settings
