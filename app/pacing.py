@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 BACKLOG = 0.1
-"""s of simulated time that may be owed; beyond, simulated time slows down instead of piling up work."""
+"""s of real time, or of simulated time if that goes slower, that may be owed; beyond, simulated time slows
+down instead of piling up work."""
 _MEMORY = 1.0
 """s over which the real-time factor is averaged and a cap stays visible."""
 
@@ -24,8 +25,9 @@ class Pacer:
         """Ticks to run now."""
         self._debt += (now - self._last) * self.speed
         self._last = now
-        if self._debt > BACKLOG:
-            self._debt = BACKLOG
+        most = BACKLOG * max(1.0, self.speed)
+        if self._debt > most:
+            self._debt = most
             self._capped_at = now
         return int(self._debt / T_s + 1e-9)
 

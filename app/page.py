@@ -14,7 +14,7 @@ from app.messages import Load, Ready, SceneChoice
 from app.stage import Stage
 from app.text import block, stopped
 from app.view.robot import aim
-from lessons.scenes import SCENES
+from lessons.kinds import ALL_SCENES
 
 RATE = 30.0  # Hz, poses
 _PLOTS = 3  # every so many frames
@@ -137,7 +137,7 @@ class Page:
                 self._client,
                 self.learner,
                 ready,
-                SCENES,
+                ALL_SCENES,
                 self._dark,
                 self._choose,
                 self._theme,
@@ -146,7 +146,7 @@ class Page:
             )
             seen = (ready.choice, ready.robot.name)
             if seen != self._seen:  # a restart leaves the learner's view as it was
-                aim(self._client.camera, ready.robot, self._phone)
+                aim(self._client.camera, ready.robot, self._phone, ready.room)
                 self._seen = seen
         self._failure = None
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 import viser
 
 from app.faces import Context, face_for
@@ -92,7 +94,7 @@ class Stage:
     def _build_scene(self, scene: viser.SceneApi, dark: bool) -> None:
         # Shadows triple the cost of a frame, which decides on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
-        self._floor = scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
+        self._floor = _floor(scene, self._ready.room)
         self._paint_floor(dark)
         self._robot = RobotView(scene, self._ready.robot)
         self._face.add_scene(scene)
@@ -174,3 +176,12 @@ class Stage:
         self._bindings.close()
         self._playback.close()
         self._face.close()
+
+
+def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
+    """A floor below the robot and the points (k, 3) it will go to, m."""
+    far = float(np.abs(room[:, :2]).max(initial=0.0))
+    if far == 0.0:
+        return scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
+    side = 2.0 * math.ceil(far + 1.0)
+    return scene.add_grid("/floor", width=side, height=side, cell_size=0.5, section_size=1.0)

@@ -1,4 +1,5 @@
-"""Torques, velocities and positions inside their bounds: all joints in shares, or one in its units."""
+"""Inputs (torques or accelerations), velocities and positions inside their bounds: all joints in shares, or
+one in its units."""
 
 from __future__ import annotations
 
@@ -30,12 +31,28 @@ class _Quantity:
     upper: np.ndarray
 
 
+@dataclass(frozen=True)
+class Input:
+    """What drives the joints: fields of the telemetry (value, lower, upper; no lower one: it is −upper), and
+    units of turning and of sliding joints."""
+
+    title: str
+    value: str
+    lower: str | None
+    upper: str
+    units: tuple[str, str]
+
+
+TORQUE = Input("Torque", "tau", "tau_lower", "tau_upper", ("N·m", "N"))
+ACCELERATION = Input("Acceleration, largest", "acceleration", None, "a_limit", ("rad/s²", "m/s²"))
+
+
 class JointPlots:
     """Three charts. The choice is only noted by the callback; the page's loop builds and draws."""
 
-    def __init__(self, gui: viser.GuiApi, robot: Robot) -> None:
-        self._gui, self._robot = gui, robot
-        self._sheet = _sheet(robot)
+    def __init__(self, gui: viser.GuiApi, robot: Robot, driven: Input = TORQUE) -> None:
+        self._gui, self._robot, self._input = gui, robot, driven
+        self._sheet = _sheet(robot, driven)
         self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
         self._joint: int | None = None
         self._built: int | None = -1
@@ -87,9 +104,11 @@ class JointPlots:
 
     def _read(self, history: History) -> Sequence[_Quantity]:
         columns, fields = history.columns, history.layout.fields
-        v = columns(fields["v_limit"])
+        v, driven = columns(fields["v_limit"]), self._input
+        upper = columns(fields[driven.upper])
+        lower = -upper if driven.lower is None else columns(fields[driven.lower])
         found = (
-            ("Torque", "tau", columns(fields["tau_lower"]), columns(fields["tau_upper"])),
+            (driven.title, driven.value, lower, upper),
             ("Velocity", "v", -v, v),
             ("Position", "q", columns(fields["q_lower"]), columns(fields["q_upper"])),
         )
@@ -108,9 +127,10 @@ class JointPlots:
 
     def _unit(self, kind: int, joint: int) -> tuple[str, float]:
         """(unit on the axis, factor from SI)."""
+        turning, sliding = self._input.units
         if self._prismatic[joint]:
-            return (("N", 1.0), ("m/s", 1.0), ("m", 1.0))[kind]
-        return (("N·m", 1.0), ("°/s", np.degrees(1.0)), ("°", np.degrees(1.0)))[kind]
+            return ((sliding, 1.0), ("m/s", 1.0), ("m", 1.0))[kind]
+        return ((turning, 1.0), ("°/s", np.degrees(1.0)), ("°", np.degrees(1.0)))[kind]
 
     def _span(self, kind: int, joint: int) -> tuple[float, float]:
         factor = self._unit(kind, joint)[1]
@@ -125,7 +145,7 @@ class JointPlots:
         with self._place:
             self._charts = [
                 self._all(title, names, last=kind == 2) if joint is None else self._one(title, kind, joint)
-                for kind, title in enumerate(("Torque", "Velocity", "Position"))
+                for kind, title in enumerate((self._input.title, "Velocity", "Position"))
             ]
         self._built = joint
 
@@ -160,12 +180,13 @@ class JointPlots:
         )
 
 
-def _sheet(robot: Robot) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+def _sheet(robot: Robot, driven: Input) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """The robot's own bounds; ± one turn where a joint has none."""
-    tau = np.where(np.isfinite(robot.tau_limit), robot.tau_limit, 1e3)
+    own = robot.tau_limit if driven is TORQUE else robot.a_max
+    u = np.where(np.isfinite(own), own, 1e3)
     v = np.where(np.isfinite(robot.v_limit), robot.v_limit, 1e2)
     return (
-        (-tau, tau),
+        (-u, u),
         (-v, v),
         (
             np.where(np.isfinite(robot.q_lower), robot.q_lower, -2 * np.pi),

@@ -6,11 +6,19 @@ import numpy as np
 
 from app.messages import BindingRow, MissionRow, MissionView, Person, TaskView
 from app.runs.run import LISTED
+from himpc.htmpc import base_joints
 from himpc.missions import Go, MissionTask
 from himpc.tasks import FramePosition, Task
 from lessons.kinds import AnyEvent
 from lessons.mobile.scene import MobileScene
 from lessons.mobile.session import MobileSession
+
+_ABOVE = np.array([0.0, 0.0, 0.015])
+"""m, of predicted paths above the floor, so that it does not hide them."""
+_ARM = 0.55
+"""m from a person's middle to the hand that takes the ball."""
+_AROUND = 2.5
+"""m about a mobile base that the camera should show at least."""
 
 
 class VelocityRun:
@@ -70,9 +78,12 @@ class VelocityRun:
         return np.zeros((0, 3))
 
     def room(self) -> np.ndarray:
-        mission = self.session.progress.mission
-        goals = [task.motion.goal for task in mission if isinstance(task.motion, Go)]
-        return np.array([_point(goal) for goal in goals]).reshape(-1, 3)
+        if not base_joints(self.session.robot):
+            return np.zeros((0, 3))
+        tasks = self.session.progress.mission
+        goals = [_point(task.motion.goal) for task in tasks if isinstance(task.motion, Go)]
+        corners = [np.array([x, y, 0.0]) for x in (-_AROUND, _AROUND) for y in (-_AROUND, _AROUND)]
+        return np.array([*goals, *corners])
 
     def binding(self) -> tuple[BindingRow, ...]:
         return tuple(BindingRow(*row) for row in self.session.binding()[:LISTED])
@@ -104,7 +115,7 @@ class VelocityRun:
             rows=tuple(row(place, task) for place, task in enumerate(progress.mission)),
             done=progress.done,
             paths={
-                role: np.array([_point(at) for at in session.predicted_path(role)])
+                role: np.array([_point(at) for at in session.predicted_path(role)]) + _ABOVE
                 for role, task in session.roles.items()
                 if ran and isinstance(task, FramePosition)
             },
@@ -112,7 +123,32 @@ class VelocityRun:
         )
 
     def _people(self) -> tuple[Person, ...]:
-        return ()
+        """Each stands behind the place of the hand-over, seen from where the base goes for it."""
+        options, progress = self.session.settings.options, self.session.progress
+        visits: dict[int, list[tuple[MissionTask, bool]]] = {}
+        beside: np.ndarray | None = None
+        stands: dict[str, np.ndarray] = {}
+        for place, task in enumerate(progress.mission):
+            if not isinstance(task.motion, Go):
+                continue
+            if task.role == "base":
+                beside = np.array(task.motion.goal)
+            person = options.person(task.name)
+            if person is not None:
+                visits.setdefault(person, []).append((task, place < progress.place))
+                stands[task.name] = np.zeros(2) if beside is None else beside
+        people: list[Person] = []
+        for person in sorted(visits):
+            task = next((task for task, done in visits[person] if not done), visits[person][-1][0])
+            assert isinstance(task.motion, Go)
+            hand = _point(task.motion.goal)
+            away = hand[:2] - stands[task.name]
+            x, y = hand[:2] + _ARM * away / max(float(np.linalg.norm(away)), 1e-6)
+            balls = sum(done for _, done in visits[person])
+            people.append(
+                Person((float(hand[0]), float(hand[1]), float(hand[2])), (float(x), float(y)), balls)
+            )
+        return tuple(people)
 
 
 def _point(values: tuple[float, ...] | np.ndarray) -> np.ndarray:

@@ -55,10 +55,16 @@ def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     return middle + reach * direction, middle, reach
 
 
-def aim(camera: viser.CameraHandle, robot: Robot, phone: bool) -> None:
-    """Turns the camera to a robot. phone: viser's sheet covers the lower half of the scene, so the robot
-    goes, smaller, into the upper one."""
-    eye, at, _ = camera_for(robot)
+def aim(camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray) -> None:
+    """Turns the camera to a robot and the points (k, 3) it will go to, m. phone: viser's sheet covers the
+    lower half of the scene, so the robot goes, smaller, into the upper one."""
+    eye, at, reach = camera_for(robot)
+    if len(room):
+        points = np.vstack([at, room])
+        low, high = points.min(axis=0), points.max(axis=0)
+        at = np.array([*(0.5 * (low + high))[:2], 0.4])
+        wide = 0.5 * float(np.linalg.norm((high - low)[:2])) + 0.5 * reach
+        eye = at + 1.15 * wide * np.array([0.8, -0.95, 0.85])
     if phone:
         eye = at + 1.7 * (eye - at)
         down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])
@@ -66,3 +72,10 @@ def aim(camera: viser.CameraHandle, robot: Robot, phone: bool) -> None:
     camera.up_direction = (0.0, 0.0, 1.0)
     camera.position = eye
     camera.look_at = at
+
+
+def look_at(camera: viser.CameraHandle, robot: Robot, base: np.ndarray) -> None:
+    """Turns the camera to a robot whose base is at (3,), m."""
+    eye, at, _ = camera_for(robot)
+    camera.position = eye + base
+    camera.look_at = at + base

@@ -12,7 +12,7 @@ from app.palette import RGB
 TRACE_SECONDS = 6.0
 _TRACE_POINTS = 240
 EXAGGERATION = 100
-"""The prediction reaches some milliseconds ahead: at true scale it would be a dot."""
+"""At torque level the prediction reaches some milliseconds ahead: at true scale it would be a dot."""
 
 
 def _segments(points: np.ndarray) -> np.ndarray:
@@ -25,12 +25,25 @@ _NOTHING = np.zeros((1, 2, 3), np.float32)
 class Trails:
     """Reference curves (drawn once), trace and prediction (renewed about ten times a second)."""
 
-    def __init__(self, scene: viser.SceneApi, curves: list[tuple[np.ndarray, RGB]], colour: RGB) -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        curves: list[tuple[np.ndarray, RGB]],
+        colour: RGB,
+        name: str = "",
+        scale: int = EXAGGERATION,
+    ) -> None:
+        """name: sets the nodes of several trails apart; scale: by which predicted motions are enlarged."""
+        self._scale = scale
         for index, (points, curve_colour) in enumerate(curves):
-            scene.add_line_segments(f"/reference/{index}", _segments(points), curve_colour, thickness=0.003)
-        self._trace = scene.add_line_segments("/trace", _NOTHING, colour, thickness=0.004)
-        self._prediction = scene.add_line_segments("/prediction", _NOTHING, (225, 29, 116), thickness=0.008)
-        self._label = scene.add_label("/prediction_label", "", visible=False)
+            scene.add_line_segments(
+                f"/reference{name}/{index}", _segments(points), curve_colour, thickness=0.003
+            )
+        self._trace = scene.add_line_segments(f"/trace{name}", _NOTHING, colour, thickness=0.004)
+        self._prediction = scene.add_line_segments(
+            f"/prediction{name}", _NOTHING, (225, 29, 116), thickness=0.008
+        )
+        self._label = scene.add_label(f"/prediction_label{name}", "", visible=False)
         self._points: deque[np.ndarray] = deque(maxlen=_TRACE_POINTS)
         self._times: deque[float] = deque(maxlen=_TRACE_POINTS)
 
@@ -67,11 +80,11 @@ class Trails:
             self._prediction.points = _NOTHING
             self._label.visible = False
             return
-        larger = path[0] + EXAGGERATION * (path - path[0])
+        larger = path[0] + self._scale * (path - path[0])
         self._prediction.points = _segments(larger)
-        moving = bool(np.linalg.norm(larger[-1] - larger[0]) > 0.03)
+        moving = self._scale > 1 and bool(np.linalg.norm(larger[-1] - larger[0]) > 0.03)
         self._label.visible = moving
         if moving:
             self._label.position = larger[-1]
             milliseconds = 1e3 * T_s * (len(path) - 1)
-            self._label.text = f"predicted {milliseconds:g} ms, motion × {EXAGGERATION}"
+            self._label.text = f"predicted {milliseconds:g} ms, motion × {self._scale}"

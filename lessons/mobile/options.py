@@ -50,6 +50,10 @@ class MobileOptions:
         """Whether the arm stands still while the base has its task, and the other way round."""
         return False
 
+    def person(self, task: str) -> int | None:
+        """Which person a task of the mission goes to, 0 the first; None: to nobody."""
+        return None
+
 
 @dataclass(frozen=True)
 class ArchitectureOptions(MobileOptions):
@@ -228,17 +232,26 @@ class DeliveryOptions(ArchitectureOptions):
         if not 1 <= self.rounds <= MAX_VISITS:
             raise InputError(f"rounds is {self.rounds}: give 1 to {MAX_VISITS}")
 
+    def person(self, task: str) -> int | None:
+        visits = {_visit("ee", visit): visit for visit in range(1, len(self.seats) * self.rounds + 1)}
+        return (visits[task] - 1) % len(self.seats) if task in visits else None
+
     def mission(self, home: Home) -> Mission:
         tasks: list[MissionTask] = []
         for visit, seat in enumerate([int(seat) for seat in self.seats] * self.rounds, start=1):
             hand, place = SEATS[seat]
             motion = Go(place, self.cruise)
             if self.architecture != "hierarchical":
-                tasks.append(MissionTask(f"base {visit}", "base", motion, 0.05, rest=0.02))
+                tasks.append(MissionTask(_visit("base", visit), "base", motion, 0.05, rest=0.02))
             else:
-                tasks.append(MissionTask(f"base {visit}", "base", motion, 0.8))
-            tasks.append(MissionTask(f"ee {visit}", "ee", Go(hand), 0.02, self.hold_s))
+                tasks.append(MissionTask(_visit("base", visit), "base", motion, 0.8))
+            tasks.append(MissionTask(_visit("ee", visit), "ee", Go(hand), 0.02, self.hold_s))
         return tuple(tasks)
+
+
+def _visit(role: str, number: int) -> str:
+    """The name of a task of a delivery's visit."""
+    return f"{role} {number}"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,173 @@
+"""The face of a velocity-level scene: goals of hand and base, a mission, two predictions, surroundings."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import viser
+
+from app.faces.face import Context
+from app.goals import Goals
+from app.messages import Status, TaskView
+from app.panels.begin import BeginPanel
+from app.panels.htmpc import HtmpcPanel
+from app.panels.joints import ACCELERATION, JointPlots
+from app.panels.mission import MissionPanel, swap
+from app.panels.roles import RolesPanel
+from app.panels.servos import ServoPanel
+from app.panels.snapshot import Snapshot
+from app.panels.tracking import TrackingPlots
+from app.view.coordinates import full
+from app.view.robot import camera_for, look_at
+from app.view.surroundings import Carried, Obstacles, People, ReachCircle
+from app.view.target import Frames
+from app.view.trails import Trails
+from himpc.htmpc import base_joints
+from lessons.events import Set
+from lessons.kinds import ALL_SCENES
+from lessons.mobile.settings import MobileSettings
+from robots.stretch import horizontal_reach
+
+
+class VelocityFace:
+    """See `app.faces.face.Face`."""
+
+    fastest: ClassVar[float] = 10.0
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._points = [task for task in context.ready.tasks if task.kind == "position"]
+        self._base = base_joints(context.ready.robot)
+
+    # ---------------------------------------------------------------- building
+
+    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+        context = self._context
+        ready, bindings, colours = context.ready, context.bindings, context.colours
+        with tabs.add_tab("Start"):
+            self._begin = BeginPanel(
+                gui, ALL_SCENES[ready.choice.name], colours, bool(self._base), context.dark
+            )
+        with tabs.add_tab("Mission"):
+            self._mission = MissionPanel(
+                gui,
+                self._points,
+                colours,
+                context.post,
+                self._status,
+                lambda: self._goals.places,
+            )
+        with tabs.add_tab("Tasks"):
+            self._roles = RolesPanel(gui, bindings, context.settings, colours, self._settings)
+        with tabs.add_tab("Control"):
+            self._controller = HtmpcPanel(gui, bindings, context.settings, ready.robot, self._settings)
+        with tabs.add_tab("Plant"):
+            ServoPanel(gui, bindings, context.settings)
+        self._begin.on_theme = context.theme
+        self._begin.on_swap = self._swap
+        self._begin.on_look = self._look
+
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+        with plots.add_tab("Errors"):
+            self._plots = TrackingPlots(gui, self._context.ready, self._context.colours)
+        with plots.add_tab("Joints"):
+            self._joint_plots = JointPlots(gui, self._context.ready.robot, ACCELERATION)
+
+    def add_scene(self, scene: viser.SceneApi) -> None:
+        context, ready = self._context, self._context.ready
+        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.6))
+        self._frames = Frames(scene)
+        self._obstacles = Obstacles(scene)
+        self._people = People(scene)
+        self._carried = Carried(scene)
+        self._goals = Goals(
+            scene, ready, context.colours, size, context.post, self._status, self._begin.dragged
+        )
+        self._trails = {
+            task.name: Trails(scene, [], context.colours[task.level], f"_{task.name}", scale=1)
+            for task in self._points
+        }
+        self._circle: ReachCircle | None = None
+        if self._base:
+            first = len(self._base)
+            self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
+
+    # ---------------------------------------------------------------- events out
+
+    def _settings(self) -> MobileSettings:
+        return self._context.settings
+
+    def _status(self) -> Status | None:
+        return self._context.learner.status
+
+    def toggle(self, place: int) -> Set | None:
+        return self._roles.toggle(place)
+
+    def _swap(self) -> None:
+        status = self._status()
+        if status is not None and status.mission is not None:
+            swap(status.mission.rows, self._context.post)
+
+    def _look(self) -> None:
+        poses = self._context.poses()
+        if poses is not None:
+            base = poses[len(self._base) - 1, :3] if self._base else np.zeros(3)
+            look_at(self._context.client.camera, self._context.ready.robot, base)
+
+    # ---------------------------------------------------------------- following
+
+    def follow(self, status: Status, poses: np.ndarray) -> None:
+        tip = poses[-1]
+        self._frames.actual(tip)
+        mission = status.mission
+        carries = mission is not None and bool(mission.people) and not mission.done
+        self._carried.follow(tip[:3], carries)
+        for task in self._points:
+            self._trails[task.name].add(status.t, self._at(task, poses))
+
+    def _at(self, task: TaskView, poses: np.ndarray) -> np.ndarray:
+        """Where a task's point is, (3,) m: the tip, or the base on the floor."""
+        if "z" in task.axes or not self._base:
+            return poses[-1, :3]
+        return np.array([*poses[len(self._base) - 1, :2], 0.01])
+
+    def after_reset(self, status: Status) -> None:
+        for trail in self._trails.values():
+            trail.clear()
+
+    def draw(self, status: Status) -> None:
+        learner, settings = self._context.learner, self._settings()
+        latest = learner.read(lambda _, history: history.latest)
+        fields = self._context.ready.layout.fields
+        self._goals.follow(status, latest, fields)
+        self._obstacles.show(settings.htmpc.obstacles)
+        self._frames.show(bool(self._begin.frames.value))
+        if self._circle is not None:
+            self._circle.show(bool(self._begin.reach.value))
+        if status.mission is not None:
+            self._people.show(status.mission.people)
+        for task in self._points:
+            trail = self._trails[task.name]
+            trail.show(bool(self._begin.trace.value), bool(self._begin.prediction.value))
+            path = np.zeros((0, 3)) if status.mission is None else status.mission.paths.get(task.name)
+            trail.draw(np.zeros((0, 3)) if path is None else path, settings.T_s)
+        self._draw_desired(latest)
+        learner.read(lambda _, history: self._plots.draw(history, settings.T_s))
+        learner.read(lambda _, history: self._joint_plots.draw(history, settings.T_s))
+
+    def _draw_desired(self, latest: np.ndarray | None) -> None:
+        """What the hand is to do now: the point of its reference."""
+        hand = next((task for task in self._points if "z" in task.axes), None)
+        if hand is not None and latest is not None:
+            fields = self._context.ready.layout.fields
+            self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), None)
+
+    def write(self, now: Snapshot[MobileSettings]) -> None:
+        self._begin.update(now)
+        self._mission.update(now)
+        self._roles.update(now)
+        self._controller.update(now)
+
+    def close(self) -> None:
+        pass

@@ -1,0 +1,102 @@
+"""The learner's hand in a scene with a mission: one goal per role, and what is posted when it is moved."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+
+from app.messages import MissionRow, Ready, Status, TaskView
+from app.palette import RGB
+from app.panels.bind import Post
+from app.text import quantity
+from app.view.goal import Goal
+from lessons.events import MoveTarget
+from lessons.mobile.events import InsertTask
+
+
+def point(values: Sequence[float] | np.ndarray) -> np.ndarray:
+    """A point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
+    return np.array([*values, 0.0][:3], float)
+
+
+def open_row(rows: Sequence[MissionRow], role: str) -> MissionRow | None:
+    """The first task of a role that is not completed."""
+    return next((row for row in rows if row.role == role and row.state != "done"), None)
+
+
+def free_name(wanted: str, taken: Sequence[str]) -> str:
+    """The name wanted, with a number if it is taken."""
+    numbered = (wanted if k == 1 else f"{wanted} {k}" for k in itertools.count(1))
+    return next(name for name in numbered if name not in taken)
+
+
+class Goals:
+    """A goal per position role that is not sent along a given trajectory from the start."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        ready: Ready,
+        colours: dict[str, RGB],
+        size: float,
+        post: Post,
+        status: Callable[[], Status | None],
+        dragged: Callable[[], None],
+    ) -> None:
+        """size: of the arrows, m; status: the newest one; dragged: called at every move."""
+        self._post, self._status, self._dragged = post, status, dragged
+        self._roles = {task.name: task for task in ready.tasks if task.kind == "position"}
+        self._goals = {
+            name: Goal(
+                scene,
+                name,
+                task.axes,
+                colours[task.level],
+                point(task.raw),
+                size,
+                lambda place, task=task: self._moved(task, place),
+            )
+            for name, task in self._roles.items()
+            if task.raw is not None
+        }
+        self._asked: dict[str, str] = {}
+
+    def _moved(self, task: TaskView, place: np.ndarray) -> None:
+        """Moves the role's open task; if none is left, a new one keeps the point where the hand puts it."""
+        status = self._status()
+        if status is None or status.mission is None:
+            return
+        self._dragged()
+        goal = tuple(float(place["xyz".index(axis)]) for axis in task.axes)
+        row, names = open_row(status.mission.rows, task.name), [each.name for each in status.mission.rows]
+        asked = self._asked.get(task.name)
+        if row is not None:
+            self._post(MoveTarget(row.name, goal))
+        elif asked is not None and asked not in names:
+            self._post(MoveTarget(asked, goal))  # the session has not answered yet
+        else:
+            name = self._asked[task.name] = free_name(f"{task.name} by hand", names)
+            self._post(InsertTask(name, task.name, goal, hold=None))
+
+    def follow(self, status: Status, latest: np.ndarray | None, fields: dict[str, slice]) -> None:
+        """Goals and lines of a new status and the newest row of telemetry."""
+        rows = () if status.mission is None else status.mission.rows
+        for name, goal in self._goals.items():
+            row, target = open_row(rows, name), status.targets.get(name)
+            text = f"{name}: no task left, drag to add one" if row is None else row.name
+            if latest is not None and target is not None:
+                at = latest[fields[f"x/{name}"]]
+                away = float(np.linalg.norm(at - target))
+                if np.isfinite(away):
+                    goal.reach_from(point(at))
+                    if away > 5e-3:
+                        text += f": {quantity(away, 'm')} to go"
+            goal.follow(None if target is None else point(target), text)
+
+    @property
+    def places(self) -> dict[str, np.ndarray]:
+        """Where each goal is drawn, (3,) m."""
+        return {name: goal.place for name, goal in self._goals.items()}

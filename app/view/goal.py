@@ -1,0 +1,89 @@
+"""A goal that a hand can drag: of the robot's hand in space, or of its base on the floor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.palette import RGB
+from app.panels.bind import HOLD
+
+_BALL = 0.07  # m
+_DISC = 0.22  # m
+_GAP = 0.03  # m: shorter lines to the goal are not drawn
+_LIFT = 0.01  # m above the floor
+
+
+class Goal:
+    """Arrows along the world's axes; a ball, or a disc for what stays on the floor; a line from the point it
+    is for; and a label.
+
+    The hand wins: for a moment after it moved the goal, `follow` leaves it where it is.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        role: str,
+        axes: str,
+        colour: RGB,
+        start: np.ndarray,
+        size: float,
+        moved: Callable[[np.ndarray], None],
+    ) -> None:
+        """start (3,): m; size: of the arrows, m; moved: called with the goal (3,), m, after each move."""
+        floor = "z" not in axes
+        self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
+        self._touched = -float("inf")
+        node = f"/goal/{role}"
+        x, y, z = (axis in axes for axis in "xyz")
+        self._gizmo = scene.add_transform_controls(
+            node,
+            scale=size,
+            position=start + self._lift,
+            active_axes=(x, y, z),
+            disable_rotations=True,
+            depth_test=False,
+            line_width=3.0,
+        )
+        if floor:
+            scene.add_cylinder(
+                f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6, cast_shadow=False
+            )
+        else:
+            scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
+        self._label = scene.add_label(f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06))
+        self._gap = scene.add_line_segments(
+            f"/gap/{role}", np.zeros((1, 2, 3), np.float32), colour, thickness=0.008, visible=False
+        )
+
+        @self._gizmo.on_update
+        async def _(_: viser.TransformControlsEvent) -> None:
+            self._touched = time.monotonic()
+            moved(self.place)
+
+    @property
+    def place(self) -> np.ndarray:
+        """(3,) m."""
+        return np.array(self._gizmo.position, float) - self._lift
+
+    def follow(self, goal: np.ndarray | None, text: str) -> None:
+        """goal (3,): where the session has it, m; None: it has none, and the hand's stays."""
+        if self._label.text != text:
+            self._label.text = text
+        if goal is None or time.monotonic() - self._touched < HOLD:
+            return
+        if not np.allclose(goal, self.place, rtol=0.0, atol=1e-4):
+            self._gizmo.position = goal + self._lift
+
+    def reach_from(self, point: np.ndarray) -> None:
+        """Draws the line from where the point (3,) is, m, to the goal."""
+        ends = np.array([[point + self._lift, self.place + self._lift]], np.float32)
+        shown = bool(np.linalg.norm(ends[0, 1] - ends[0, 0]) > _GAP)
+        if self._gap.visible != shown:
+            self._gap.visible = shown
+        if shown and not np.allclose(ends, self._gap.points, rtol=0.0, atol=1e-3):
+            self._gap.points = ends
