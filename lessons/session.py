@@ -129,9 +129,9 @@ class Session:
     def _take(self, event: Event) -> None:
         match event:
             case Set(path, value):
-                self._adopt(changed(self.settings, path, value))
+                self.adopt(changed(self.settings, path, value))
             case MoveLevel(level, to):
-                self._adopt(replace(self.settings, levels=moved(self.settings.levels, level, to)))
+                self.adopt(replace(self.settings, levels=moved(self.settings.levels, level, to)))
             case MoveTarget(task, value):
                 tasks = {each.name: each for each in _tasks(self.settings.levels)}
                 move_target(tasks, self.references, task, value)
@@ -148,7 +148,9 @@ class Session:
             case Reset():
                 self.reset()
 
-    def _adopt(self, settings: SceneSettings) -> None:
+    def adopt(self, settings: SceneSettings) -> None:
+        """Takes over settings at once, as an event that changed them would. Raises InputError if they do
+        not fit."""
         if settings.plant != self.settings.plant:
             self.plant.configure(settings.plant)
         if settings.controller == self.settings.controller:

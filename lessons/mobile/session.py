@@ -110,7 +110,7 @@ class MobileSession:
     def _take(self, event: MobileEvent) -> None:
         match event:
             case Set(path, value):
-                self._adopt(changed(self.settings, path, value))
+                self.adopt(changed(self.settings, path, value))
             case MoveLevel(name, to):
                 self.progress = reorder(self.progress, name, to)
             case MoveTarget(name, goal):
@@ -126,7 +126,7 @@ class MobileSession:
             case Appear():
                 htmpc = self.settings.htmpc
                 obstacles = tuple(each for each in htmpc.obstacles if each.name != event.name)
-                self._adopt(
+                self.adopt(
                     replace(self.settings, htmpc=replace(htmpc, obstacles=(*obstacles, event.ball())))
                 )
             case Push():
@@ -134,7 +134,9 @@ class MobileSession:
             case Reset():
                 self.reset()
 
-    def _adopt(self, settings: MobileSettings) -> None:
+    def adopt(self, settings: MobileSettings) -> None:
+        """Takes over settings at once, as an event that changed them would. Raises InputError if they do
+        not fit."""
         # A controller that refuses them leaves everything as it is; the window's order comes with the tick.
         fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
         if settings.controller != self.settings.controller:

@@ -1,0 +1,156 @@
+"""A follower lives through what its leader lives through: the same script, to the tick and to the bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.follow import Follower
+from lessons.scene import Scene
+from lessons.scenes import load_scene
+from lessons.session import Session
+from robots import InputError
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("iiwa14-hold")
+
+
+class Pair:
+    """A leader that is told of events, and a follower that only hears what the leader's log says."""
+
+    def __init__(self, scene: Scene, *own: str) -> None:
+        self.leader = Session(scene)
+        self.follower = Follower(scene, scene.settings, own)
+        self.rows: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+        self._told = 0
+
+    def lead(self, ticks: int) -> None:
+        self.rows[0].extend(self.leader.tick().copy() for _ in range(ticks))
+
+    def tell(self) -> None:
+        log = self.leader.log
+        self.follower.hear(log[self._told :], self.leader.t)
+        self._told = len(log)
+
+    def follow(self) -> None:
+        self.tell()
+        while (row := self.follower.tick()) is not None:
+            self.rows[1].append(row.copy())
+
+    def post(self, *events: Event) -> None:
+        for event in events:
+            self.leader.post(event)
+
+    def compare(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of both without what a clock measured."""
+        timed = [self.leader.layout.fields["step_us"]]
+        timed += [self.leader.layout.fields[f"time_us/{name}"] for name in self.leader.layout.levels]
+        both = tuple(np.array(rows) for rows in self.rows)
+        for rows in both:
+            for field in timed:
+                rows[:, field] = 0.0
+        return both[0], both[1]
+
+
+def hand(pair: Pair) -> np.ndarray:
+    return pair.leader.plant.frame_pose(pair.leader.robot.tip)[1]
+
+
+def test_equal_settings_give_equal_rows_whatever_happens(scene: Scene) -> None:
+    """Events of every kind at odd times, heard of in portions of odd sizes, in the middle of pauses too."""
+    pair = Pair(scene)
+    rng = np.random.default_rng(3)
+    target = tuple(hand(pair) + np.array([0.02, 0.08, -0.03]))
+    script: tuple[tuple[Event, ...], ...] = (
+        (MoveTarget("position", target),),
+        (Push(scene.robot.joint_names[4], (0.0, 25.0, 0.0), seconds=0.013), Set("horizon", 3)),
+        (Set("horizon", 3),),
+        (MoveLevel("posture", 1), Set("levels.posture.Q", 40.0)),
+        (Set("plant.payload_kg", 2.0), Set("controller", "hqp")),
+        (Set("controller", "himpc"), Set("levels.orientation.enabled", False)),
+        (Reset(), MoveTarget("position", target)),
+        (Set("T_s", 0.002), Set("M_bar_scale", 1.3)),
+    )
+    for events in script:
+        if any(isinstance(event, Reset) for event in events):
+            pair.follow()  # what it had not run before a reset it would skip
+        pair.post(*events)
+        if rng.random() < 0.5:
+            pair.leader.drain()  # posted while paused: it takes effect before time passes
+            pair.tell()
+        pair.lead(int(rng.integers(1, 60)))
+        pair.follow()
+        pair.lead(int(rng.integers(1, 30)))
+    pair.follow()
+    led, followed = pair.compare()
+    assert len(led) > 200 and pair.leader.log and not pair.leader.notices
+    assert np.array_equal(led, followed, equal_nan=True)
+    assert pair.follower.session.settings == pair.leader.settings and pair.follower.behind == 0.0
+
+
+def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: Scene) -> None:
+    pair = Pair(scene, "controller=weighted", "levels.position.Q=50")
+    for event in (
+        Set("controller", "osf"),
+        Set("levels.position.Q", 300.0),
+        Set("Q", 120.0),
+        Set("horizon", 4),
+        MoveLevel("position", 2),
+    ):
+        pair.post(event)
+        pair.lead(3)
+        pair.follow()
+    own, leader = pair.follower.session.settings, pair.leader.settings
+    assert own.controller == "weighted" and leader.controller == "osf"
+    Q = {level.name: level.Q for level in own.levels}
+    assert Q == {"position": 50, "orientation": 120, "posture": 120}
+    assert own.horizon == 4 and [level.name for level in own.levels] == [level.name for level in leader.levels]
+    assert pair.follower.session.t == pair.leader.t
+
+
+def test_a_change_of_the_difference_itself_is_not_even_noticed(scene: Scene) -> None:
+    """The leader turns N up and down: a follower with its own N runs as if nothing had happened."""
+    moved, left = Pair(scene, "horizon=2"), Pair(scene, "horizon=2")
+    for N in (7, 9, 3):
+        moved.post(Set("horizon", N))
+        for pair in (moved, left):
+            pair.lead(5)
+            pair.follow()
+    assert np.array_equal(moved.compare()[1], left.compare()[1], equal_nan=True)
+
+
+def test_another_period_runs_to_the_same_time_and_takes_events_then(scene: Scene) -> None:
+    pair = Pair(scene, "T_s=0.002")
+    pair.lead(7)
+    pair.post(Push(scene.robot.joint_names[3], (0.0, 40.0, 0.0), seconds=0.01))
+    pair.lead(8)
+    pair.follow()
+    assert pair.follower.session.t == pytest.approx(0.014)
+    assert [t for t, _ in pair.follower.session.log] == pytest.approx([0.008])
+    pair.lead(1)
+    pair.follow()
+    assert pair.follower.session.t == pytest.approx(0.016) and pair.follower.behind == 0.0
+
+
+def test_it_never_runs_ahead_and_a_reset_brings_it_back_at_once(scene: Scene) -> None:
+    pair = Pair(scene)
+    assert pair.follower.tick() is None
+    pair.lead(50)
+    pair.tell()
+    assert pair.follower.behind == pytest.approx(0.05)
+    for _ in range(10):
+        assert pair.follower.tick() is not None
+    pair.post(Set("horizon", 8), Reset())
+    pair.lead(4)
+    pair.follow()
+    assert len(pair.rows[1]) == 4 and pair.follower.session.settings.horizon == 8
+    led, followed = pair.compare()
+    assert np.array_equal(led[-4:], followed, equal_nan=True)
+
+
+def test_own_settings_that_do_not_fit_are_refused(scene: Scene) -> None:
+    with pytest.raises(InputError, match="horizon"):
+        Follower(scene, scene.settings, ("horizn=3",))
