@@ -29,6 +29,7 @@ class Block:
         self._memory = shared_memory.SharedMemory(name=name, create=name is None, size=size)
         buffer = self._memory.buf
         self._head = np.ndarray((8,), np.int64, buffer)
+        self._time = np.ndarray((1,), np.float64, buffer, 56)
         self._ring = np.ndarray((self.rows, width), np.float64, buffer, _HEAD)
         self._poses = np.ndarray((bodies, 7), np.float64, buffer, _HEAD + 8 * self.rows * width)
         if name is None:
@@ -52,20 +53,27 @@ class Block:
         self._ring[count % self.rows] = row
         self._head[0] = count + 1
 
-    def write_poses(self, poses: np.ndarray) -> None:
+    def write_poses(self, poses: np.ndarray, t: float = 0.0) -> None:
+        """t: the simulated time of the poses, s."""
         self._head[1] += 1  # odd: being written
         self._poses[:] = poses
+        self._time[0] = t
         self._head[1] += 1
 
     def poses(self) -> np.ndarray:
-        """A copy that is not torn between two instants (or, in the unlikely fourth try, may be)."""
-        copy = self._poses.copy()
+        """A copy of the poses written last."""
+        return self.moment()[1]
+
+    def moment(self) -> tuple[float, np.ndarray]:
+        """(simulated time in s, poses), not torn between two instants (or, in the unlikely fourth try, may
+        be)."""
+        t, copy = float(self._time[0]), self._poses.copy()
         for _ in range(3):
             before = int(self._head[1])
-            copy = self._poses.copy()
+            t, copy = float(self._time[0]), self._poses.copy()
             if before % 2 == 0 and before == int(self._head[1]):
                 break
-        return copy
+        return t, copy
 
     def since(self, count: int) -> tuple[int, np.ndarray]:
         """(index of the first row, copies of the rows) from `count` on, as far as they are still there."""
@@ -75,7 +83,7 @@ class Block:
 
     def close(self, unlink: bool = False) -> None:
         """Detaches; `unlink` frees the memory once every process has detached."""
-        del self._head, self._ring, self._poses
+        del self._head, self._time, self._ring, self._poses
         self._memory.close()
         if unlink:
             self._memory.unlink()

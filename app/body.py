@@ -7,8 +7,11 @@ import numpy as np
 import pinocchio as pin
 
 from app.block import Block
+from app.leader import Leader
 from app.messages import (
     Command,
+    Lead,
+    Leash,
     Load,
     Play,
     Post,
@@ -40,10 +43,11 @@ class Body:
         self.resets = 0
         self._steps = 0
         self._sent: AnySettings | None = None
+        self.leader = Leader()
         self._enter(choice)
 
     def _enter(self, choice: SceneChoice) -> None:
-        scene = scene_of(choice)
+        scene = self._load_scene(choice)
         self.run = start(scene, choice.seed)
         self.scene, self.choice = scene, choice
         robot = self.session.robot
@@ -57,10 +61,15 @@ class Body:
         self._fresh_start()
         self.write_poses()
 
+    def _load_scene(self, choice: SceneChoice) -> AnyScene:
+        return scene_of(choice)
+
     def _fresh_start(self) -> None:
         self.ticks = self.over_budget = self.late = self._steps = 0
         self.resets += 1
         self._sent = None
+        if self.leader.on:
+            self.leader.begin(self.choice, self.session)
 
     @property
     def session(self) -> AnySession:
@@ -94,9 +103,25 @@ class Body:
                 self.write_poses()
             case Load(choice):
                 return self._load(choice)
+            case Lead(on):
+                self._lead(on)
+            case Leash(until):
+                self.leader.leash = until if self.leader.on else self.leader.leash
             case _:
                 pass
         return None
+
+    def _lead(self, on: bool) -> None:
+        if not on:
+            self.leader.end()
+            return
+        if self.run.between:
+            self.tick()
+        self.session.post(Reset())
+        self.session.drain()
+        self.resets += 1
+        self.write_poses()
+        self.leader.begin(self.choice, self.session)
 
     def _load(self, choice: SceneChoice) -> Report:
         before = self.block
@@ -152,7 +177,7 @@ class Body:
         for joint in range(1, model.njoints):
             poses[joint - 1] = _pose(data.oMi[joint])
         poses[-1] = _pose(data.oMf[self._tip])
-        self.block.write_poses(poses)
+        self.block.write_poses(poses, self.session.t)
 
     # ---------------------------------------------------------------- reports
 

@@ -1,33 +1,47 @@
-"""The last seconds of telemetry, thinned for plots so that no spike is lost."""
+"""The last minute of telemetry, thinned for plots so that no spike is lost."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from app.block import Block
 from himpc.telemetry import AT_POSITION, AT_VELOCITY, Layout
 
-BUCKETS = 160
+WINDOW = 8.0  # s of simulated time in the plots
+BUCKETS = 160  # in a window
+KEPT = 60.0  # s of simulated time that one can look back
+_SPAN = WINDOW / BUCKETS
+_SLOTS = round((KEPT + WINDOW) / _SPAN)
 _SLOW = 0.85  # of the velocity limit: the controller keeps a few per cent free of its own
+
+Take = Callable[[np.ndarray], None]
 
 
 class History:
-    """Per bucket of ticks and per column: the least and the greatest value, in the order they came.
+    """Per bucket of simulated time and per column: the least and the greatest value, in the order they came,
+    and the bucket's last row.
 
-    Buckets are aligned to the tick count, so that a curve slides instead of shimmering. Each row is looked
-    at once, whatever the window.
+    Buckets are aligned to simulated time, so that a curve slides instead of shimmering, and two robots on one
+    clock have the same buckets. Each row is looked at once, whatever the window. A reset, which turns the
+    time back, drops the curves: a jump in a curve would look like a motion.
     """
 
-    def __init__(self, block: Block, layout: Layout, ticks_per_bucket: int) -> None:
+    def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
+        """takers: are given every portion of rows of one run, too."""
         self.layout = layout
         self.latest = np.full(layout.size, np.nan)
         self.bound_ticks = np.zeros((layout.fields["at_bound"].stop - layout.fields["at_bound"].start, 3))
+        self.bucket = -1
+        self._takers = takers
         self._block = block
-        self._size = max(1, ticks_per_bucket)
-        self._bucket = -1
+        self._t = layout.fields["t"].start
         self._count = 0
-        self._pairs = np.full((BUCKETS, 2, layout.size), np.nan)
-        self._bits = np.zeros((BUCKETS, len(self.bound_ticks)), np.int64)
+        self._numbers = np.full(_SLOTS, -1)
+        self._pairs = np.full((_SLOTS, 2, layout.size), np.nan)
+        self._lasts = np.full((_SLOTS, layout.size), np.nan)
+        self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
         self._first = np.full(layout.size, np.nan)  # of the open bucket, for the order of the pair
 
     @property
@@ -41,18 +55,27 @@ class History:
         if not len(rows):
             return 0
         self._count = start + len(rows)
+        before = np.concatenate([[self.latest[self._t]], rows[:-1, self._t]])
+        turns = np.flatnonzero(rows[:, self._t] < before)
+        if turns.size:
+            self.forget()
+        self._take(rows[turns[-1] :] if turns.size else rows)
+        return len(rows)
+
+    def _take(self, rows: np.ndarray) -> None:
         self.latest = rows[-1]
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         bits = self._viable(bits, rows)
         for k in range(3):
             self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
-        numbers = (start + np.arange(len(rows))) // self._size
+        numbers = np.floor(rows[:, self._t] / _SPAN + 1e-6).astype(np.int64)
         for bucket in np.unique(numbers):
             of_bucket = numbers == bucket
-            self._merge(int(bucket), rows[of_bucket])
-            self._bits[-1] |= np.bitwise_or.reduce(bits[of_bucket], axis=0)
-        return len(rows)
+            slot = self._merge(int(bucket), rows[of_bucket])
+            self._bits[slot] |= np.bitwise_or.reduce(bits[of_bucket], axis=0)
+        for take in self._takers:
+            take(rows)
 
     def _viable(self, bits: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """A joint held by its velocity row far below its velocity limit is really held by its position
@@ -62,42 +85,73 @@ class History:
         by_position = (bits & AT_VELOCITY != 0) & slow
         return np.where(by_position, (bits & ~AT_VELOCITY) | AT_POSITION, bits)
 
-    def _merge(self, bucket: int, rows: np.ndarray) -> None:
-        if bucket != self._bucket:
-            skipped = min(bucket - self._bucket, BUCKETS)
-            self._pairs = np.roll(self._pairs, -skipped, axis=0)
-            self._pairs[-skipped:] = np.nan
-            self._bits = np.roll(self._bits, -skipped, axis=0)
-            self._bits[-skipped:] = 0
-            self._bucket = bucket
+    def _merge(self, bucket: int, rows: np.ndarray) -> int:
+        slot = bucket % _SLOTS
+        if self._numbers[slot] != bucket:
+            self._numbers[slot] = bucket
+            self._bits[slot] = 0
             self._first = rows[0]
             low, high = rows.min(axis=0), rows.max(axis=0)
         else:
-            pair = self._pairs[-1]
+            pair = self._pairs[slot]
             low = np.fmin(pair.min(axis=0), rows.min(axis=0))
             high = np.fmax(pair.max(axis=0), rows.max(axis=0))
         rising = rows[-1] >= self._first
-        self._pairs[-1, 0] = np.where(rising, low, high)
-        self._pairs[-1, 1] = np.where(rising, high, low)
+        self._pairs[slot, 0] = np.where(rising, low, high)
+        self._pairs[slot, 1] = np.where(rising, high, low)
+        self._lasts[slot] = rows[-1]
+        self.bucket = bucket
+        return slot
 
-    def columns(self, which: slice | np.ndarray) -> np.ndarray:
-        """(2 · BUCKETS, k) of some columns, oldest first; NaN where nothing was recorded."""
-        return self._pairs[:, :, which].reshape(2 * BUCKETS, -1)
+    def window(self, until: float | None = None) -> Window:
+        """What the plots show when the clock reads `until` (s); None: now."""
+        end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
+        wanted = np.arange(end - BUCKETS + 1, end + 1)
+        slots = wanted % _SLOTS
+        known = self._numbers[slots] == wanted
+        known &= wanted >= 0
+        return Window(self.layout, known, slots, self._pairs, self._bits)
+
+    def at(self, t: float) -> np.ndarray:
+        """The row that was the newest one when the clock read t (s), as near as is known."""
+        bucket = int(np.floor(t / _SPAN - 1e-6))
+        slot = bucket % _SLOTS
+        return self._lasts[slot].copy() if bucket >= 0 and self._numbers[slot] == bucket else self.latest
+
+    def forget(self) -> None:
+        """Drops everything, for after a reset."""
+        self._numbers[:] = -1
+        self.bucket = -1
+        self.bound_ticks[:] = 0
+
+
+class Window:
+    """What the plots show at one moment: BUCKETS pairs, oldest first."""
+
+    def __init__(
+        self, layout: Layout, known: np.ndarray, slots: np.ndarray, pairs: np.ndarray, bits: np.ndarray
+    ) -> None:
+        self.layout = layout
+        self._known, self._slots = known, slots
+        self._pairs, self._bits = pairs, bits
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing at all was recorded in it."""
+        return not bool(self._known.any())
+
+    def columns(self, which: slice) -> np.ndarray:
+        """(2 · BUCKETS, k) of some columns; NaN where nothing was recorded."""
+        found = self._pairs[:, :, which][self._slots]
+        found[~self._known] = np.nan
+        return found.reshape(2 * BUCKETS, -1)
 
     def at_bound(self, kind: int) -> np.ndarray:
         """(2 · BUCKETS, n) whether a joint was at its torque (0), velocity (1) or position (2) bound."""
-        return np.repeat(self._bits & (1 << kind) != 0, 2, axis=0)
+        hit = (self._bits[self._slots] & (1 << kind) != 0) & self._known[:, None]
+        return np.repeat(hit, 2, axis=0)
 
-    def ages(self, T_s: float) -> np.ndarray:
-        """(2 · BUCKETS,) seconds before now, ≤ 0."""
-        return np.linspace(-1.0, 0.0, 2 * BUCKETS) * (BUCKETS * self._size * T_s)
-
-    def clear_bounds(self) -> None:
-        """Starts the time at bounds again (after a reset)."""
-        self.bound_ticks[:] = 0
-
-    def forget(self) -> None:
-        """Drops the curves, for after a reset: a jump in a curve would look like a motion."""
-        self._pairs[:] = np.nan
-        self._bits[:] = 0
-        self.clear_bounds()
+    @staticmethod
+    def ages() -> np.ndarray:
+        """(2 · BUCKETS,) seconds before the window's end, ≤ 0."""
+        return np.linspace(-WINDOW, 0.0, 2 * BUCKETS)

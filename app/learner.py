@@ -1,57 +1,32 @@
-"""One learner: a simulation process and what is known about it. Outlives page reloads."""
+"""One learner: a simulation process, perhaps its ghost, and what is known about them. Outlives page reloads."""
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable
-from typing import TypeVar
 
-from app.block import Block
-from app.history import BUCKETS, History
-from app.messages import Command, Failed, Load, Ready, Refused, Report, ResetAll, SceneChoice, Status
+from app.ghost import Ghost
+from app.messages import Lead, Leash, Load, Ready, Report, ResetAll, SceneChoice, Script
 from app.process import Process, Spares
-from himpc.telemetry import Layout
-from lessons.kinds import AnySettings
-
-WINDOW = 8.0  # s of simulated time in the plots
-T = TypeVar("T")
+from app.simulation import Simulation
+from lessons import lesson
 
 
-class Learner:
-    """Owns the process of one browser tab. Reports arrive on the process' thread; the page reads the fields
-    from its own loop. `changed` counts scenes and restarts: the page rebuilds itself when it differs."""
+class Learner(Simulation):
+    """The simulation of one browser tab, and the ghost that follows it, if there is one."""
 
     def __init__(self, token: str, choice: SceneChoice, spares: Spares) -> None:
         self.token = token
         self.choice = choice
         self.attached = False
         self.left_at = time.monotonic()
-        self.ready: Ready | None = None
-        self.status: Status | None = None
-        self.settings: AnySettings | None = None
-        self.failure: str | None = None
-        self.changed = 0
-        self._refusals: list[str] = []
-        self._notices: list[str] = []
-        self._spares = spares
-        self._lock = threading.RLock()
-        self._block: Block | None = None
-        self._history: History | None = None
-        self._closed = False
-        self._start()
+        self.ghost: Ghost | None = None
+        super().__init__(spares)
 
     def _start(self) -> None:
-        process = self._process = self._spares.take()
-        process.listen(lambda report: self._hear(process, report))
-        process.send(Load(self.choice))
-
-    @property
-    def pid(self) -> int | None:
-        return self._process.pid
-
-    def send(self, command: Command) -> None:
-        self._process.send(command)
+        super()._start()
+        self.send(Load(self.choice))
+        if self.ghost is not None:
+            self.send(Lead(True))
 
     def reset_all(self) -> None:
         """The scene from its beginning; after a crash in a new process."""
@@ -70,66 +45,54 @@ class Learner:
             self._start()
         before.close()
 
-    # ---------------------------------------------------------------- reports
+    def _enter(self, ready: Ready) -> None:
+        super()._enter(ready)
+        self.choice = ready.choice
 
     def _hear(self, process: Process, report: Report) -> None:
+        super()._hear(process, report)
+        ghost = self.ghost
+        if isinstance(report, Script) and ghost is not None and process is self._process:
+            ghost.hear(report)
+
+    # ---------------------------------------------------------------- ghost
+
+    def start_ghost(self, ghost: lesson.Ghost) -> None:
+        """A second robot, with `ghost.set` on top of whatever is set here, in the same scene: the scene
+        starts again so that both begin together. A ghost that is there already becomes the new one. If
+        `ghost.set` does not fit the scene, a notice says so and there is no ghost."""
         with self._lock:
-            if self._closed or process is not self._process:
+            if self._closed:
                 return
-            match report:
-                case Ready():
-                    self._enter(report)
-                case Status():
-                    self.status = report
-                    self.settings = report.settings or self.settings
-                    self._notices += report.notices
-                case Refused(sentence):
-                    self._refusals.append(sentence)
-                case Failed(sentence):
-                    self.failure = sentence
+            before = self.ghost
+            self.ghost = Ghost(
+                ghost.words,
+                ghost.set,
+                self._spares,
+                lambda until: self.send(Leash(until)),
+                self._lost_ghost,
+            )
+        if before is not None:
+            before.close()
+        self.send(Lead(True))
 
-    def _enter(self, ready: Ready) -> None:
-        self._free()
-        self.ready, self.choice = ready, ready.choice
-        self.settings, self.status = ready.settings, None
-        self._block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
-        self._history = _history(self._block, ready.layout, ready.settings.T_s)
-        self.changed += 1
-
-    def _free(self) -> None:
-        block, self._block, self._history = self._block, None, None
-        if block is not None:
-            block.close(unlink=True)
-
-    def take_messages(self) -> tuple[list[str], list[str]]:
-        """(refusals, notices) since the last call."""
+    def stop_ghost(self) -> None:
+        """The robot goes on alone."""
         with self._lock:
-            refusals, self._refusals = self._refusals, []
-            notices, self._notices = self._notices, []
-            return refusals, notices
+            before, self.ghost = self.ghost, None
+        self.send(Lead(False))
+        if before is not None:
+            before.close()
 
-    # ---------------------------------------------------------------- telemetry
-
-    def read(self, look: Callable[[Block, History], T]) -> T | None:
-        """What `look` finds, while the memory cannot be freed under it; None before the first scene."""
+    def _lost_ghost(self, ghost: Ghost, sentence: str) -> None:
         with self._lock:
-            if self._block is None or self._history is None:
-                return None
-            return look(self._block, self._history)
-
-    def new_time_step(self, T_s: float) -> None:
-        """Thins the plots anew after T_s changed."""
-        with self._lock:
-            if self._block is not None and self._history is not None:
-                self._history = _history(self._block, self._history.layout, T_s)
+            if ghost is not self.ghost:
+                return
+            self._notices.append(f"There is no ghost: {sentence}")
+        self.stop_ghost()
 
     def close(self) -> None:
-        with self._lock:
-            self._closed = True
-        self._process.close()
-        with self._lock:
-            self._free()
-
-
-def _history(block: Block, layout: Layout, T_s: float) -> History:
-    return History(block, layout, round(WINDOW / T_s / BUCKETS))
+        super().close()
+        ghost, self.ghost = self.ghost, None
+        if ghost is not None:
+            ghost.close()

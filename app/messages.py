@@ -69,11 +69,44 @@ class Load:
 
 
 @dataclass(frozen=True)
+class Lead:
+    """Whether another process follows this one. On: the scene is reset, so that both begin together, and
+    `Script` reports tell what happens from there on."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
+class Leash:
+    """Simulated time, s, beyond which a leader waits for its follower."""
+
+    until: float
+
+
+@dataclass(frozen=True, eq=False)
+class Begin:
+    """Where a follower begins: the leader's scene, its settings at its last reset, and its seed."""
+
+    choice: SceneChoice
+    settings: AnySettings
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Follow:
+    """What a follower hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
+    they count where the script begins anew."""
+
+    script: Script
+    own: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Quit:
     """End the process."""
 
 
-Command = Post | Play | Step | Speed | ResetAll | Load | Quit
+Command = Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Quit
 
 
 # ------------------------------------------------------------------ simulation → page
@@ -203,4 +236,24 @@ class Failed:
     sentence: str
 
 
-Report = Ready | Status | Refused | Failed
+@dataclass(frozen=True, eq=False)
+class Script:
+    """What a leader's follower must hear.
+
+    events: what the leader's log gained; t: the time the leader has come to, s; begin: begin anew from there
+    before taking the events.
+    """
+
+    events: tuple[tuple[float, AnyEvent], ...]
+    t: float
+    begin: Begin | None
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The time a follower has come to, s."""
+
+    t: float
+
+
+Report = Ready | Status | Refused | Failed | Script | Reached

@@ -10,12 +10,14 @@ import traceback
 from multiprocessing.connection import Connection
 
 from app.body import Body
-from app.messages import Command, Failed, Load, Quit, Refused, SceneChoice
+from app.follower import follow
+from app.messages import Command, Failed, Follow, Load, Quit, Refused, SceneChoice
 from app.pacing import Pacer
 from robots import InputError
 
 POSE_PERIOD = 1 / 60  # s
 STATUS_PERIOD = 0.1  # s
+SCRIPT_PERIOD = 0.02  # s
 _CHUNK = 0.01  # s: the longest run before commands are looked at again
 
 
@@ -35,6 +37,9 @@ def main(pipe: Connection) -> None:
 
 def _serve(pipe: Connection) -> None:
     body = _first(pipe)
+    if isinstance(body, Follow):
+        follow(pipe, body)
+        return
     if body is None:
         return
     try:
@@ -43,11 +48,13 @@ def _serve(pipe: Connection) -> None:
         body.block.close()
 
 
-def _first(pipe: Connection) -> Body | None:
+def _first(pipe: Connection) -> Body | Follow | None:
     while True:
         command: Command = pipe.recv()
         if isinstance(command, Quit):
             return None
+        if isinstance(command, Follow):
+            return command
         if isinstance(command, Load):
             body = _try(pipe, command.choice)
             if body is not None:
@@ -66,7 +73,7 @@ def _try(pipe: Connection, choice: SceneChoice) -> Body | None:
 
 def _simulate(pipe: Connection, body: Body) -> None:
     pacer = Pacer(time.perf_counter())
-    next_pose = next_status = 0.0
+    next_pose = next_status = next_script = 0.0
     while True:
         while pipe.poll():
             command: Command = pipe.recv()
@@ -78,14 +85,14 @@ def _simulate(pipe: Connection, body: Body) -> None:
                 pacer.rest(time.perf_counter())
         pacer.speed = body.speed
         now = time.perf_counter()
+        ran = 0
         if body.running:
             due = pacer.due(now, body.run.step_s)
-            _run(body, pacer, due, until=now + _CHUNK)
+            ran = _run(body, pacer, due, until=now + _CHUNK)
         else:
             pacer.rest(now)
             body.settle()
             body.tick(body.take_steps())
-            due = 0
         now = time.perf_counter()
         if now >= next_pose:
             body.write_poses()
@@ -93,17 +100,26 @@ def _simulate(pipe: Connection, body: Body) -> None:
         if now >= next_status:
             pipe.send(body.status(pacer.real_time_factor(now), pacer.capped(now)))
             next_status = now + STATUS_PERIOD
-        if due == 0:
+        if now >= next_script:
+            script = body.leader.script(body.session)
+            if script is not None:
+                pipe.send(script)
+            next_script = now + SCRIPT_PERIOD
+        if ran == 0:
             pipe.poll(0.001 if body.running else 0.02)
 
 
-def _run(body: Body, pacer: Pacer, due: int, until: float) -> None:
-    for _ in range(due):
+def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:
+    """Runs up to so many steps, and returns how many it were."""
+    for ran in range(due):
         step_s = body.run.step_s
+        if body.leader.waits(body.session.t + step_s):
+            return ran
         body.advance()
         pacer.ran(1, step_s)
         if time.perf_counter() > until:
-            return
+            return ran + 1
+    return due
 
 
 def _sentence(error: Exception) -> str:

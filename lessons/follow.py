@@ -6,20 +6,34 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from lessons.events import Event, MoveLevel, Reset, Set
-from lessons.run import with_assignments
+from lessons.events import MoveLevel, Reset, Set
+from lessons.kinds import AnyEvent, AnyScene, AnySession, AnySettings, prepared
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.session import MobileSession
+from lessons.mobile.settings import MobileSettings
+from lessons.mobile.settings import changed as changed_mobile
 from lessons.scene import Scene
 from lessons.session import Session
 from lessons.settings import SceneSettings, changed
 from robots import InputError
 
-Array = NDArray[np.float64]
-
 _SAME = 1e-6
 """s: times closer than this are the same moment; ticks are further apart."""
+
+
+def followed(scene: AnyScene, leader: AnySettings, own: Sequence[str]) -> AnyScene:
+    """The scene that a follower runs.
+
+    Args:
+        scene: as the leader loaded it.
+        leader: the leader's settings at its last reset, where both begin.
+        own: assignments "PATH=VALUE" on top of them.
+
+    Raises:
+        InputError: the assignments do not fit the scene.
+    """
+    # What the scene's own script does is in the leader's log.
+    return replace(_with(scene, leader, own), events=())
 
 
 class Follower:
@@ -32,14 +46,14 @@ class Follower:
     A reset is taken as soon as it is heard of, even if the follower had not yet come to where the leader was.
     """
 
-    def __init__(self, scene: Scene, leader: SceneSettings, own: Sequence[str], seed: int = 0) -> None:
-        """scene: as the leader loaded it; leader: its settings at the last reset, where both begin; own:
-        assignments; seed: the leader's. Raises InputError if the assignments do not fit the scene."""
+    def __init__(self, session: AnySession, leader: AnySettings, own: Sequence[str]) -> None:
+        """session: of `followed`, fresh; leader: the leader's settings at the last reset, where both begin;
+        own: assignments."""
+        self.session = session
+        self._scene = session.scene
         self._leader = leader
         self._own = tuple(own)
-        # The leader's log holds what its scene's own script did.
-        self.session = Session(replace(scene, settings=with_assignments(leader, self._own), events=()), seed)
-        self._script: deque[tuple[float, Event]] = deque()
+        self._script: deque[tuple[float, AnyEvent]] = deque()
         self._until = 0.0
 
     @property
@@ -47,49 +61,73 @@ class Follower:
         """s of the leader's time that are still to be run."""
         return max(0.0, self._until - self.session.t)
 
-    def hear(self, script: Iterable[tuple[float, Event]], until: float) -> None:
+    def hear(self, script: Iterable[tuple[float, AnyEvent]], until: float) -> None:
         """What the leader's log gained, and the time the leader has come to, s: an event of earlier than
         that will not come any more."""
         self._script.extend(script)
         self._until = until
         self._skip_to_reset()
-        self._take_due()
+        self.take()
 
-    def tick(self) -> Array | None:
-        """One control period; its row as of `Session.tick`. None: the leader is no further."""
-        session = self.session
-        if session.t + session.settings.T_s > self._until + _SAME:
-            return None
-        row = session.tick()
-        self._take_due()
-        return row
+    @property
+    def due(self) -> bool:
+        """Whether the leader is at least one of the follower's control periods further."""
+        return self.session.t + self.session.settings.T_s <= self._until + _SAME
+
+    def take(self) -> None:
+        """Takes the events that are due; to be called after every control period."""
+        while self._script and self._script[0][0] <= self.session.t + _SAME:
+            self._take(self._script.popleft()[1])
+        self.session.drain()
 
     def _skip_to_reset(self) -> None:
         resets = [k for k, (_, event) in enumerate(self._script) if isinstance(event, Reset)]
         for _ in range(resets[-1] + 1 if resets else 0):
             self._take(self._script.popleft()[1])
 
-    def _take_due(self) -> None:
-        while self._script and self._script[0][0] <= self.session.t + _SAME:
-            self._take(self._script.popleft()[1])
-        self.session.drain()
-
-    def _take(self, event: Event) -> None:
-        if not isinstance(event, (Set, MoveLevel)):
-            self.session.post(event)
+    def _take(self, event: AnyEvent) -> None:
+        settings = _after(self._leader, event)
+        if settings is None:
+            self.session.post(event)  # pyright: ignore[reportArgumentType]
             self.session.drain()
             return
-        before, self._leader = self._leader, _after(self._leader, event)
+        before, self._leader = self._leader, settings
         try:
-            settings = with_assignments(self._leader, self._own)
-            # The leader's controller was told, even if that was what it had: so is the follower's.
-            if settings != self.session.settings or self._leader == before:
-                self.session.adopt(settings)
+            found = _with(self._scene, settings, self._own).settings
+            # A leader that sets what it had already tells its controller all the same: so does a follower.
+            if found != self.session.settings or settings == before:
+                self._adopt(found)
         except InputError as error:
             self.session.notices.append(str(error))
 
+    def _adopt(self, settings: AnySettings) -> None:
+        match self.session, settings:
+            case Session(), SceneSettings():
+                self.session.adopt(settings)
+            case MobileSession(), MobileSettings():
+                self.session.adopt(settings)
+            case _:
+                raise TypeError("a session never changes its kind")
 
-def _after(settings: SceneSettings, event: Set | MoveLevel) -> SceneSettings:
-    if isinstance(event, Set):
-        return changed(settings, event.path, event.value)
-    return replace(settings, levels=moved(settings.levels, event.level, event.to))
+
+def _with(scene: AnyScene, settings: AnySettings, own: Sequence[str]) -> AnyScene:
+    match scene, settings:
+        case Scene(), SceneSettings():
+            return prepared(replace(scene, settings=settings), None, own)
+        case MobileScene(), MobileSettings():
+            return prepared(replace(scene, settings=settings), None, own)
+        case _:
+            raise TypeError("a scene and its settings are of one kind")
+
+
+def _after(settings: AnySettings, event: AnyEvent) -> AnySettings | None:
+    """What an event makes of settings; None if it leaves them alone."""
+    match settings, event:
+        case SceneSettings(), Set(path, value):
+            return changed(settings, path, value)
+        case SceneSettings(), MoveLevel(level, to):
+            return replace(settings, levels=moved(settings.levels, level, to))
+        case MobileSettings(), Set(path, value):
+            return changed_mobile(settings, path, value)
+        case _:
+            return None

@@ -10,8 +10,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from app.history import BUCKETS
-from app.learner import WINDOW
+from app.history import BUCKETS, WINDOW
 from app.palette import RGB, css
 
 _NUDGE = 10

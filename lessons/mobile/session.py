@@ -126,9 +126,7 @@ class MobileSession:
             case Appear():
                 htmpc = self.settings.htmpc
                 obstacles = tuple(each for each in htmpc.obstacles if each.name != event.name)
-                self.adopt(
-                    replace(self.settings, htmpc=replace(htmpc, obstacles=(*obstacles, event.ball())))
-                )
+                self.adopt(replace(self.settings, htmpc=replace(htmpc, obstacles=(*obstacles, event.ball()))))
             case Push():
                 raise InputError("this scene is driven by velocity servos: a push would not move it")
             case Reset():

@@ -1,0 +1,85 @@
+"""How well a run has done since its last reset: running sums over every tick, none left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from himpc.telemetry import Layout
+
+
+@dataclass(frozen=True)
+class Result:
+    """seconds: of the run; rmse: per task, of ‖x̃‖, m or rad; torque_share: largest |τ| asked for over its
+    bound; unsolved: QPs; step_ms, longest_ms: mean and longest control step."""
+
+    seconds: float
+    rmse: dict[str, float]
+    torque_share: float
+    unsolved: int
+    step_ms: float
+    longest_ms: float
+
+
+class Score:
+    """Takes portions of rows in order; `clear` where a run begins."""
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self.clear()
+
+    def clear(self) -> None:
+        self._ticks = 0
+        self._squares = {task.name: 0.0 for task in self._layout.tasks}
+        self._known = dict.fromkeys(self._squares, 0)
+        self._share = self._step_us = self._longest_us = 0.0
+        self._unsolved = 0
+        self._t = -1.0
+        self._first = 0.0
+
+    def take(self, rows: np.ndarray) -> None:
+        fields = self._layout.fields
+        t = rows[:, fields["t"].start]
+        if t[0] < self._t:
+            self.clear()
+        if self._ticks == 0:
+            self._first = float(t[0])
+        self._t = float(t[-1])
+        self._ticks += len(rows)
+        for name in self._squares:
+            squares = (rows[:, fields[f"error/{name}"]] ** 2).sum(axis=1)
+            known = np.isfinite(squares)
+            self._squares[name] += float(squares[known].sum())
+            self._known[name] += int(known.sum())
+        self._share = max(self._share, self._torque_share(rows))
+        self._unsolved += int(np.nansum(rows[:, fields["unsolved"]]))
+        step = rows[:, fields["step_us"].start]
+        self._step_us += float(step.sum())
+        self._longest_us = max(self._longest_us, float(step.max()))
+
+    def _torque_share(self, rows: np.ndarray) -> float:
+        fields = self._layout.fields
+        if "tau_lower" not in fields:
+            return float("nan")
+        tau = rows[:, fields["tau_demand"]]
+        with np.errstate(all="ignore"):
+            share = np.maximum(tau / rows[:, fields["tau_upper"]], tau / rows[:, fields["tau_lower"]])
+        finite = share[np.isfinite(share)]
+        return float(finite.max()) if finite.size else 0.0
+
+    def result(self) -> Result | None:
+        """None before the first row."""
+        if not self._ticks:
+            return None
+        return Result(
+            seconds=self._t - self._first,
+            rmse={
+                name: float(np.sqrt(total / self._known[name])) if self._known[name] else float("nan")
+                for name, total in self._squares.items()
+            },
+            torque_share=self._share,
+            unsolved=self._unsolved,
+            step_ms=1e-3 * self._step_us / self._ticks,
+            longest_ms=1e-3 * self._longest_us,
+        )
