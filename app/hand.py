@@ -92,22 +92,28 @@ class Hand:
         self,
         frames: Frames,
         settings: SceneSettings,
-        latest: np.ndarray | None,
+        latest: np.ndarray,
         fields: dict[str, slice],
     ) -> None:
         """The filtered target of the last telemetry row, rings while they turn something, and the verdict."""
         gizmo = self._gizmo
         if gizmo is None:
             return
-        if latest is not None:
-            turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
-            position = latest[fields[f"x_d/{gizmo.position.name}"]]
-            frames.desired(full(gizmo.position, position, gizmo.raw), turned)
+        turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
+        position = latest[fields[f"x_d/{gizmo.position.name}"]]
+        frames.desired(full(gizmo.position, position, gizmo.raw), turned)
         if gizmo.orientation is not None:
             name = gizmo.orientation.level
             gizmo.show_rings(any(level.name == name and level.enabled for level in settings.levels))
         if self.verdict is not None:
             gizmo.show_accepted(self.verdict.accepted, self.verdict.missing)
+
+    def look_back(self, targets: dict[str, np.ndarray] | None) -> None:
+        """Raw targets of a moment of the past, where a ball shows the one that is dragged now; None: now."""
+        gizmo = self._gizmo
+        if gizmo is not None:
+            then = None if targets is None else targets.get(gizmo.position.name)
+            gizmo.look_back(None if then is None else full(gizmo.position, then, gizmo.raw))
 
     def close(self) -> None:
         if self._judge is not None:

@@ -1,4 +1,4 @@
-"""One learner: a simulation process, perhaps its ghost, and what is known about them. Outlives page reloads."""
+"""One learner: a simulation process and perhaps its ghost. Outlives page reloads."""
 
 from __future__ import annotations
 

@@ -29,6 +29,7 @@ JOINTS: tuple[RGB, ...] = (
 BAD: RGB = (225, 45, 45)
 GOOD: RGB = (22, 163, 104)
 BOUND: RGB = (139, 149, 161)
+GHOST: RGB = (124, 92, 230)
 
 
 def css(colour: RGB, alpha: float = 1.0) -> str:

@@ -5,23 +5,29 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import viser
 
 from app.faces import Context, face_for
+from app.ghost import Ghost
 from app.learner import Learner
-from app.messages import Post, Ready, SceneChoice
+from app.messages import Post, Ready, SceneChoice, Status
+from app.moment import Moment, moment_of
 from app.palette import level_colours
 from app.panels.bind import Bindings
 from app.panels.binding import BindingPanel
+from app.panels.compare import ComparePanel
 from app.panels.help import HelpPanel
 from app.panels.playback import PlaybackPanel
 from app.panels.robot import RobotPanel
 from app.panels.snapshot import Snapshot
+from app.panels.timeline import TimeLine
 from app.text import PHONE
 from app.view.coordinates import in_order
+from app.view.ghost import GhostView
 from app.view.robot import RobotView
 from lessons.kinds import AnyEvent, AnySettings
 
@@ -51,7 +57,8 @@ class Stage:
             Context(client, learner, ready, self._colours, self._bindings, loop, dark, self._change_theme)
         )
         self._resets: int | None = None
-        self._T_s = ready.settings.T_s
+        self._ghost: GhostView | None = None
+        self._shown_ghost: Ghost | None = None
         self._build_panels(client.gui, scenes, choose, by_path, loop)
         self._build_scene(client.scene, dark)
 
@@ -67,8 +74,11 @@ class Stage:
     ) -> None:
         gui.add_html(PHONE)
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
+        self._time_line = TimeLine(gui, self._learner, loop)
         tabs = gui.add_tab_group()
         self._face.add_tabs(gui, tabs)
+        with tabs.add_tab("Compare"):
+            self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):
@@ -128,53 +138,62 @@ class Stage:
     def follow(self, plots: bool, texts: bool) -> None:
         """Shows the newest poses, and now and then plots and texts."""
         learner = self._learner
-        found = learner.read(lambda block, history: (block.poses(), history.pull()))
-        if found is None:
+        if learner.status is not None:
+            self._time_line.update(learner.status.running)
+        moment = moment_of(learner, self._time_line.past)
+        if moment is None:
             return
-        poses, _ = found
-        status, settings = learner.status, self._settings()
         with self._client.atomic():
-            self._robot.move(poses[:-1])
-            if learner.failure is not None or status is None:
+            self._robot.move(moment.poses[:-1])
+            self._show_ghost(moment)
+            if learner.failure is not None:
                 return
-            if status.resets != self._resets:
-                self._after_reset(first=self._resets is None)
-                self._resets = status.resets
-            self._face.follow(status, poses)
-        if settings.T_s != self._T_s:
-            self._T_s = settings.T_s
-            learner.new_time_step(self._T_s)
+            if moment.live and moment.status.resets != self._resets:
+                self._after_reset(moment.status, first=self._resets is None)
+                self._resets = moment.status.resets
+            self._face.follow(moment)
         if plots:
             with self._client.atomic():
-                self._face.draw(status)
+                self._face.draw(moment)
+                if self._ghost is not None and moment.ghost is not None:
+                    self._ghost.draw(moment.ghost)
         if texts:
-            self._write()
+            self._write(moment)
 
-    def _after_reset(self, first: bool) -> None:
-        status = self._learner.status
-        assert status is not None
-        if first:
+    def _show_ghost(self, moment: Moment) -> None:
+        ghost = self._learner.ghost
+        if self._ghost is not None and (moment.ghost is None or ghost is not self._shown_ghost):
+            self._ghost.remove()
+            self._ghost = None
+        if moment.ghost is None or ghost is None:
             return
-        self._learner.read(lambda _, history: history.forget())
-        self._face.after_reset(status)
+        if self._ghost is None:
+            self._ghost = GhostView(self._client.scene, self._ready.robot, ghost.words)
+            self._shown_ghost = ghost
+        self._ghost.move(moment.ghost)
 
-    def _write(self) -> None:
+    def _after_reset(self, status: Status, first: bool) -> None:
+        if not first:
+            self._face.after_reset(status)
+
+    def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self._settings()
-        found = learner.read(
-            lambda _, history: (history.latest.copy(), history.bound_ticks.copy(), history.count)
-        )
-        if found is None or learner.status is None or found[2] == 0:
+        found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
+        if found is None or learner.status is None or found[1] == 0:
             return
-        now = Snapshot(self._ready, settings, learner.status, found[0], found[1] * settings.T_s)
+        shown = Snapshot(self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s)
+        now = replace(shown, status=learner.status)
         with self._client.atomic():
             self._playback.update(now)
-            self._face.write(now)
-            self._binding.update(now)
+            self._compare.update(now)
+            self._face.write(shown)
+            self._binding.update(shown)
             self._bindings.refresh(settings)
 
     def close(self) -> None:
         self._bindings.close()
         self._playback.close()
+        self._time_line.close()
         self._face.close()
 
 

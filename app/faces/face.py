@@ -12,6 +12,7 @@ import viser
 
 from app.learner import Learner
 from app.messages import Post, Ready, Status
+from app.moment import Moment
 from app.palette import RGB
 from app.panels.bind import Bindings
 from app.panels.snapshot import Snapshot
@@ -67,15 +68,15 @@ class Face(Protocol):
         """The event that switches the level at a place (0-based) on or off; None if there is none."""
         ...
 
-    def follow(self, status: Status, poses: np.ndarray) -> None:
-        """A new frame; poses (n + 1, 7) of the joints and the tip."""
+    def follow(self, moment: Moment) -> None:
+        """A new frame."""
         ...
 
     def after_reset(self, status: Status) -> None:
         """The robot was put back to its start."""
         ...
 
-    def draw(self, status: Status) -> None:
+    def draw(self, moment: Moment) -> None:
         """Curves and plots, about ten times a second."""
         ...
 

@@ -10,6 +10,7 @@ import viser
 from app.faces.face import Context
 from app.hand import Hand
 from app.messages import Status
+from app.moment import Moment
 from app.palette import LEVELS
 from app.panels.controller import ControllerPanel
 from app.panels.joints import JointPlots
@@ -97,24 +98,23 @@ class TorqueFace:
 
     # ---------------------------------------------------------------- following
 
-    def follow(self, status: Status, poses: np.ndarray) -> None:
-        self._frames.actual(poses[-1])
-        self._trails.add(status.t, poses[-1, :3])
+    def follow(self, moment: Moment) -> None:
+        self._frames.actual(moment.poses[-1])
 
     def after_reset(self, status: Status) -> None:
-        self._trails.clear()
         self._hand.after_reset(status.targets)
 
-    def draw(self, status: Status) -> None:
-        context = self._context
-        learner, settings = context.learner, context.settings
+    def draw(self, moment: Moment) -> None:
+        context, T_s = self._context, self._context.settings.T_s
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
-        latest = learner.read(lambda _, history: history.latest)
-        self._hand.show(self._frames, settings, latest, context.ready.layout.fields)
-        self._trails.draw(status.path, settings.T_s)
-        learner.read(lambda _, history: self._level_plots.draw(history, settings.T_s))
-        learner.read(lambda _, history: self._joint_plots.draw(history, settings.T_s))
+        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields)
+        self._hand.look_back(None if moment.live else moment.status.targets)
+        tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
+        self._trails.draw(tips, moment.status.path, T_s)
+        beside = None if moment.ghost is None else moment.ghost.window
+        self._level_plots.draw(moment.window, beside, T_s)
+        self._joint_plots.draw(moment.window, beside)
 
     def write(self, now: Snapshot[SceneSettings]) -> None:
         if now.status.gauge is not None:

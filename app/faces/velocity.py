@@ -10,6 +10,7 @@ import viser
 from app.faces.face import Context
 from app.goals import Goals
 from app.messages import Status, TaskView
+from app.moment import Moment
 from app.panels.begin import BeginPanel
 from app.panels.htmpc import HtmpcPanel
 from app.panels.joints import ACCELERATION, JointPlots
@@ -117,14 +118,12 @@ class VelocityFace:
 
     # ---------------------------------------------------------------- following
 
-    def follow(self, status: Status, poses: np.ndarray) -> None:
-        tip = poses[-1]
+    def follow(self, moment: Moment) -> None:
+        tip = moment.poses[-1]
         self._frames.actual(tip)
-        mission = status.mission
+        mission = moment.status.mission
         carries = mission is not None and bool(mission.people) and not mission.done
         self._carried.follow(tip[:3], carries)
-        for task in self._points:
-            self._trails[task.name].add(status.t, self._at(task, poses))
 
     def _at(self, task: TaskView, poses: np.ndarray) -> np.ndarray:
         """Where a task's point is, (3,) m: the tip, or the base on the floor."""
@@ -133,12 +132,10 @@ class VelocityFace:
         return np.array([*poses[len(self._base) - 1, :2], 0.01])
 
     def after_reset(self, status: Status) -> None:
-        for trail in self._trails.values():
-            trail.clear()
+        pass
 
-    def draw(self, status: Status) -> None:
-        learner, settings = self._context.learner, self._settings()
-        latest = learner.read(lambda _, history: history.latest)
+    def draw(self, moment: Moment) -> None:
+        status, latest, settings = moment.status, moment.latest, self._settings()
         fields = self._context.ready.layout.fields
         self._goals.follow(status, latest, fields)
         self._obstacles.show(settings.htmpc.obstacles)
@@ -151,15 +148,17 @@ class VelocityFace:
             trail = self._trails[task.name]
             trail.show(bool(self._begin.trace.value), bool(self._begin.prediction.value))
             path = np.zeros((0, 3)) if status.mission is None else status.mission.paths.get(task.name)
-            trail.draw(np.zeros((0, 3)) if path is None else path, settings.T_s)
+            way = np.array([self._at(task, poses) for poses in moment.way]).reshape(-1, 3)
+            trail.draw(way, np.zeros((0, 3)) if path is None else path, settings.T_s)
         self._draw_desired(latest)
-        learner.read(lambda _, history: self._plots.draw(history, settings.T_s))
-        learner.read(lambda _, history: self._joint_plots.draw(history, settings.T_s))
+        beside = None if moment.ghost is None else moment.ghost.window
+        self._plots.draw(moment.window, beside, settings.T_s)
+        self._joint_plots.draw(moment.window, beside)
 
-    def _draw_desired(self, latest: np.ndarray | None) -> None:
+    def _draw_desired(self, latest: np.ndarray) -> None:
         """What the hand is to do now: the point of its reference."""
         hand = next((task for task in self._points if "z" in task.axes), None)
-        if hand is not None and latest is not None:
+        if hand is not None:
             fields = self._context.ready.layout.fields
             self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), None)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import viser
@@ -20,13 +20,24 @@ panel still had no width stays without ticks for ever."""
 
 @dataclass(frozen=True)
 class Line:
-    """label: of the legend; fill: opacity of the area below, down to the axis; dashed: for bounds."""
+    """label: of the legend; fill: opacity of the area below, down to the axis; dashed: for bounds and, finer,
+    for ghosts."""
 
     label: str
     colour: RGB
     dashed: bool = False
     fill: float = 0.0
     width: float = 1.6
+    dash: tuple[float, float] = (6.0, 4.0)
+
+    def of_ghost(self) -> Line:
+        """The same curve of the ghost."""
+        return replace(self, label=f"{self.label}, ghost", dashed=True, width=1.3, dash=(3.0, 3.0))
+
+
+def of_ghost(lines: Sequence[Line], ghost: bool) -> list[Line]:
+    """The ghost's curves beside these, if there is one."""
+    return [line.of_ghost() for line in lines] if ghost else []
 
 
 class Chart:
@@ -114,7 +125,7 @@ def _series(line: Line, floor: float) -> uplot.Series:
         "points": {"show": False},
     }
     if line.dashed:
-        series["dash"] = (6.0, 4.0)
+        series["dash"] = line.dash
     if line.fill:
         series["fill"], series["fillTo"] = css(line.colour, line.fill), floor
     return series

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from app.history import History
+from app.history import Window
 from app.palette import BAD, BOUND, GOOD, joint_colour
-from app.panels.chart import Chart, Line
+from app.panels.chart import Chart, Line, of_ghost
 from app.text import block
 from robots import Robot
 from robots.truth import joint_axis
@@ -29,6 +29,11 @@ class _Quantity:
     values: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+
+    def shares(self) -> np.ndarray:
+        """(rows, n) distance from the middle of the bounds, % of half their distance."""
+        middle, half = 0.5 * (self.upper + self.lower), 0.5 * (self.upper - self.lower)
+        return 100.0 * (self.values - middle) / np.where(half > 0, half, np.inf)
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class JointPlots:
         self._sheet = _sheet(robot, driven)
         self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
         self._joint: int | None = None
-        self._built: int | None = -1
+        self._built: tuple[int | None, bool] | None = None
         self._charts: list[Chart] = []
         options = (_ALL, *robot.joint_names)
         choice = gui.add_dropdown("Joints", options, initial_value=_ALL)
@@ -72,23 +77,23 @@ class JointPlots:
             index = options.index(str(choice.value)) - 1
             self._joint = None if index < 0 else index
 
-    def draw(self, history: History, T_s: float) -> None:
+    def draw(self, window: Window, ghost: Window | None) -> None:
+        """ghost: the same stretch of time of the ghost, drawn dashed."""
         joint = self._joint
-        if joint != self._built:
-            self._build(joint)
-        ages = history.ages(T_s)
-        for kind, (chart, quantity) in enumerate(zip(self._charts, self._read(history), strict=True)):
-            at_bound = history.at_bound(kind)
+        if (joint, ghost is not None) != self._built:
+            self._build(joint, ghost is not None)
+        ages = window.ages()
+        beside = [None] * 3 if ghost is None else self._read(ghost)
+        for kind, (chart, quantity, other) in enumerate(
+            zip(self._charts, self._read(window), beside, strict=True)
+        ):
+            at_bound = window.at_bound(kind)
             known = np.isfinite(quantity.values[:, 0])
             if joint is None:
-                middle, half = (
-                    0.5 * (quantity.upper + quantity.lower),
-                    0.5 * (quantity.upper - quantity.lower),
-                )
-                shares = 100.0 * (quantity.values - middle) / np.where(half > 0, half, np.inf)
                 edge = np.where(known, 100.0, np.nan)
                 low, high = -_SHARE, _SHARE
-                lines = [*shares.T, edge, -edge]
+                lines = [*quantity.shares().T, edge, -edge]
+                dashed = [] if other is None else list(other.shares().T)
                 marked = at_bound.any(axis=1)
             else:
                 low, high = self._span(kind, joint)
@@ -98,12 +103,13 @@ class JointPlots:
                     unit * quantity.upper[:, joint],
                     unit * quantity.lower[:, joint],
                 ]
+                dashed = [] if other is None else [unit * other.values[:, joint]]
                 marked = at_bound[:, joint]
             rug = np.where(marked, low + _RUG * (high - low), low)
-            chart.show(ages, [*lines, rug])
+            chart.show(ages, [*lines, rug, *dashed])
 
-    def _read(self, history: History) -> Sequence[_Quantity]:
-        columns, fields = history.columns, history.layout.fields
+    def _read(self, window: Window) -> Sequence[_Quantity]:
+        columns, fields = window.columns, window.layout.fields
         v, driven = columns(fields["v_limit"]), self._input
         upper = columns(fields[driven.upper])
         lower = -upper if driven.lower is None else columns(fields[driven.lower])
@@ -138,40 +144,45 @@ class JointPlots:
         margin = 0.1 * (upper - lower)
         return lower - margin, upper + margin
 
-    def _build(self, joint: int | None) -> None:
+    def _build(self, joint: int | None, ghost: bool) -> None:
         for chart in self._charts:
             chart.remove()
         names = self._robot.joint_names
         with self._place:
             self._charts = [
-                self._all(title, names, last=kind == 2) if joint is None else self._one(title, kind, joint)
+                self._all(title, names, kind == 2, ghost)
+                if joint is None
+                else self._one(title, kind, joint, ghost)
                 for kind, title in enumerate((self._input.title, "Velocity", "Position"))
             ]
-        self._built = joint
+        self._built = joint, ghost
 
-    def _all(self, title: str, names: tuple[str, ...], last: bool) -> Chart:
+    def _all(self, title: str, names: tuple[str, ...], last: bool, ghost: bool) -> Chart:
         n = len(names)
         lines = [Line(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
         bounds = [Line("upper bound", BOUND, dashed=True), Line("lower bound", BOUND, dashed=True)]
         return Chart(
             self._gui,
             f"{title}, % of bound",
-            [*lines, *bounds, Line("at bound", BAD, fill=0.5, width=0.5)],
+            [*lines, *bounds, Line("at bound", BAD, fill=0.5, width=0.5), *of_ghost(lines, ghost)],
             (-_SHARE, _SHARE),
             height=170,
             bands=((n, n + 1, GOOD),),
-            legend=last,  # one legend serves the three
+            # One legend serves the three; the ghost's curves would double it.
+            legend=last and not ghost,
         )
 
-    def _one(self, title: str, kind: int, joint: int) -> Chart:
+    def _one(self, title: str, kind: int, joint: int, ghost: bool) -> Chart:
+        line = Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0)
         return Chart(
             self._gui,
             f"{title}, {self._unit(kind, joint)[0]}",
             [
-                Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0),
+                line,
                 Line("upper bound", BOUND, dashed=True),
                 Line("lower bound", BOUND, dashed=True),
                 Line("at bound", BAD, fill=0.5, width=0.5),
+                *of_ghost([line], ghost),
             ],
             self._span(kind, joint),
             height=170,

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import viser
 
+from app.palette import RGB
 from robots import Robot
 from robots.shapes import link_shapes
 
@@ -13,20 +14,38 @@ _STILL = 1e-5  # m, and about as many rad: less than a pixel
 
 
 class RobotView:
-    """One frame per joint with the shapes it carries."""
+    """One frame per joint with the shapes it carries.
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+    links: (joint it moves with, 0 for the base; mesh) of every shape.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        robot: Robot,
+        root: str = "/robot",
+        colour: RGB | None = None,
+        opacity: float | None = None,
+    ) -> None:
+        """root: name of the node below which it is; colour, opacity: of all of it; None: its own, opaque."""
         shapes = link_shapes(robot)
         self._frames = [
-            scene.add_frame(f"/robot/{joint}", show_axes=False) for joint in range(1, robot.n + 1)
+            scene.add_frame(f"{root}/{joint}", show_axes=False) for joint in range(1, robot.n + 1)
         ]
-        for index, shape in enumerate(shapes):
-            scene.add_mesh_simple(
-                f"/robot/{shape.joint or 'base'}/shape{index}",
-                shape.vertices,
-                shape.faces,
-                color=shape.colour,
+        self.links = [
+            (
+                shape.joint,
+                scene.add_mesh_simple(
+                    f"{root}/{shape.joint or 'base'}/shape{index}",
+                    shape.vertices,
+                    shape.faces,
+                    color=colour or shape.colour,
+                    opacity=opacity,
+                    cast_shadow=opacity is None,
+                ),
             )
+            for index, shape in enumerate(shapes)
+        ]
         self._shown = np.full((robot.n, 7), np.nan)
 
     def move(self, poses: np.ndarray) -> None:

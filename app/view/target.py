@@ -74,6 +74,9 @@ class TargetGizmo:
         self._accepted = scene.add_icosphere(
             "/accepted", radius=_BALL, color=colour, opacity=0.6, visible=False, cast_shadow=False
         )
+        self._then = scene.add_icosphere(
+            "/target_then", radius=_BALL, color=colour, opacity=0.8, visible=False, cast_shadow=False
+        )
         self._gap = scene.add_line_segments(
             "/gap", np.zeros((1, 2, 3), np.float32), BAD, thickness=0.006, visible=False
         )
@@ -117,6 +120,14 @@ class TargetGizmo:
             self._accepted.position = accepted
             self._gap.points = np.array([[self.raw, accepted]], np.float32)
             self._label.text = f"out of reach by {100 * missing:.0f} cm"
+
+    def look_back(self, then: np.ndarray | None) -> None:
+        """The ball at its place in the past, with nothing to drag it by; None: as it is now."""
+        back = then is not None
+        if self._then.visible != back:
+            self._then.visible, self._gizmo.visible = back, not back
+        if then is not None:
+            self._then.position = then
 
 
 class Frames:

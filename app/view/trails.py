@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 import viser
 
 from app.palette import RGB
 
-TRACE_SECONDS = 6.0
-_TRACE_POINTS = 240
 EXAGGERATION = 100
 """At torque level the prediction reaches some milliseconds ahead: at true scale it would be a dot."""
 
 
-def _segments(points: np.ndarray) -> np.ndarray:
+def segments(points: np.ndarray) -> np.ndarray:
+    """A curve (k, 3) as line segments (k − 1, 2, 3)."""
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
 
-_NOTHING = np.zeros((1, 2, 3), np.float32)
+NOTHING = np.zeros((1, 2, 3), np.float32)
 
 
 class Trails:
@@ -37,15 +34,13 @@ class Trails:
         self._scale = scale
         for index, (points, curve_colour) in enumerate(curves):
             scene.add_line_segments(
-                f"/reference{name}/{index}", _segments(points), curve_colour, thickness=0.003
+                f"/reference{name}/{index}", segments(points), curve_colour, thickness=0.003
             )
-        self._trace = scene.add_line_segments(f"/trace{name}", _NOTHING, colour, thickness=0.004)
+        self._trace = scene.add_line_segments(f"/trace{name}", NOTHING, colour, thickness=0.004)
         self._prediction = scene.add_line_segments(
-            f"/prediction{name}", _NOTHING, (225, 29, 116), thickness=0.008
+            f"/prediction{name}", NOTHING, (225, 29, 116), thickness=0.008
         )
         self._label = scene.add_label(f"/prediction_label{name}", "", visible=False)
-        self._points: deque[np.ndarray] = deque(maxlen=_TRACE_POINTS)
-        self._times: deque[float] = deque(maxlen=_TRACE_POINTS)
 
     def show(self, trace: bool, prediction: bool) -> None:
         self._trace.visible = trace
@@ -53,35 +48,17 @@ class Trails:
         if not prediction:
             self._label.visible = False
 
-    def clear(self) -> None:
-        self._points.clear()
-        self._times.clear()
-        self._trace.points = _NOTHING
-
-    def add(self, t: float, tip: np.ndarray) -> None:
-        """The actual tip (3,) at simulated time t."""
-        if self._times and t <= self._times[-1]:
-            if t < self._times[-1]:
-                self.clear()
-            return
-        self._points.append(tip.copy())
-        self._times.append(t)
-        while self._times and t - self._times[0] > TRACE_SECONDS:
-            self._points.popleft()
-            self._times.popleft()
-
-    def draw(self, path: np.ndarray, T_s: float) -> None:
-        """path (N + 1, 3): the predicted tip."""
-        if len(self._points) > 1:
-            self._trace.points = _segments(np.array(self._points))
+    def draw(self, tips: np.ndarray, path: np.ndarray, T_s: float) -> None:
+        """tips (k, 3): the way the hand went; path (N + 1, 3): the predicted tip."""
+        self._trace.points = segments(tips) if len(tips) > 1 else NOTHING
         if not self._prediction.visible:
             return
         if len(path) < 2 or not np.isfinite(path).all():
-            self._prediction.points = _NOTHING
+            self._prediction.points = NOTHING
             self._label.visible = False
             return
         larger = path[0] + self._scale * (path - path[0])
-        self._prediction.points = _segments(larger)
+        self._prediction.points = segments(larger)
         moving = self._scale > 1 and bool(np.linalg.norm(larger[-1] - larger[0]) > 0.03)
         self._label.visible = moving
         if moving:

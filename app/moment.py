@@ -1,0 +1,96 @@
+"""What the page shows: one instant of a run, now or up to a minute ago, with the ghost as it was then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.ghost import Ghost
+from app.history import Window
+from app.learner import Learner
+from app.messages import Status
+from app.simulation import Simulation
+
+TRACE_SECONDS = 6.0
+_FAR = 0.5  # s: a ghost further behind is not waited for with the picture
+
+
+@dataclass(frozen=True, eq=False)
+class Shade:
+    """The ghost at that instant; see `Moment`."""
+
+    poses: np.ndarray
+    window: Window
+    way: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One instant.
+
+    Attributes:
+        t: s.
+        live: whether it is now.
+        poses: (n + 1, 7) of joints and tip, position (m) and quaternion wxyz.
+        status: the report that was the newest one.
+        latest: the row of telemetry that was the newest one.
+        window: what the plots show.
+        way: (k, n + 1, 7) poses of the last TRACE_SECONDS, oldest first.
+        ghost: None if there is none.
+    """
+
+    t: float
+    live: bool
+    poses: np.ndarray
+    status: Status
+    latest: np.ndarray
+    window: Window
+    way: np.ndarray
+    ghost: Shade | None
+
+
+def moment_of(learner: Learner, past: float | None) -> Moment | None:
+    """The instant to show, after taking over what is new; None while nothing was reported yet.
+
+    Args:
+        learner: whose.
+        past: s of simulated time to look back to; None: now.
+    """
+    t = learner.look()
+    ghost = learner.ghost
+    beside = None if ghost is None else ghost.look()
+    if ghost is not None and (ghost.ready is None or ghost.ready.choice != learner.choice):
+        beside = None  # still the ghost of another scene
+    if t is None or learner.status is None:
+        return None
+    if past is not None:
+        t = past
+    elif beside is not None and 0.0 < t - beside < _FAR:
+        t = beside  # a ghost shown later than the robot would look like one that follows badly
+    frame = learner.tape.at(t)
+    found = learner.read(
+        lambda _, history: (history.window(t), history.latest if past is None else history.at(t))
+    )
+    if frame is None or found is None:
+        return None
+    return Moment(
+        t=t,
+        live=past is None,
+        poses=frame.poses,
+        status=learner.status if past is None else frame.status or learner.status,
+        latest=found[1],
+        window=found[0],
+        way=_way(learner, t),
+        ghost=None if ghost is None or beside is None else _shade(ghost, t),
+    )
+
+
+def _shade(ghost: Ghost, t: float) -> Shade | None:
+    frame = ghost.tape.at(t)
+    window = ghost.read(lambda _, history: history.window(t))
+    return None if frame is None or window is None else Shade(frame.poses, window, _way(ghost, t))
+
+
+def _way(simulation: Simulation, t: float) -> np.ndarray:
+    return np.array([frame.poses for frame in simulation.tape.between(t - TRACE_SECONDS, t)])

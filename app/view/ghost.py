@@ -1,0 +1,37 @@
+"""The ghost in the scene: a translucent robot of one colour, its trace and its name."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.moment import Shade
+from app.palette import GHOST
+from app.view.robot import RobotView
+from app.view.trails import NOTHING, segments
+from robots import Robot
+
+_OPACITY = 0.38
+
+
+class GhostView:
+    """Exists while there is a ghost."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, words: str) -> None:
+        self._root = scene.add_frame("/ghost", show_axes=False)
+        self._robot = RobotView(scene, robot, "/ghost", GHOST, _OPACITY)
+        self._trace = scene.add_line_segments("/ghost/trace", NOTHING, GHOST, thickness=0.004)
+        self._label = scene.add_label("/ghost/label", f"ghost: {words}")
+
+    def move(self, shade: Shade) -> None:
+        self._robot.move(shade.poses[:-1])
+        at = shade.poses[-1, :3] + np.array([0.0, 0.0, 0.08])
+        if not np.allclose(at, self._label.position, atol=1e-4):
+            self._label.position = at
+
+    def draw(self, shade: Shade) -> None:
+        """The trace, about ten times a second."""
+        self._trace.points = segments(shade.way[:, -1, :3]) if len(shade.way) > 1 else NOTHING
+
+    def remove(self) -> None:
+        self._root.remove()

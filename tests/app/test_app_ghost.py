@@ -1,0 +1,178 @@
+"""A ghost in its own process, without a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+from app.block import Block
+from app.body import Body
+from app.follower import Shadow
+from app.learner import Learner
+from app.messages import Lead, Leash, Load, Play, Post, ResetAll, SceneChoice, Script
+from app.process import Spares, wait_until
+from lessons.events import Push, Reset, Set
+from lessons.lesson import Ghost
+
+LONG = 60.0  # s
+
+
+@pytest.fixture
+def body() -> Iterator[Body]:
+    made = Body(SceneChoice("planar3-hold"))
+    yield made
+    made.close()
+
+
+def script_of(body: Body) -> Script:
+    found = body.leader.script(body.session)
+    assert found is not None
+    return found
+
+
+def untimed(body: Body) -> np.ndarray:
+    """All rows but what a clock measured."""
+    layout = body.session.layout
+    _, rows = body.block.since(0)
+    for name, where in layout.fields.items():
+        if name == "step_us" or name.startswith("time_us/"):
+            rows[:, where] = 0.0
+    return rows
+
+
+def test_a_shadow_has_the_rows_of_its_leader(body: Body) -> None:
+    """From the moment of leading on, although much had been changed before."""
+    body.tick(20)
+    for event in (Set("horizon", 3), Set("controller", "hqp"), Set("controller", "himpc")):
+        body.handle(Post(event))
+    body.tick(7)
+    body.handle(Lead(True))
+    before = body.block.count
+    first = script_of(body)
+    assert first.begin is not None and first.t == 0.0 and first.begin.settings.horizon == 3
+    shadow = Shadow(first.begin, ())
+    try:
+        body.handle(Post(Push(body.session.robot.joint_names[-1], (0.0, 3.0, 0.0), seconds=0.02)))
+        body.tick(30)
+        body.handle(Post(Set("M_bar_scale", 2.0)))
+        body.tick(13)
+        script = script_of(body)
+        shadow.follower.hear(script.events, script.t)
+        while shadow.catch_up(0.0):
+            pass
+        assert shadow.session.t == body.session.t
+        assert np.array_equal(untimed(body)[before:], untimed(shadow), equal_nan=True)
+        assert body.leader.script(body.session) is None  # told once
+    finally:
+        shadow.close()
+
+
+def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
+    body.handle(Lead(True))
+    assert script_of(body).begin is not None
+    assert body.leader.waits(0.001)
+    body.handle(Leash(0.5))
+    assert not body.leader.waits(0.4) and body.leader.waits(0.6)
+    body.tick(3)
+    body.handle(Post(Reset()))
+    body.tick()
+    script = script_of(body)
+    assert script.begin is None and isinstance(script.events[0][1], Reset)
+    body.handle(Post(Set("horizon", 9)))
+    body.tick()
+    body.handle(ResetAll())
+    begin = script_of(body).begin
+    assert begin is not None and begin.settings.horizon == 5
+    kept = body.session
+    name = body.block.name
+    body.handle(Load(SceneChoice("panda-hold")))
+    Block.for_robot(kept.robot, kept.layout.size, name).close(unlink=True)
+    begin = script_of(body).begin
+    assert begin is not None and begin.choice.name == "panda-hold"
+    body.handle(Lead(False))
+    body.tick()
+    assert body.leader.script(body.session) is None and not body.leader.waits(1e9)
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[[str], Learner]]:
+    spares, started = Spares(), list[Learner]()
+
+    def run(scene: str) -> Learner:
+        learner = Learner("token", SceneChoice(scene), spares)
+        started.append(learner)
+        assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
+        return learner
+
+    yield run
+    for learner in started:
+        learner.close()
+    spares.close()
+
+
+def together(learner: Learner) -> bool:
+    """Both stand at the same time, which is not the start."""
+    status, ghost = learner.status, learner.ghost
+    if status is None or ghost is None or ghost.status is None or status.running:
+        return False
+    t = learner.look()
+    return t is not None and t > 0.1 and ghost.look() == t
+
+
+def test_a_ghost_begins_follows_and_ends(start: Callable[[str], Learner]) -> None:
+    learner = start("planar3-hold")
+    learner.start_ghost(Ghost("no preview", ("horizon=1",)))
+    ghost = learner.ghost
+    assert ghost is not None
+    assert wait_until(lambda: ghost.status is not None and ghost.status.t > 0.3, LONG)
+    assert ghost.ready is not None
+    learner.send(Post(Push(ghost.ready.robot.joint_names[-1], (0.0, 5.0, 0.0))))
+    learner.send(Post(Set("M_bar_scale", 2.0)))
+    assert wait_until(lambda: getattr(ghost.settings, "M_bar_scale", 1.0) == 2.0, LONG)
+    assert ghost.settings is not None and ghost.settings.horizon == 1
+    learner.send(Play(False))
+    assert wait_until(lambda: together(learner), LONG)
+    mine = learner.score.result() if learner.score else None
+    its = ghost.score.result() if ghost.score else None
+    assert mine is not None and its is not None and mine.seconds == pytest.approx(its.seconds, abs=1e-9)
+    pid, memory = ghost.pid, Path("/dev/shm", ghost.ready.block)
+    assert memory.exists()
+    learner.stop_ghost()
+    assert learner.ghost is None and pid is not None
+    assert wait_until(lambda: not psutil.pid_exists(pid), LONG)
+    assert not memory.exists()
+    learner.send(Play(True))
+    t = learner.look() or 0.0
+    assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)  # no leash is left
+
+
+def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Callable[[str], Learner]) -> None:
+    learner = start("planar3-hold")
+    learner.start_ghost(Ghost("nonsense", ("horizn=3",)))
+    notices: list[str] = []
+    assert wait_until(lambda: bool(notices.extend(learner.take_messages()[1]) or notices), LONG)
+    assert "horizon" in notices[0] and learner.ghost is None
+    t = learner.look() or 0.0
+    assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
+
+
+def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], Learner]) -> None:
+    learner = start("planar3-hold")
+    learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
+    ghost = learner.ghost
+    learner.send(Load(SceneChoice("iiwa14-hold")))
+    assert wait_until(
+        lambda: (
+            ghost is not None
+            and ghost.ready is not None
+            and ghost.ready.choice.name == "iiwa14-hold"
+            and ghost.status is not None
+            and ghost.status.t > 0.3
+        ),
+        LONG,
+    )
+    assert learner.ghost is ghost and learner.choice.name == "iiwa14-hold"
