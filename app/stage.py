@@ -20,16 +20,20 @@ from app.palette import level_colours
 from app.panels.bind import Bindings
 from app.panels.binding import BindingPanel
 from app.panels.compare import ComparePanel
+from app.panels.export import ExportPanel
 from app.panels.help import HelpPanel
 from app.panels.playback import PlaybackPanel
 from app.panels.robot import RobotPanel
 from app.panels.snapshot import Snapshot
 from app.panels.timeline import TimeLine
+from app.pull import Pull
 from app.text import PHONE
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
 from lessons.kinds import AnyEvent, AnySettings
+from lessons.settings import SceneSettings
+from robots import PlantSettings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -79,6 +83,8 @@ class Stage:
         self._face.add_tabs(gui, tabs)
         with tabs.add_tab("Compare"):
             self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
+        with tabs.add_tab("Export"):
+            ExportPanel(gui, self._learner, self._settings)
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):
@@ -108,6 +114,9 @@ class Stage:
         self._paint_floor(dark)
         self._robot = RobotView(scene, self._ready.robot)
         self._face.add_scene(scene)
+        # Velocity servos do not feel a push.
+        torque_level = isinstance(self._ready.settings, SceneSettings)
+        self._pull = Pull(scene, self._robot, self._ready.robot, self._post) if torque_level else None
 
     def _change_theme(self, dark: bool) -> None:
         self._theme(dark)
@@ -152,6 +161,8 @@ class Stage:
                 self._after_reset(moment.status, first=self._resets is None)
                 self._resets = moment.status.resets
             self._face.follow(moment)
+            if self._pull is not None and isinstance(plant := self._settings().plant, PlantSettings):
+                self._pull.follow(moment.poses, plant, moment.status.running)
         if plots:
             with self._client.atomic():
                 self._face.draw(moment)

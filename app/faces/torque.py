@@ -122,6 +122,7 @@ class TorqueFace:
             # The snapshot's row is its own copy.
             now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
         self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
+        self._start.update(now)
         self._tasks.update(now)
         self._controller.update(now)
 

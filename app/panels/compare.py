@@ -127,8 +127,8 @@ class ComparePanel:
             )
         rows += [
             _line("unsolved QPs", mine.unsolved, its.unsolved, str),
-            _line("control step, mean", mine.step_ms, its.step_ms, _milliseconds),
-            _line("control step, longest", mine.longest_ms, its.longest_ms, _milliseconds),
+            _line("control step, median", mine.step_ms, its.step_ms, _milliseconds),
+            _line("control step, 99 % below", mine.slow_ms, its.slow_ms, _milliseconds),
         ]
         head = (
             '<tr><td></td><td style="text-align:right"><b>robot</b></td>'

@@ -12,8 +12,8 @@ from app.palette import BAD, GOOD
 from app.panels.bind import Post
 from app.panels.snapshot import Snapshot
 from app.text import block, esc, quantity
-from lessons.events import Push
-from lessons.kinds import AnySettings
+from lessons.events import Push, Set
+from lessons.settings import SceneSettings
 
 _DIRECTIONS = {
     "→ +x": (1, 0, 0),
@@ -24,6 +24,8 @@ _DIRECTIONS = {
     "↓ −z": (0, 0, -1),
 }
 PUSH_SECONDS = 0.1
+_LOAD = 3.0  # kg
+_PICK_UP, _DROP = f"Pick up {_LOAD:g} kg", "Drop the payload"
 
 
 class StartPanel:
@@ -52,6 +54,8 @@ class StartPanel:
             buttons = gui.add_button_group(
                 "Push", tuple(_DIRECTIONS), hint=f"Along a world axis, for {PUSH_SECONDS:g} s"
             )
+            gui.add_html(block("Or hold <b>Ctrl</b> and drag any link: it pulls like a rubber band."))
+            self._load = gui.add_button(_PICK_UP, hint="The controller is not told")
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand", True)
             self.prediction = gui.add_checkbox("Predicted path", True)
@@ -63,6 +67,10 @@ class StartPanel:
             direction = np.array(_DIRECTIONS[str(buttons.value)], float)
             vector = tuple(float(x) for x in force.value * direction)
             post(Push(str(body.value), vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
+
+        @self._load.on_click
+        async def _(_: object) -> None:
+            post(Set("plant.payload_kg", _LOAD if self._load.label == _PICK_UP else 0.0))
 
         @recall.on_click
         async def _(_: object) -> None:
@@ -97,8 +105,11 @@ class StartPanel:
             text += " This orientation cannot be met there: the lower level gives way."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: Snapshot[AnySettings]) -> None:
-        del now
+    def update(self, now: Snapshot[SceneSettings]) -> None:
+        """The button offers what is not the case."""
+        label = _DROP if now.settings.plant.payload_kg > 0 else _PICK_UP
+        if self._load.label != label:
+            self._load.label = label
 
 
 _GUIDE = block(

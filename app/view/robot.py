@@ -45,6 +45,7 @@ class RobotView:
                 ),
             )
             for index, shape in enumerate(shapes)
+            if shape.joint or colour is None  # two bases at one place would flicker
         ]
         self._shown = np.full((robot.n, 7), np.nan)
 

@@ -23,7 +23,9 @@ class Pair:
 
     def __init__(self, scene: Scene, *own: str) -> None:
         self.leader = Session(scene)
-        session = Session(followed(scene, scene.settings, own))
+        other = followed(scene, scene.settings, own)
+        assert isinstance(other, Scene)
+        session = Session(other)
         self.follower = Follower(session, scene.settings, own)
         self.rows: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
         self._told = 0
