@@ -17,7 +17,7 @@ from app.view.robot import aim
 from lessons.kinds import ALL_SCENES
 
 RATE = 30.0  # Hz, poses
-_PLOTS = 3  # every so many frames
+PLOTS_RATE = 12.0  # Hz
 _TEXTS = 8
 
 
@@ -44,6 +44,7 @@ class Page:
         self._stage: Stage | None = None
         self._built = -1
         self._failure: str | None = None
+        self._next_plots = 0.0
         self._waiting: viser.GuiHtmlHandle | None = None
         self._again: viser.GuiButtonHandle | None = None
         self._closed = threading.Event()
@@ -105,9 +106,17 @@ class Page:
             self._failure = learner.failure
             stage.show_failure(self._failure)
         stage.follow(
-            plots=frame % _PLOTS == 0,
+            plots=self._plots_due(),
             texts=frame % _TEXTS == 0,
         )
+
+    def _plots_due(self) -> bool:
+        now = time.perf_counter()
+        if now < self._next_plots:
+            return False
+        # Frames come a little too late or too early; on average the rate is kept.
+        self._next_plots = max(self._next_plots, now - 1 / RATE) + 1 / PLOTS_RATE
+        return True
 
     def _show_early_failure(self) -> None:
         """The simulation died before there was anything to show."""

@@ -4,6 +4,7 @@ used."""
 from __future__ import annotations
 
 import asyncio
+import math
 
 import viser
 
@@ -84,7 +85,7 @@ class TimeLine:
 
     def _enter(self, first: float, last: float) -> None:
         self.past, self._paused_at = None, last
-        self._slider.min = round(first - last, 3)
+        self._slider.min = round(-math.floor((last - first) / _STEP) * _STEP, 3)
         self._loop.call_soon_threadsafe(self._set, 0.0)
         self._slider.visible = True
 

@@ -12,6 +12,8 @@ from lessons.plots.panels import Curve, Panel, Picture
 
 Array = NDArray[np.float64]
 
+_FLOOR = 1e-3  # mm or °
+
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
@@ -67,7 +69,8 @@ def _errors(run: Recorded, style: str) -> list[Curve]:
     curves: list[Curve] = []
     for place, task in enumerate(run.layout.tasks):
         unit, factor = ("mm", 1e3) if task.unit == "m" else ("°", 180 / np.pi)
-        size = factor * np.linalg.norm(run[f"error/{task.name}"], axis=1)
+        # Below that an error is nothing to look at, and would squeeze what is.
+        size = np.maximum(factor * np.linalg.norm(run[f"error/{task.name}"], axis=1), _FLOOR)
         label = f"{task.name} ({unit})" + (", ghost" if style == "dashed" else "")
         curves.append(Curve(run["t"][:, 0], size, label, str(place), style))
     return curves

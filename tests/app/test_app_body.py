@@ -135,10 +135,11 @@ def test_a_scene_that_cannot_be_loaded_at_all() -> None:
 
 def test_history_keeps_spikes_and_counts_bounds(body: Body) -> None:
     layout = body.session.layout
-    history = History(body.block, layout, 10)
+    history = History(body.block, layout)
     row = np.zeros(layout.size)
     for k in range(95):
         row[:] = 0.0
+        row[layout.fields["t"]] = 1e-3 * k
         if k == 42:
             row[layout.fields["step_us"]] = 7.0
             row[layout.fields["at_bound"]][2] = 5.0
@@ -148,13 +149,14 @@ def test_history_keeps_spikes_and_counts_bounds(body: Body) -> None:
         if k % 7 == 0:
             history.pull()
     history.pull()
-    assert np.nanmax(history.columns(layout.fields["step_us"])) == 7.0
+    window = history.window()
+    assert np.nanmax(window.columns(layout.fields["step_us"])) == 7.0
     assert history.bound_ticks[2].tolist() == [1, 0, 1] and history.bound_ticks.sum() == 3
     assert history.bound_ticks[3].tolist() == [0, 0, 1]
-    assert history.at_bound(0)[:, 2].sum() == 2  # one bucket, two points
-    assert len(history.ages(1e-3)) == 2 * BUCKETS
+    assert window.at_bound(0)[:, 2].sum() == 2  # one bucket, two points
+    assert len(window.ages()) == 2 * BUCKETS
     history.forget()
-    assert np.isnan(history.columns(layout.fields["t"])).all()
+    assert np.isnan(history.window().columns(layout.fields["t"])).all()
 
 
 def test_the_ring_wraps(body: Body) -> None:

@@ -1,0 +1,227 @@
+"""The last minute: motion, curves, figures and files, without a browser."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from app.block import Block
+from app.body import Body
+from app.history import KEPT, WINDOW, History
+from app.messages import SceneChoice
+from app.pull import Grip, pulled, push_at
+from app.record import MOST, Record
+from app.score import Score
+from app.tape import Frame, Tape
+from himpc.telemetry import Layout
+from lessons.events import Push
+from lessons.plots.draw import draw
+from lessons.plots.recorded import Recorded, run_picture
+from lessons.table import as_csv, as_npz, named
+from robots import Plant, PlantSettings, load_robot
+
+
+@pytest.fixture(scope="module")
+def body() -> Iterator[Body]:
+    made = Body(SceneChoice("planar3-circle"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def layout(body: Body) -> Layout:
+    return body.session.layout
+
+
+def rows_at(layout: Layout, times: np.ndarray, field: str, values: np.ndarray) -> np.ndarray:
+    rows = np.zeros((len(times), layout.size))
+    rows[:, layout.fields["t"].start] = times
+    rows[:, layout.fields[field].start] = values
+    return rows
+
+
+# ---------------------------------------------------------------- motion
+
+
+def frame(t: float, x: float = 0.0, turn: float = 0.0) -> Frame:
+    pose = np.array([x, 0.0, 0.0, np.cos(0.5 * turn), 0.0, 0.0, np.sin(0.5 * turn)])
+    return Frame(t, pose[None], None)
+
+
+def test_the_tape_shows_any_moment_of_the_last_minute() -> None:
+    tape = Tape()
+    assert tape.at(1.0) is None and tape.span == (0.0, 0.0)
+    for k in range(30 * 90):
+        tape.add(frame(k / 30, x=k / 30, turn=0.02 * k))
+    first, last = tape.span
+    assert last - first == pytest.approx(KEPT, abs=0.05)
+    found = tape.at(72.345)
+    assert found is not None and found.poses[0, 0] == pytest.approx(72.345)
+    expected = frame(0.0, turn=0.02 * 30 * 72.345).poses[0, 3:]
+    assert abs(found.poses[0, 3:] @ expected) == pytest.approx(1.0, abs=1e-6)
+    times = [each.t for each in tape.between(70.0, 71.0)]
+    assert len(times) == pytest.approx(30, abs=1) and times == sorted(times)
+
+
+def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
+    tape = Tape()
+    for k in range(3000):
+        tape.add(frame(1e-3 * k))
+    assert len(list(tape.between(-1.0, 10.0))) < 3.0 * 30 + 3
+    found = tape.at(2.999)
+    assert found is not None and found.t == 2.999  # the newest moment is always there
+    tape.add(frame(0.0))
+    assert tape.span == (0.0, 0.0)
+
+
+# ---------------------------------------------------------------- curves
+
+
+def test_plots_of_the_past_are_those_that_were_seen(layout: Layout) -> None:
+    block = Block(layout.size, 1)
+    try:
+        history, seen = History(block, layout), {}
+        for k in range(40):
+            times = 0.5 * k + 0.002 * np.arange(250)
+            for row in rows_at(layout, times, "step_us", np.sin(7 * times)):
+                block.write(row)
+            history.pull()
+            seen[round(float(times[-1]), 3)] = history.window().columns(layout.fields["step_us"])
+        for t in (19.998, 12.498, 9.998):
+            assert np.array_equal(
+                history.window(t).columns(layout.fields["step_us"]), seen[t], equal_nan=True
+            )
+            assert history.at(t)[layout.fields["t"]] == pytest.approx(t, abs=WINDOW / 160)
+        block.write(rows_at(layout, np.zeros(1), "step_us", np.ones(1))[0])
+        history.pull()
+        assert np.nanmax(history.window().columns(layout.fields["step_us"])) == 1.0  # a new run
+        assert np.isfinite(history.window().columns(layout.fields["t"])).sum() == 2
+    finally:
+        block.close(unlink=True)
+
+
+def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
+    """A ghost with another control period, or one that is a little behind, is drawn at the same places."""
+    found = []
+    for period, late in ((0.001, 0), (0.004, 3)):
+        block = Block(layout.size, 1)
+        history = History(block, layout)
+        times = np.arange(0.0, 2.0, period)[: len(np.arange(0.0, 2.0, period)) - late]
+        for row in rows_at(layout, times, "step_us", np.floor(times / 0.05 + 1e-6)):
+            block.write(row)
+        history.pull()
+        found.append(history.window(1.9999).columns(layout.fields["step_us"]))
+        block.close(unlink=True)
+    assert np.array_equal(found[0], found[1], equal_nan=True)
+
+
+# ---------------------------------------------------------------- figures and files
+
+
+def test_the_score_counts_every_tick_of_the_run(layout: Layout) -> None:
+    score = Score(layout)
+    assert score.result() is None
+    name = layout.tasks[0].name
+    for start in (0, 100):
+        rows = rows_at(layout, 1e-3 * (start + np.arange(100)), "unsolved", np.ones(100))
+        rows[:, layout.fields[f"error/{name}"].start] = 3.0 if start else 1.0
+        rows[:, layout.fields["tau_upper"]], rows[:, layout.fields["tau_lower"]] = 2.0, -4.0
+        rows[:, layout.fields["tau_demand"].start] = -3.0
+        rows[:, layout.fields["step_us"]] = 500.0
+        score.take(rows)
+    found = score.result()
+    assert found is not None and found.rmse[name] == pytest.approx(np.sqrt(5.0))
+    assert found.torque_share == 0.75 and found.unsolved == 200 and found.seconds == pytest.approx(0.199)
+    assert found.step_ms == pytest.approx(0.5, rel=0.03) and found.slow_ms == pytest.approx(0.5, rel=0.03)
+    score.take(rows_at(layout, np.zeros(1), "unsolved", np.zeros(1)))
+    found = score.result()
+    assert found is not None and found.unsolved == 0 and found.rmse[name] == 0.0
+
+
+def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
+    record = Record(layout)
+    for minute in range(8):
+        times = 60.0 * minute + 0.002 * np.arange(30_000)
+        record.take(rows_at(layout, times, "step_us", times**2))
+    recent, whole = record.recent(), record.whole()
+    t, value = layout.fields["t"].start, layout.fields["step_us"].start
+    assert len(recent) == 6000 and recent[0, t] == pytest.approx(420.0)
+    assert MOST // 3 < len(whole) < MOST and whole[0, t] == 0.0 and whole[-1, t] > 479.5
+    assert np.unique(np.round(np.diff(whole[:, t]), 6)).size == 1  # evenly
+    for rows in (recent, whole):
+        assert np.array_equal(rows[:, value], rows[:, t] ** 2)
+    record.take(rows_at(layout, np.zeros(1), "step_us", np.ones(1)))
+    assert len(record.whole()) == len(record.recent()) == 1
+
+
+@pytest.fixture(scope="module")
+def run(body: Body) -> Recorded:
+    record = Record(body.session.layout)
+    history = History(body.block, body.session.layout, record.take)
+    for _ in range(6):
+        body.tick(50)
+        history.pull()
+    return Recorded(record.layout, record.whole())
+
+
+def test_files_hold_what_was_recorded(body: Body, run: Recorded) -> None:
+    data = np.load(io.BytesIO(as_npz(named(run.layout, run.rows, body.session.settings, {"scene": "x"}))))
+    assert np.allclose(np.diff(data["t"]), 0.01) and len(data["t"]) == 30
+    assert np.array_equal(data["q"], run["q"]) and data["q"].shape == (30, 3)
+    settings = json.loads(str(data["settings"]))
+    assert settings["scene"] == "x" and settings["in_force"]["horizon"] == body.session.settings.horizon
+    lines = list(csv.DictReader(io.StringIO(as_csv(run.layout, run.rows).decode())))
+    assert len(lines) == 30
+    joint, task = run.layout.joints[1], run.layout.tasks[0]
+    assert float(lines[7][f"q[{joint}]"]) == pytest.approx(run["q"][7, 1], rel=1e-8)
+    error = float(lines[7][f"error/{task.name}[{task.coordinates[0]}]"])
+    assert error == pytest.approx(run[f"error/{task.name}"][7, 0], rel=1e-8)
+
+
+def test_the_picture_is_drawn_with_and_without_a_ghost(run: Recorded, tmp_path: Path) -> None:
+    sizes = []
+    for ghost in (None, Recorded(run.layout, 0.5 * run.rows)):
+        picture = run_picture("run", run, ghost, 1e-3)
+        data = draw(picture, tmp_path).read_bytes()
+        assert data.startswith(b"\x89PNG")
+        sizes.append(len(picture.panels[0].curves))  # pyright: ignore[reportAttributeAccessIssue]
+    assert sizes == [len(run.layout.tasks), 2 * len(run.layout.tasks)]
+
+
+# ---------------------------------------------------------------- pulling at a link
+
+
+def test_a_pull_acts_at_the_point_that_is_held() -> None:
+    """The acceleration under the push equals that of the force alone at the held point, J(point)ᵀ f."""
+    robot, settings = load_robot("iiwa14"), PlantSettings(payload_kg=2.0)
+    plant = Plant(robot, settings)
+    rng = np.random.default_rng(5)
+    plant.reset(robot.home + 0.3 * rng.standard_normal(robot.n))
+    joint, frame_name = robot.n, robot.tip
+    _, point = plant.frame_pose(frame_name)
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, plant.q)
+    placement = data.oMi[joint]
+    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+    pose = np.array([*placement.translation, w, x, y, z])
+    grip = Grip(
+        joint, placement.rotation.T @ (point - placement.translation), point + np.array([0.1, -0.05, 0.2])
+    )
+    poses = np.tile(pose, (robot.n + 1, 1))
+    held, force = pulled(grip, poses, mass=20.0)
+    assert np.allclose(held, point, atol=1e-9) and np.linalg.norm(force) > 10.0
+    free = plant.acceleration(plant.tau)
+    push = push_at(robot, settings, joint, pose, held, force)
+    assert isinstance(push, Push)
+    plant.push(push.body, np.array(push.force), np.array(push.torque))
+    gained = plant.mass_matrix() @ (plant.acceleration(plant.tau) - free)
+    assert np.allclose(gained, plant.jacobian(frame_name)[:3].T @ force, atol=1e-6)
+    far = Grip(joint, grip.at, point + np.array([50.0, 0.0, 0.0]))
+    assert np.linalg.norm(pulled(far, poses, mass=20.0)[1]) == pytest.approx(70.0)
