@@ -103,12 +103,14 @@ class Simulation:
 
     def look(self) -> float | None:
         """Takes over what is new, keeps it for looking back, and returns the simulated time, s."""
-        found = self.read(lambda block, history: (history.pull(), block.moment()))
-        if found is None:
-            return None
-        t, poses = found[1]
-        self.tape.add(Frame(t, poses, self.status))
-        return t
+
+        def take(block: Block, history: History) -> float:
+            history.pull()
+            t, poses = block.moment()
+            self.tape.add(Frame(t, poses, self.status))
+            return t
+
+        return self.read(take)
 
     def close(self) -> None:
         with self._lock:
