@@ -23,10 +23,13 @@ from app.messages import (
     Speed,
     Status,
     Step,
+    Tell,
+    Told,
 )
 from app.runs import start
 from lessons.events import Reset
 from lessons.kinds import AnyScene, AnySession, AnySettings, find_scene, prepared
+from lessons.state import settings_now
 from robots import InputError
 
 
@@ -103,6 +106,8 @@ class Body:
                 self.write_poses()
             case Load(choice):
                 return self._load(choice)
+            case Tell():
+                return Told(self.choice, settings_now(self.session), tuple(self.session.log), self.session.t)
             case Lead(on):
                 self._lead(on)
             case Leash(until):

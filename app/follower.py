@@ -23,7 +23,7 @@ class Shadow(Body):
     def __init__(self, begin: Begin, own: tuple[str, ...]) -> None:
         """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
         self._leader, self._own = begin.settings, own
-        super().__init__(begin.choice, begin.seed)
+        super().__init__(begin.choice)
         self.follower = Follower(self.session, begin.settings, own)
 
     def _load_scene(self, choice: SceneChoice) -> AnyScene:

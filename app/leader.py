@@ -21,7 +21,7 @@ class Leader:
     def begin(self, choice: SceneChoice, session: AnySession) -> None:
         """The session was just reset: followers begin here, and until one is there no time passes."""
         self.on, self.leash = True, 0.0
-        self._begin = Begin(choice, session.settings, session.seed)
+        self._begin = Begin(choice, session.settings)
         self._told = len(session.log)
 
     def end(self) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from queue import Empty, Queue
 
 from app.ghost import Ghost
-from app.messages import Lead, Leash, Load, Ready, Report, ResetAll, SceneChoice, Script
+from app.messages import Lead, Leash, Load, Ready, Report, ResetAll, SceneChoice, Script, Tell, Told
 from app.process import Process, Spares
 from app.simulation import Simulation
 from lessons import lesson
@@ -20,6 +21,7 @@ class Learner(Simulation):
         self.attached = False
         self.left_at = time.monotonic()
         self.ghost: Ghost | None = None
+        self._asking: Queue[Told] | None = None
         super().__init__(spares)
 
     def _start(self) -> None:
@@ -51,9 +53,22 @@ class Learner(Simulation):
 
     def _hear(self, process: Process, report: Report) -> None:
         super()._hear(process, report)
+        if isinstance(report, Told) and self._asking is not None:
+            self._asking.put(report)
         ghost = self.ghost
         if isinstance(report, Script) and ghost is not None and process is self._process:
             ghost.hear(report)
+
+    def ask(self, timeout: float = 10.0) -> Told | None:
+        """What the run was; None if the simulation does not answer within so many seconds. Not to be called
+        on the page's loop or viser's: it waits."""
+        answer: Queue[Told] = Queue()
+        self._asking = answer
+        self.send(Tell())
+        try:
+            return answer.get(timeout=timeout)
+        except Empty:
+            return None
 
     # ---------------------------------------------------------------- ghost
 

@@ -85,11 +85,10 @@ class Leash:
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """Where a follower begins: the leader's scene, its settings at its last reset, and its seed."""
+    """Where a follower begins: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
     settings: AnySettings
-    seed: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +101,16 @@ class Follow:
 
 
 @dataclass(frozen=True)
+class Tell:
+    """Tell what the run was; the answer is `Told`."""
+
+
+@dataclass(frozen=True)
 class Quit:
     """End the process."""
 
 
-Command = Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Quit
+Command = Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Tell | Quit
 
 
 # ------------------------------------------------------------------ simulation → page
@@ -256,4 +260,18 @@ class Reached:
     t: float
 
 
-Report = Ready | Status | Refused | Failed | Script | Reached
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a run was, so that it can be repeated.
+
+    choice: the scene, as it was loaded; settings: in force now; log: (time, event) of every event that took
+    effect since it was loaded; t: s since the last reset.
+    """
+
+    choice: SceneChoice
+    settings: AnySettings
+    log: tuple[tuple[float, AnyEvent], ...]
+    t: float
+
+
+Report = Ready | Status | Refused | Failed | Script | Reached | Told

@@ -24,6 +24,7 @@ from app.panels.export import ExportPanel
 from app.panels.help import HelpPanel
 from app.panels.playback import PlaybackPanel
 from app.panels.robot import RobotPanel
+from app.panels.share import SharePanel
 from app.panels.snapshot import Snapshot
 from app.panels.timeline import TimeLine
 from app.pull import Pull
@@ -85,6 +86,7 @@ class Stage:
             self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
         with tabs.add_tab("Export"):
             ExportPanel(gui, self._learner, self._settings)
+            SharePanel(gui, self._learner, choose)
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):

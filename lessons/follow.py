@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
+from lessons.assignments import assignment
 from lessons.events import MoveLevel, Reset, Set
-from lessons.kinds import AnyEvent, AnyScene, AnySession, AnySettings, prepared
+from lessons.kinds import AnyEvent, AnyScene, AnySession, AnySettings, prepared, settings_after
+from lessons.mobile.events import Appear
 from lessons.mobile.scene import MobileScene
 from lessons.mobile.session import MobileSession
 from lessons.mobile.settings import MobileSettings
-from lessons.mobile.settings import changed as changed_mobile
+from lessons.mobile.settings import value_at as mobile_value_at
+from lessons.run import parse_assignment
 from lessons.scene import Scene
 from lessons.session import Session
-from lessons.settings import SceneSettings, changed
+from lessons.settings import SceneSettings, value_at
 from robots import InputError
 
 _SAME = 1e-6
@@ -86,12 +90,12 @@ class Follower:
             self._take(self._script.popleft()[1])
 
     def _take(self, event: AnyEvent) -> None:
-        settings = _after(self._leader, event)
-        if settings is None:
+        if not _sets(event, self._leader):
             self.session.post(event)  # pyright: ignore[reportArgumentType]
             self.session.drain()
             return
-        before, self._leader = self._leader, settings
+        before = self._leader
+        settings = self._leader = settings_after(before, (event,))
         try:
             found = _with(self._scene, settings, self._own).settings
             # A leader that sets what it had already tells its controller all the same: so does a follower.
@@ -110,6 +114,36 @@ class Follower:
                 raise TypeError("a session never changes its kind")
 
 
+def swapped(settings: AnySettings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
+    """What leader and follower get when they change sides.
+
+    Args:
+        settings: the leader's.
+        own: the follower's assignments.
+
+    Returns:
+        the follower's new assignments, with the leader's present values; and the events that give the leader
+        the follower's.
+
+    Raises:
+        InputError: an assignment sets more than one value, or fits nothing here.
+    """
+    given = [parse_assignment(text) for text in own]
+    try:
+        kept = tuple(assignment(path, _value(settings, path)) for path, _ in given)
+    except (AttributeError, StopIteration):
+        raise InputError(
+            f"{', '.join(own)} cannot change sides: name a level or a task, e.g. levels.position.Q=50"
+        ) from None
+    return kept, tuple(Set(path, value) for path, value in given)
+
+
+def _value(settings: AnySettings, path: str) -> Any:
+    if isinstance(settings, SceneSettings):
+        return value_at(settings, path)
+    return mobile_value_at(settings, path)
+
+
 def _with(scene: AnyScene, settings: AnySettings, own: Sequence[str]) -> AnyScene:
     match scene, settings:
         case Scene(), SceneSettings():
@@ -120,14 +154,8 @@ def _with(scene: AnyScene, settings: AnySettings, own: Sequence[str]) -> AnyScen
             raise TypeError("a scene and its settings are of one kind")
 
 
-def _after(settings: AnySettings, event: AnyEvent) -> AnySettings | None:
-    """What an event makes of settings; None if it leaves them alone."""
-    match settings, event:
-        case SceneSettings(), Set(path, value):
-            return changed(settings, path, value)
-        case SceneSettings(), MoveLevel(level, to):
-            return replace(settings, levels=moved(settings.levels, level, to))
-        case MobileSettings(), Set(path, value):
-            return changed_mobile(settings, path, value)
-        case _:
-            return None
+def _sets(event: AnyEvent, settings: AnySettings) -> bool:
+    """Whether an event changes settings, not only what the robot is to do."""
+    return isinstance(event, (Set, Appear)) or (
+        isinstance(event, MoveLevel) and isinstance(settings, SceneSettings)
+    )

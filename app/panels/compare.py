@@ -8,13 +8,16 @@ from collections.abc import Callable
 import viser
 
 from app.learner import Learner
+from app.messages import Post
 from app.palette import BAD, BOUND, GHOST, RGB, css
 from app.panels.snapshot import Snapshot
 from app.score import Result
 from app.text import badge, block, esc, quantity, swatch
+from lessons.follow import swapped
 from lessons.kinds import AnySettings
 from lessons.lesson import Ghost
 from lessons.menu import controllers_for, usual_settings
+from robots import InputError
 
 _SAME = "as the robot"
 _NOTHING = "–"
@@ -50,6 +53,10 @@ class ComparePanel:
         @self._start.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._begin(event.client)
+
+        @self._swap.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._change_sides(event.client)
 
         @self._end.on_click
         def _(_: object) -> None:  # in a thread: it waits for a process to end
@@ -91,6 +98,21 @@ class ComparePanel:
                 )
             return
         self._learner.start_ghost(Ghost(", ".join(words), tuple(own)))
+
+    def _change_sides(self, client: viser.ClientHandle | None) -> None:
+        learner = self._learner
+        ghost, settings = learner.ghost, learner.settings
+        if ghost is None or settings is None:
+            return
+        try:
+            own, events = swapped(settings, ghost.own)
+        except InputError as error:
+            if client is not None:
+                client.add_notification("Not swapped", str(error), color="orange")
+            return
+        for event in events:
+            learner.send(Post(event))
+        learner.start_ghost(Ghost(", ".join(own), own))
 
     def update(self, now: Snapshot[AnySettings]) -> None:
         """Shows what is."""

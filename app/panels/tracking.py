@@ -6,9 +6,9 @@ import numpy as np
 import viser
 
 from app.history import Window
-from app.messages import Ready
+from app.messages import Ready, TaskView
 from app.palette import BOUND, GOOD, JOINTS, LEVELS, RGB
-from app.panels.chart import Chart, Line
+from app.panels.chart import Chart, Line, of_ghost
 from app.text import block
 from himpc.htmpc import base_joints
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.follow import Follower, followed
+from lessons.follow import Follower, followed, swapped
 from lessons.scene import Scene
 from lessons.scenes import load_scene
 from lessons.session import Session
@@ -164,3 +164,18 @@ def test_it_never_runs_ahead_and_a_reset_brings_it_back_at_once(scene: Scene) ->
 def test_own_settings_that_do_not_fit_are_refused(scene: Scene) -> None:
     with pytest.raises(InputError, match="horizon"):
         followed(scene, scene.settings, ("horizn=3",))
+
+
+def test_changing_sides_gives_each_what_the_other_had(scene: Scene) -> None:
+    own = ("controller=hqp", "levels.position.Q=50", "plant.payload_kg=2")
+    kept, events = swapped(scene.settings, own)
+    assert kept == ("controller=himpc", "levels.position.Q=200.0", "plant.payload_kg=0.0")
+    session = Session(scene)
+    for event in events:
+        session.post(event)
+    session.drain()
+    other = followed(scene, scene.settings, own).settings
+    assert session.settings == other and not session.notices
+    assert followed(scene, session.settings, kept).settings == scene.settings
+    with pytest.raises(InputError, match="level"):
+        swapped(scene.settings, ("levels.position.K_p=3",))
