@@ -18,6 +18,7 @@ Statistic = Literal["largest", "rms", "mean", "range", "last", "sum"]
 UNITS: dict[str, float] = {
     "": 1.0,
     "×": 1.0,
+    "s": 1.0,
     "m": 1.0,
     "mm": 1e3,
     "µm": 1e6,
@@ -29,7 +30,7 @@ UNITS: dict[str, float] = {
     "%": 100.0,
     "µs": 1.0,
 }
-"""How many of a unit are one of the unit that telemetry records (m, rad, N·m, share)."""
+"""How many of a unit are one of the unit that telemetry records (s, m, rad, N·m, share)."""
 
 
 class Rows(Protocol):
@@ -43,7 +44,8 @@ class Signal:
     """One number per tick.
 
     Attributes:
-        name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.Layout`).
+        name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.layout_of`, and for velocity-level
+            scenes `lessons.mobile.telemetry.layout_of`).
         unit: a key of UNITS.
         column: which component of the field; None: its Euclidean norm.
     """
@@ -160,6 +162,17 @@ def _tip_travel(rows: Rows) -> Array:
     return np.linalg.norm(x - x[:1], axis=1, keepdims=True)
 
 
+def _way_of_the_base(rows: Rows) -> Array:
+    """How far the base has driven since the first row, along its path, (ticks, 1) m."""
+    steps = np.linalg.norm(np.diff(rows["x/base"], axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])[: len(rows["t"]), None]
+
+
+def _time_at_work(rows: Rows) -> Array:
+    """t as long as tasks of the mission are left, (ticks, 1) s; then not defined."""
+    return np.where(rows["left"] > 0, rows["t"], math.nan)
+
+
 DERIVED: Mapping[str, Callable[[Rows], Array]] = {
     "torque share": lambda rows: _shares(rows, "tau_demand", "tau_upper"),
     "speed share": lambda rows: _shares(rows, "v", "v_limit"),
@@ -169,8 +182,11 @@ DERIVED: Mapping[str, Callable[[Rows], Array]] = {
     "at a position bound": _at(AT_POSITION),
     "joints moved": _joints_moved,
     "distance from the start": _tip_travel,
+    "way of the base": _way_of_the_base,
+    "time at work": _time_at_work,
 }
-"""Signals that telemetry does not record as they are. Torque shares suppose symmetric bounds."""
+"""Signals that telemetry does not record as they are. Torque shares suppose symmetric bounds; the last two
+are of velocity-level scenes."""
 
 
 def _last(values: Array) -> float:

@@ -32,7 +32,7 @@ class DeadlineFolder:
             )
             with gui.add_folder(None):
                 per_knot = gui.add_slider(
-                    "Time per knot [ms]",
+                    "Per knot [ms]",
                     min=0.0,
                     max=max(0.5, settings.solve_ms_per_knot),
                     step=0.01,

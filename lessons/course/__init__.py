@@ -25,6 +25,10 @@ COURSE: tuple[str, ...] = (
     "sensors-are-coarse",
     "the-model-is-wrong",
     "inside-the-qp",
+    "first-hold-then-reach",
+    "how-strict-is-strict",
+    "seeing-ahead",
+    "deliveries",
     "your-robot",
 )
 """The lessons by name, in the order in which to take them."""

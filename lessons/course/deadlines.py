@@ -3,7 +3,7 @@
 The torque is due every millisecond: what if the computer is not ready?
 
 Minutes: 10
-You need: lesson "no-model-needed"
+You need: lesson "no-model-needed"; lesson "how-far-ahead"
 """
 
 from __future__ import annotations
@@ -17,67 +17,80 @@ from lessons.measure import Measure, Signal
 from lessons.prediction import Choice, Option, Value
 
 HAND = Signal("error/position", "mm")
+LATE = Signal("late", "%")
 MOVE = ((0.1, MoveTarget("position", (0.55, 0.42))),)
-DELAY = Control("plant.delay_ms", "Result late by, ms", 0.0, 8.0)
+HORIZON = Control("horizon", "N", 1, 30)
+DEADLINE = Control("deadline_ms", "Due after, ms (0: lockstep)", 0.0, 5.0)
 PERIOD = Control("T_s", "Period, s", 0.001, 0.01)
 M_BAR = Control("M_bar_scale", "M̄, factor", 0.1, 4.0, log=True)
-PLOTS = (HAND, Signal("torque share", "%"), Signal("step_us", "µs"))
+PLOTS = (HAND, LATE, Signal("torque share", "%"))
 
-LATE = Step(
-    title="One tick late",
+ONE_MORE = Step(
+    title="One knot more",
     text=r"""
-    Measure, solve, apply: all within $T_s = 1$ ms. A computer that takes a little more than that
-    misses the deadline, the motors hold the previous torque, and the result acts one millisecond
-    late. Time-delay estimation (8) lives on fresh values. How late the result is, is set here and
-    not measured, so that every run is the same. The target moves by 13 cm in half a second.
+    So far time stood still while the controller computed. Now it does not: measure, solve, apply,
+    all within $T_s = 1$ ms. If the torque is not ready when it is due, the motors hold the previous
+    one, and the late torque acts at the next tick. The computer here is assumed to need 0.1 ms for
+    each of the $N$ knots, so that every run is the same on every machine. $N = 10$ is just in time;
+    now $N = 11$. The target moves by 13 cm in half a second.
     """,
-    do="Look at the time per step of your own machine. How long a horizon does it manage within 1 ms?",
+    do="Where is the edge if the deadline is 2 ms? And what happens beyond it, at N = 20, N = 30?",
     why=r"""
-    The error doubles. Each $\Delta\tau$ is meant as a change of the torque that acts now; when it
-    arrives, that torque is already the result of another $\Delta\tau$, so two corrections are made
-    from the same starting point and every other one is lost. One millisecond late is not a tenth of
-    a per cent of a second's motion: it is half of the feedback.
+    The error more than doubles, between one knot and the next. Nothing is gained by the longer
+    horizon, and every single torque is one tick late. Each $\Delta\tau$ is meant as a change of the
+    torque that acts now; when it arrives, that torque is already the result of another
+    $\Delta\tau$: two corrections start from the same point, and every other one is lost. Late by a
+    thousandth of a second is not a small delay here: it is half of the feedback.
     """,
     prediction=Choice(
-        "Everything arrives one millisecond late. The largest error of this half-second motion …",
+        "Eleven knots instead of ten, 0.1 ms too slow: the largest error of this motion …",
         (
-            Option("grows by a few per cent", high=1.2),
+            Option("shrinks a little: a longer horizon sees more", high=0.95),
+            Option("stays the same within 30 %", 0.95, 1.3),
             Option("about doubles", 1.6, 3.0),
-            Option("explodes", low=10.0),
         ),
         Measure(HAND, over_ghost=True),
         tempting=0,
     ),
     claims=(
         Claim(
+            "Every torque is late.",
+            Measure(LATE, "mean"),
+            "at least",
+            99.0,
+            fails_with=("horizon=10",),
+            because="ten knots take exactly the millisecond there is",
+        ),
+        Claim(
             "The largest error is at least 1.8 times that of an arm in time.",
             Measure(HAND, over_ghost=True),
             "at least",
             1.8,
-            fails_with=("plant.delay_ms=0",),
-            because="then it is the ghost",
+            fails_with=("deadline_ms=0",),
+            because="in lockstep eleven knots do as well as ten",
         ),
     ),
-    set=("plant.delay_ms=1",),
+    set=("deadline_ms=1", "horizon=11"),
     events=MOVE,
     duration=1.2,
-    ghost=Ghost("in time", ("plant.delay_ms=0",)),
-    controls=(DELAY, Control("horizon", "N", 1, 30)),
+    ghost=Ghost("N = 10, in time", ("horizon=10",)),
+    controls=(HORIZON, DEADLINE),
     plots=PLOTS,
 )
 
 SLOWER = Step(
     title="Promise less, keep it",
     text=r"""
-    The other way out of the same trouble: ask only every 2 ms and be in time. The controller is
-    told, so its prediction uses $T_s = 2$ ms. The ghost keeps asking every millisecond and is
-    always one late.
+    Eleven knots again, but asked for every 2 ms only, and due after 2 ms: now they are in time. The
+    controller is told, so its prediction uses $T_s = 2$ ms. The ghost keeps asking every
+    millisecond and is always one tick late.
     """,
-    do="Try 5 ms and 10 ms. Where does it stop to be usable?",
+    do="What do 5 ms and 10 ms do? Where does the arm stop to be usable?",
     why=r"""
     The same error, with half the computing. A loop that misses every deadline by one tick is a loop
-    at half the rate that does not know it. Error grows with the period (Remark 6): that is why the
-    paper insists on 1 ms, and why its 8 ms per step on seven joints (Table VII) is a problem.
+    at half the rate that does not know it. The error grows with the period (Remark 6): that is why
+    the paper wants 1 ms, and why it calls its own 8 ms per step on seven joints, at $N = 5$, too
+    long.
     """,
     prediction=Value(
         "Every 2 ms and in time, against every 1 ms and one late: the ratio of the largest errors is …",
@@ -92,32 +105,40 @@ SLOWER = Step(
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,
-            fails_with=("T_s=0.005",),
+            fails_with=("T_s=0.005", "deadline_ms=5"),
             because="every 5 ms is slower than that",
         ),
+        Claim(
+            "No torque is late.",
+            Measure(LATE, "mean"),
+            "at most",
+            0.0,
+            fails_with=("deadline_ms=1",),
+            because="a longer period does not move the deadline by itself",
+        ),
     ),
-    set=("T_s=0.002",),
+    set=("T_s=0.002", "deadline_ms=2", "horizon=11"),
     events=MOVE,
     duration=1.2,
-    ghost=Ghost("every 1 ms, one late", ("T_s=0.001", "plant.delay_ms=1")),
-    controls=(PERIOD, DELAY),
+    ghost=Ghost("every 1 ms, one tick late", ("T_s=0.001", "deadline_ms=1")),
+    controls=(PERIOD, DEADLINE, HORIZON),
     plots=PLOTS,
 )
 
 REPAIR = Step(
     title="Buy it back",
     text=r"""
-    One tick late again. A small $\bar M$ and a late result have the same effect, corrections come
+    One tick late again. A small $\bar M$ and a late torque have the same effect, corrections come
     too slowly. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
     """,
-    do="Now go on: 2.5, 3. And what if the computer becomes fast again?",
+    do="How far does this go: 2.5, 3? And what if the computer becomes fast again, N = 10?",
     why=r"""
     The lost half is back: the errors are the same to the third digit. It was paid for with the
     margin: the cliff is where it was, between 2 and 2.5 times the old $\bar M$, and noise counts
     double. Time is bought with robustness, never for nothing.
     """,
     prediction=Choice(
-        "One millisecond late, but M̄ doubled. Compared with an arm in time the error is …",
+        "Always one tick late, but M̄ doubled. Compared with an arm in time the error is …",
         (
             Option("still clearly larger", low=1.2),
             Option("the same within 10 %", 0.9, 1.1),
@@ -136,18 +157,21 @@ REPAIR = Step(
             because="the lost half is not made up for",
         ),
     ),
-    set=("plant.delay_ms=1", "M_bar_scale=2"),
+    set=("deadline_ms=1", "horizon=11", "M_bar_scale=2"),
     events=MOVE,
     duration=1.2,
-    ghost=Ghost("in time, M̄ as it was", ("plant.delay_ms=0", "M_bar_scale=1")),
-    controls=(M_BAR, DELAY),
+    ghost=Ghost("in time, M̄ as it was", ("horizon=10", "M_bar_scale=1")),
+    controls=(M_BAR, HORIZON, DEADLINE),
     plots=PLOTS,
 )
 
 CHALLENGE = Challenge(
-    text="Every result is two milliseconds late. Keep the hand within 3.5 mm without chatter.",
+    text=r"""
+    A slower computer: 0.4 ms per knot, and $N = 5$. The deadline stays 1 ms, and so does the
+    period. Keep the hand within 2 mm without chatter. There is more than one way.
+    """,
     goals=(
-        Claim("The hand stays within 3.5 mm.", Measure(HAND), "at most", 3.5),
+        Claim("The hand stays within 2 mm.", Measure(HAND), "at most", 2.0),
         Claim(
             "Torque changes stay below 0.1 N·m RMS.",
             Measure(Signal("delta_tau", "N·m"), "rms"),
@@ -156,13 +180,14 @@ CHALLENGE = Challenge(
         ),
     ),
     knobs=(
+        HORIZON,
         M_BAR,
         Control("tasks.position.K_p", "K_P of the position, 1/s²", 10.0, 400.0, log=True),
         Control("tasks.position.K_v", "K_V of the position, 1/s", 2.0, 60.0),
     ),
-    score=Score(Measure(HAND), worst=3.5, best=1.0),
-    solutions=(("M_bar_scale=2",), ("tasks.position.K_p=400", "tasks.position.K_v=40")),
-    set=("plant.delay_ms=2",),
+    score=Score(Measure(HAND), worst=2.0, best=0.7),
+    solutions=(("horizon=2",), ("M_bar_scale=2",), ("tasks.position.K_p=400", "tasks.position.K_v=40")),
+    set=("deadline_ms=1", "solve_ms_per_knot=0.4"),
     events=MOVE,
     duration=1.2,
 )
@@ -171,6 +196,6 @@ LESSON = Lesson(
     name="deadlines",
     card=card_of(__doc__),
     scene="planar3-hold",
-    steps=(LATE, SLOWER, REPAIR),
+    steps=(ONE_MORE, SLOWER, REPAIR),
     challenge=CHALLENGE,
 )

@@ -231,7 +231,8 @@ class MobileSession:
         row.fill(np.nan)
         fields = self.layout.fields
         row[fields["t"]], row[fields["q"]], row[fields["v"]] = t, q, v
-        row[fields["place"]] = self.progress.place
+        place = row[fields["place"]] = self.progress.place
+        row[fields["left"]] = len(self.progress.mission) - place
         write_plan(row, self.layout, plan, settings.lexicographic_delta)
         at = Configuration(self.robot, self._data, q, v)
         places = {level.name: place for place, level in enumerate(self._stack, start=1)}

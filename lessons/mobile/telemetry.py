@@ -23,7 +23,7 @@ AT_ACCELERATION = AT_TORQUE
 _AT = 1e-3
 """A value this share of its bound away from it is at the bound."""
 
-_SCALARS = ("t", "step_us", "priority_leak", "unsolved", "place", "clearance", "manipulability")
+_SCALARS = ("t", "step_us", "priority_leak", "unsolved", "place", "left", "clearance", "manipulability")
 _PER_JOINT = (
     "q",
     "v",
@@ -43,12 +43,13 @@ _PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
 def layout_of(robot: Robot, roles: Stack) -> Layout:
     """Where each field of a row lies.
 
-    Per joint besides the usual ones: `tau` is the velocity commanded from that tick on, `tau_demand` the
-    same, `acceleration` and `jerk` the command's, `at_bound` the bits AT_ACCELERATION, AT_VELOCITY and
-    AT_POSITION. Per role the fields of a task and `level/<role>`, its place in the window (NaN: it is not in
-    it). Per level of the stack cost, kkt, rung, time_us, the accepted line-search step, the number of active
-    constraints and `bound`, see `write_plan`. `manipulability` is w = √det(J Jᵀ) of the hand's position under
-    the arm's joints alone, m³.
+    `place` is how many tasks of the mission are completed, `left` how many are not. Per joint besides the
+    usual ones: `tau` is the velocity commanded from that tick on, `tau_demand` the same, `acceleration` and
+    `jerk` the command's, `at_bound` the bits AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the
+    fields of a task and `level/<role>`, its place in the window (NaN: it is not in it). Per level of the
+    stack cost, kkt, rung, time_us, the accepted line-search step, the number of active constraints and
+    `bound`, see `write_plan`. `manipulability` is w = √det(J Jᵀ) of the hand's position under the arm's
+    joints alone, m³.
     """
     levels = tuple(level.name for level in roles)
     return arranged(robot, roles, levels, _SCALARS, _PER_JOINT, _PER_LEVEL, per_task=("level",))

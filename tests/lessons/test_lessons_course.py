@@ -19,13 +19,14 @@ from lessons.claim import Claim
 from lessons.control import Control
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
-from lessons.lesson import Card, Ghost, Lesson, Run, Step, card_of
+from lessons.kinds import AnyScene, changed_any, paths_of
+from lessons.lesson import Card, Ghost, Lesson, Step, card_of
 from lessons.measure import DERIVED, Measure, Signal
+from lessons.mobile.telemetry import layout_of as mobile_layout_of
 from lessons.parallel import one_by_one
 from lessons.prediction import Choice, Option, Sketch, Value
 from lessons.run import parse_assignment
 from lessons.scene import Scene
-from lessons.settings import changed, paths
 from robots import InputError
 
 HAND = Signal("error/position", "mm")
@@ -55,10 +56,11 @@ def texts(lesson: Lesson) -> Iterator[str]:
         yield lesson.challenge.text
 
 
-def scene_of(run: Run) -> Scene:
-    scene = run.prepared()
-    assert isinstance(scene, Scene)
-    return scene
+def fields_of(scene: AnyScene) -> dict[str, slice]:
+    """What the telemetry of a scene records."""
+    if isinstance(scene, Scene):
+        return layout_of(scene.robot, scene.settings.levels).fields
+    return mobile_layout_of(scene.robot, scene.settings.levels).fields
 
 
 @pytest.mark.parametrize("name", COURSE)
@@ -100,22 +102,22 @@ def test_controls_and_plots_exist_in_the_scene(name: str) -> None:
     """Each control's path is a setting whose value the control can show; each signal is recorded."""
     lesson = load_lesson(name)
     for step in lesson.steps:
-        scene = scene_of(lesson.run_of(step))
-        fields = layout_of(scene.robot, scene.settings.levels).fields
+        scene = lesson.run_of(step).prepared()
+        fields = fields_of(scene)
         assert all(signal.name in fields or signal.name in DERIVED for signal in step.plots)
         for control in step.controls:
             assert_takes(scene, control)
     if lesson.challenge is not None:
         for knob in lesson.challenge.knobs:
-            assert_takes(scene_of(lesson.run_of(lesson.challenge)), knob)
+            assert_takes(lesson.run_of(lesson.challenge).prepared(), knob)
         assert len(set(lesson.challenge.solutions)) >= 2
 
 
-def assert_takes(scene: Scene, control: Control) -> None:
-    assert control.path in paths(scene.settings)
+def assert_takes(scene: AnyScene, control: Control) -> None:
+    assert control.path in paths_of(scene)
     for value in control.choices or (control.low, control.high):
         assert control.takes(value)
-        changed(scene.settings, control.path, value)
+        changed_any(scene.settings, control.path, value)
 
 
 def test_lessons_can_be_sent_to_another_process() -> None:
@@ -257,6 +259,18 @@ def test_a_measure_over_the_ghost_is_a_ratio() -> None:
     assert ratio.value(own, ghost) == pytest.approx(0.5)
     assert math.isnan(ratio.value(own))
     assert ratio.unit == "×"
+
+
+def test_signals_of_missions() -> None:
+    """The base's way adds up along its path; time at work stands still when no task is left."""
+    x = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 4.0], [3.0, 3.0]])
+    rows = {"t": np.arange(4.0)[:, None], "x/base": x, "left": np.array([[2.0], [1.0], [0.0], [0.0]])}
+    way = Signal("way of the base", "m")
+    assert way.over(rows).tolist() == [0.0, 5.0, 5.0, 6.0]
+    assert Measure(way, "range", after=1.0, until=3.0).value(rows) == 0.0
+    assert Measure(Signal("time at work", "s")).value(rows) == 1.0
+    nothing = {name: field[:0] for name, field in rows.items()}
+    assert math.isnan(Measure(way).value(nothing))
 
 
 def test_predictions_are_graded_against_the_run() -> None:

@@ -1,0 +1,238 @@
+"""Deliveries
+
+Three people wait for a ball each: must the robot finish one thing before it begins the next?
+
+Minutes: 12
+You need: lesson "first-hold-then-reach"
+"""
+
+from __future__ import annotations
+
+from lessons.challenge import Challenge, Score
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.events import MoveTarget
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.mobile.events import Release
+from lessons.prediction import Choice, Option
+
+HAND = Signal("error/ee", "mm")
+WAY = Signal("way of the base", "m")
+WORK = Signal("time at work", "s")
+PLACE = Signal("place")
+ARCHITECTURE = Control("architecture", "Tasks at a time", choices=("hierarchical", "single_task"))
+CRUISE = Control("cruise", "Speed of the planned paths, m/s", 0.2, 1.0)
+SINGLE = ("architecture=single_task",)
+ONE_BY_ONE = Ghost("one task at a time", SINGLE)
+ROUND = ("seats=[0,2,5]", "rounds=1", "hold_s=1")
+TAKEN = ((14.0, Release("ee 1")), (15.0, Release("ee 2")))
+PLOTS = (PLACE, HAND, WAY)
+
+OVERLAP = Step(
+    title="Begin the next, finish this",
+    text=r"""
+    A round to three people is a list of tasks that alternate: base to a place near the person, hand
+    to the person's hand for one second, base to the next place, … Of this list the controller is
+    given a window of $L$ tasks, $[\mathcal T_{l_0}, \ldots, \mathcal T_{l_0+L-1}]$. When
+    $\mathcal T_{l_0}$ is done the window moves on by one. The ghost has $L = 1$: it drives, stops,
+    reaches, waits, drives. Here $L = 2$: the task of now ranks first, the next one second. Nothing
+    else is different.
+    """,
+    do="Could the ghost keep up with a higher speed of the paths? What does its base do at each stop?",
+    why=r"""
+    Less than half the time, and little more than half the way. While the hand holds the ball out,
+    the base sets out for the next person as far as the arm allows; while the base drives, the hand
+    already reaches. And the base need not go to its place and stop there: it is the next task that
+    counts as soon as the hand can do it. The paper measured a factor of 2.3 over four rounds.
+    """,
+    prediction=Choice(
+        "The same places, the same speed of the paths. Two tasks at a time take …",
+        (
+            Option("nearly as long: the way is the same", low=0.85),
+            Option("about three quarters of the time", 0.65, 0.85),
+            Option("about half the time", 0.35, 0.6),
+        ),
+        Measure(WORK, over_ghost=True),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The round takes at most 0.6 times as long.",
+            Measure(WORK, over_ghost=True),
+            "at most",
+            0.6,
+            fails_with=SINGLE,
+            because="then it is the ghost",
+        ),
+        Claim(
+            "After 22 s all six tasks are done.",
+            Measure(PLACE, until=22.0),
+            "at least",
+            6.0,
+            fails_with=SINGLE,
+            because="it is still on its way to the second person",
+        ),
+        Claim(
+            "The base drives at most 0.7 times as far.",
+            Measure(WAY, over_ghost=True),
+            "at most",
+            0.7,
+            fails_with=SINGLE,
+            because="it goes to every place in full",
+        ),
+    ),
+    set=ROUND,
+    duration=45.0,
+    ghost=ONE_BY_ONE,
+    controls=(ARCHITECTURE, CRUISE),
+    plots=PLOTS,
+)
+
+WAIT = Step(
+    title="She takes her time",
+    text=r"""
+    How long somebody needs to take a ball, nobody knows. The hand is with the first person by 3 s;
+    here the ball is taken at 14 s, and only then the controller learns of it. Until then
+    $\mathcal T_{l_0}$ is *hand at her hand*, of unknown length, and the base's next place, 2 m
+    further on, is out of reach. What will the base do with the time?
+    """,
+    do="Release the ball yourself, early or late. Can you see in advance how long the rest will take?",
+    why=r"""
+    It goes to the edge of what the arm allows and waits there, stretched like somebody with one
+    foot out of the door. The moment the ball is gone the window moves on, and the rest of the way is
+    short: three seconds to the second person, where the ghost, which had nothing but the hand to
+    think of, needs nearly ten. Nobody had to plan for the duration of the wait: there is none in the
+    problem.
+    """,
+    prediction=Choice(
+        "From 5 s until the ball is taken, how far does the base drive?",
+        (
+            Option("not at all: the hand must stay", high=0.05),
+            Option("some decimetres, to the edge of the arm's reach", 0.2, 1.4),
+            Option("all of the 2 m to its next place", low=1.4),
+        ),
+        Measure(WAY, "range", after=5.0, until=14.0),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "While she takes her time, 5 s to 14 s, the base drives on by at least 45 cm.",
+            Measure(WAY, "range", after=5.0, until=14.0),
+            "at least",
+            0.45,
+            fails_with=SINGLE,
+            because="its only task is the hand, and once that is there it rests",
+        ),
+        Claim(
+            "The ball does not move: the hand stays within 1 mm.",
+            Measure(HAND, after=5.0, until=14.0),
+            "at most",
+            1.0,
+            fails_with=("formulation=paper",),
+            because="a first level that saves effort lets the hand slip",
+        ),
+        Claim(
+            "Both balls are delivered within 18 s.",
+            Measure(PLACE, until=18.0),
+            "at least",
+            4.0,
+            fails_with=SINGLE,
+            because="it sets out when the ball is taken, not before",
+        ),
+    ),
+    events=TAKEN,
+    duration=26.0,
+    ghost=ONE_BY_ONE,
+    controls=(ARCHITECTURE,),
+    plots=PLOTS,
+)
+
+MOVES = Step(
+    title="People move",
+    text=r"""
+    The same wait, and at 8 s the second person walks over to another seat: the goals of tasks three
+    and four change, while the hand is still with the first one. At 16.5 s, the hand
+    all but there, the second person lifts the ball's place by 20 cm and shifts it by 30 cm. Nothing is planned
+    again from the beginning: the references $r$ in (8) change, and the next plan, a tenth of a
+    second later, has them. The ghost is HTIDKC, which has no plan.
+    """,
+    do="Move the people yourself, while the ball waits and while the robot is on its way.",
+    why=r"""
+    At 8 s the base, waiting at the edge for the old place, goes along the edge to where it is
+    nearest to the new one. At 16.5 s the hand turns to the new spot, and a second later it is there
+    within a centimetre. A joint-space plan for the whole sequence would have been
+    void twice. What is fixed is only what the people want, in the space in which they move.
+    """,
+    prediction=Choice(
+        "At 16.5 s the goal jumps by 36 cm, when the hand is all but there. One second later it is …",
+        (
+            Option("still more than 10 cm off", low=100.0),
+            Option("some centimetres off", 20.0, 100.0),
+            Option("there within 2 cm", high=20.0),
+        ),
+        Measure(HAND, after=17.5, until=19.5),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "From 18.5 s on the hand is within 5 mm of the new spot.",
+            Measure(HAND, after=18.5, until=19.5),
+            "at most",
+            5.0,
+            fails_with=("controller=htidkc",),
+            because="with the authors' gain the hand needs seconds for the last stretch",
+        ),
+        Claim(
+            "Between 8 s and 14 s the base turns to the new place by at least 10 cm.",
+            Measure(WAY, "range", after=8.0, until=14.0),
+            "at least",
+            0.1,
+            fails_with=SINGLE,
+            because="it does not know yet that it will go there",
+        ),
+        Claim(
+            "Meanwhile the first ball stays within 1 mm.",
+            Measure(HAND, after=5.0, until=14.0),
+            "at most",
+            1.0,
+            fails_with=("formulation=paper",),
+            because="a first level that saves effort lets the hand slip",
+        ),
+    ),
+    events=(
+        (8.0, MoveTarget("base 2", (-1.2, -0.4))),
+        (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),
+        (14.0, Release("ee 1")),
+        (16.5, MoveTarget("ee 2", (-1.9, -0.4, 1.0))),
+        (19.5, Release("ee 2")),
+    ),
+    duration=20.0,
+    ghost=Ghost("HTIDKC", ("controller=htidkc",)),
+    controls=(ARCHITECTURE, Control("controller", "Controller", choices=("htmpc", "htidkc"))),
+    plots=PLOTS,
+)
+
+CHALLENGE = Challenge(
+    text=r"""
+    One round to three people, one task at a time, takes 41 s and 10.9 m of driving. Be done within
+    37 s, with less than 8 m. The fastest round counts.
+    """,
+    goals=(
+        Claim("All six tasks are done within 37 s.", Measure(PLACE, until=37.0), "at least", 6.0),
+        Claim("The base drives less than 8 m.", Measure(WAY), "at most", 8.0),
+    ),
+    knobs=(ARCHITECTURE, CRUISE),
+    score=Score(Measure(WORK), worst=37.0, best=14.0),
+    solutions=(("architecture=hierarchical",), ("architecture=hierarchical", "cruise=1")),
+    set=(*ROUND, *SINGLE),
+    duration=45.0,
+)
+
+LESSON = Lesson(
+    name="deliveries",
+    card=card_of(__doc__),
+    scene="ridgeback-ur10-handover",
+    steps=(OVERLAP, WAIT, MOVES),
+    challenge=CHALLENGE,
+)

@@ -1,0 +1,222 @@
+"""Seeing ahead
+
+Eight seconds there, eight seconds back: what is it worth to know that beforehand?
+
+Minutes: 12
+You need: lesson "first-hold-then-reach"
+"""
+
+from __future__ import annotations
+
+from lessons.claim import Claim
+from lessons.control import Control
+from lessons.lesson import Ghost, Lesson, Step, card_of
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Option, Value
+
+HAND = Signal("error/ee", "mm")
+BASE = Signal("error/base", "m")
+WAY = Signal("way of the base", "m")
+BACK = Measure(BASE, "mean", after=8.0, over_ghost=True)
+CONTROLLER = Control("controller", "Controller", choices=("htmpc", "htmpc_wpt", "htidkc"))
+HORIZON = Control("horizon", "N", 1, 20)
+PLOTS = (BASE, HAND, WAY)
+
+EARLY = Step(
+    title="It leaves before it is told",
+    text=r"""
+    The hand holds its place. The base follows a square wave: from 0 to 8 s a peak that it cannot
+    reach (Part 1), from 8 to 16 s its home (Part 2). Every plan looks $N \Delta t = 1$ s ahead, and
+    the cost (8) takes each knot's own reference, $e_k = f(q_k) - r(t + k \Delta t)$: half a second
+    before the jump five of ten knots already ask for home. The ghost is the same controller, but it
+    gets two separate waypoints, one after the other, and knows nothing of the second until it comes.
+    """,
+    do="Let N grow from 1 to 20. When does the base set out?",
+    why=r"""
+    More than half a metre of the way back is done when the clock strikes eight. Some error at the
+    end of Part 1 buys more at the beginning of Part 2: over the knots together that is the cheaper
+    plan. The mean error of Part 2 is about a quarter of the ghost's. The hand does not notice
+    either way: whatever level 2 foresees, (12) holds.
+    """,
+    prediction=Choice(
+        "The jump comes at 8 s. How much of the way back is done before that?",
+        (
+            Option("nothing: until 8 s the peak is the task", high=0.05),
+            Option("some centimetres", 0.05, 0.3),
+            Option("about half a metre", low=0.3),
+        ),
+        Measure(WAY, "range", after=6.5, until=8.0),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "Between 6.5 s and 8 s the base drives at least 40 cm.",
+            Measure(WAY, "range", after=6.5, until=8.0),
+            "at least",
+            0.4,
+            fails_with=("controller=htmpc_wpt",),
+            because="it cannot leave for a place that it does not know of",
+        ),
+        Claim(
+            "In Part 2 its mean error is at most half of the ghost's.",
+            BACK,
+            "at most",
+            0.5,
+            fails_with=("controller=htmpc_wpt",),
+            because="then it is the ghost",
+        ),
+    ),
+    duration=16.0,
+    ghost=Ghost("waypoints, no preview", ("controller=htmpc_wpt",)),
+    controls=(CONTROLLER, HORIZON),
+    plots=PLOTS,
+)
+
+SHORT = Step(
+    title="A fifth of a second",
+    text=r"""
+    How far must one see? Now $N = 2$: the plan ends 0.2 s from now. The base still brakes with at
+    most 2.5 m/s², the arm's joints with 2 to 3 rad/s². From its top speed of 1.1 m/s the base needs
+    0.44 s to stop.
+    """,
+    do="From which N on is the hand within 1 mm? Count the seconds: what takes that long to stop?",
+    why=r"""
+    The hand is first in the list and is off by 3 cm all the same. On its way home the base races at
+    its top speed, and what the arm will have to do about it comes into sight when it can no longer be
+    done in time. A priority decides between plans; it cannot choose a plan that nobody looked far
+    enough to make.
+    """,
+    prediction=Choice(
+        "N = 2 instead of 10. The hand still ranks first. It is off by at most …",
+        (
+            Option("less than 1 mm, as before: it ranks first", high=1.5),
+            Option("some millimetres", 1.5, 10.0),
+            Option("centimetres", low=10.0),
+        ),
+        Measure(HAND),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The hand is off by more than 1 cm.",
+            Measure(HAND),
+            "at least",
+            10.0,
+            fails_with=("horizon=10",),
+            because="a second ahead is enough to stop in time",
+        ),
+    ),
+    set=("horizon=2",),
+    duration=16.0,
+    ghost=Ghost("N = 10", ("horizon=10",)),
+    controls=(HORIZON,),
+    plots=PLOTS,
+)
+
+NO_PLAN = Step(
+    title="Without any plan",
+    text=r"""
+    HTIDKC, the rival of the paper, is inverse kinematics with priorities: a wish for the velocity of
+    every point,
+
+    $$\dot x = \dot r + K (r - x)$$
+
+    one quadratic program per level, bounds included, fifty times a second. $K = 0.5$ 1/s for the
+    hand and $0.3$ 1/s for the base, the authors' values. It sees the present instant only. The ghost
+    plans a second ahead, but from waypoints: neither of the two knows of the jump.
+    """,
+    do="Compare the two speeds: who is the faster right after a jump, who shortly before the goal?",
+    why=r"""
+    Both are surprised at 8 s, and still it is far behind, 15 cm from home at the end where the ghost
+    has long arrived. A gain is one curve for all occasions: a velocity in proportion to the error,
+    limited so that the first jolt is bearable, is slow at the end. A plan uses the acceleration there
+    is, and brakes when it must. The paper, which tuned both to do equally well in Part 1, counts 42 %
+    less error in Part 2 for HTMPC.
+    """,
+    prediction=Value(
+        "Part 2, mean error of the base: that of HTIDKC is how many times the ghost's?",
+        BACK,
+        low=0.3,
+        high=30.0,
+        factor=1.5,
+    ),
+    claims=(
+        Claim(
+            "In Part 2 its mean error is at least twice the ghost's.",
+            BACK,
+            "at least",
+            2.0,
+            fails_with=("controller=htmpc",),
+            because="seeing the jump is better still",
+        ),
+        Claim(
+            "The hand is off by more than 3 mm.",
+            Measure(HAND),
+            "at least",
+            3.0,
+            fails_with=("controller=htmpc_wpt",),
+            because="whoever plans takes the hand's error back at every knot",
+        ),
+    ),
+    set=("controller=htidkc",),
+    duration=16.0,
+    ghost=Ghost("HTMPC from waypoints", ("controller=htmpc_wpt",)),
+    controls=(CONTROLLER,),
+    plots=PLOTS,
+)
+
+GAINS = Step(
+    title="Just turn the gain up",
+    text=r"""
+    If it is too slow, why not raise the gains? $K = 2$ 1/s for both. The ghost keeps the authors'
+    0.5 and 0.3.
+    """,
+    do="Is there a pair of gains that is good to both, hand and base? Try [5, 2].",
+    why=r"""
+    The base is quick now, and the hand pays with 2 cm although it ranks first. Near the stretched
+    arm a small motion of the hand needs large joint velocities; the base arrives there fast, the
+    joints meet their limits, and limits are above every task. A smaller gain would have been slow
+    enough. Each gain suits one part of the motion: the paper says that HTIDKC would need its
+    parameters scheduled, where one set of weights serves HTMPC in both parts.
+    """,
+    prediction=Choice(
+        "Gains four and seven times as high. The largest error of the hand, in the first task, …",
+        (
+            Option("shrinks: its gain is four times as high", high=0.9),
+            Option("stays about the same", 0.9, 1.5),
+            Option("grows severalfold", low=1.5),
+        ),
+        Measure(HAND, over_ghost=True),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "In Part 2 the base's mean error is at most half of the ghost's.",
+            BACK,
+            "at most",
+            0.5,
+            fails_with=("gains=[0.5,0.3]",),
+            because="then it is the ghost",
+        ),
+        Claim(
+            "The hand is off by more than 1 cm.",
+            Measure(HAND),
+            "at least",
+            10.0,
+            fails_with=("gains=[0.5,0.3]",),
+            because="a slow base meets the stretched arm gently",
+        ),
+    ),
+    set=("controller=htidkc", "gains=[2,2]"),
+    duration=16.0,
+    ghost=Ghost("gains 0.5 and 0.3", ("gains=[0.5,0.3]",)),
+    controls=(Control("gains", "Gains of hand and base, 1/s", choices=([0.5, 0.3], [1, 1], [2, 2], [5, 2])),),
+    plots=PLOTS,
+)
+
+LESSON = Lesson(
+    name="seeing-ahead",
+    card=card_of(__doc__),
+    scene="ridgeback-ur10-square",
+    steps=(EARLY, SHORT, NO_PLAN, GAINS),
+)
