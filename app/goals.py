@@ -16,6 +16,9 @@ from app.view.goal import Goal
 from lessons.events import MoveTarget
 from lessons.mobile.events import InsertTask
 
+_THERE = 5e-3
+"""m: a point this near has got there."""
+
 
 def point(values: Sequence[float] | np.ndarray) -> np.ndarray:
     """A point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
@@ -34,7 +37,8 @@ def free_name(wanted: str, taken: Sequence[str]) -> str:
 
 
 class Goals:
-    """A goal per position role that is not sent along a given trajectory from the start."""
+    """A goal per position role. One that is sent along a given trajectory from the start cannot be dragged:
+    it shows what is asked of its point now."""
 
     def __init__(
         self,
@@ -46,21 +50,21 @@ class Goals:
         status: Callable[[], Status | None],
         dragged: Callable[[], None],
     ) -> None:
-        """size: of the arrows, m; status: the newest one; dragged: called at every move."""
+        """size: of the arrows of a hand, m; status: the newest one; dragged: called at every move."""
         self._post, self._status, self._dragged = post, status, dragged
         self._roles = {task.name: task for task in ready.tasks if task.kind == "position"}
+        self._given = frozenset(name for name, task in self._roles.items() if task.raw is None)
         self._goals = {
             name: Goal(
                 scene,
                 name,
                 task.axes,
                 colours[task.level],
-                point(task.raw),
-                size,
-                lambda place, task=task: self._moved(task, place),
+                np.zeros(3) if task.raw is None else point(task.raw),
+                size if "z" in task.axes else 2 * size,
+                None if task.raw is None else lambda place, task=task: self._moved(task, place),
             )
             for name, task in self._roles.items()
-            if task.raw is not None
         }
         self._asked: dict[str, str] = {}
 
@@ -86,14 +90,19 @@ class Goals:
         rows = () if status.mission is None else status.mission.rows
         for name, goal in self._goals.items():
             row, target = open_row(rows, name), status.targets.get(name)
-            text = f"{name}: no task left, drag to add one" if row is None else row.name
-            if latest is not None and target is not None:
-                at = latest[fields[f"x/{name}"]]
+            text = f"{name}: done" if row is None else row.name
+            at, wanted = (
+                (np.full(3, np.nan), np.full(3, np.nan))
+                if latest is None
+                else (latest[fields[f"x/{name}"]], latest[fields[f"x_d/{name}"]])
+            )
+            if target is None and name in self._given and np.isfinite(wanted).all():
+                target = wanted
+            if target is not None and np.isfinite(at).all():
+                goal.reach_from(point(at))
                 away = float(np.linalg.norm(at - target))
-                if np.isfinite(away):
-                    goal.reach_from(point(at))
-                    if away > 5e-3:
-                        text += f": {quantity(away, 'm')} to go"
+                if away > _THERE:
+                    text += f": {quantity(away, 'm') if away < 1.0 else f'{away:.2f} m'} to go"
             goal.follow(None if target is None else point(target), text)
 
     @property

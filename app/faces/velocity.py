@@ -26,7 +26,6 @@ from app.view.target import Frames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Set
-from lessons.kinds import ALL_SCENES
 from lessons.mobile.settings import MobileSettings
 from robots.stretch import horizontal_reach
 
@@ -47,9 +46,7 @@ class VelocityFace:
         context = self._context
         ready, bindings, colours = context.ready, context.bindings, context.colours
         with tabs.add_tab("Start"):
-            self._begin = BeginPanel(
-                gui, ALL_SCENES[ready.choice.name], colours, bool(self._base), context.dark
-            )
+            self._begin = BeginPanel(gui, ready.choice.name, colours, bool(self._base), context.dark)
         with tabs.add_tab("Mission"):
             self._mission = MissionPanel(
                 gui,
@@ -77,7 +74,7 @@ class VelocityFace:
 
     def add_scene(self, scene: viser.SceneApi) -> None:
         context, ready = self._context, self._context.ready
-        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.6))
+        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
         self._frames = Frames(scene)
         self._obstacles = Obstacles(scene)
         self._people = People(scene)

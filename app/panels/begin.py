@@ -21,16 +21,16 @@ class BeginPanel:
     """Guidance that follows what the learner has already done. The callbacks are set by the face."""
 
     def __init__(
-        self, gui: viser.GuiApi, title: str, colours: dict[str, RGB], drives: bool, dark: bool
+        self, gui: viser.GuiApi, scene: str, colours: dict[str, RGB], drives: bool, dark: bool
     ) -> None:
-        """title: of the scene, one line; colours: per role; drives: whether there is a mobile base."""
+        """scene: its name; colours: per role; drives: whether there is a mobile base."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_swap: Callable[[], None] = lambda: None
         self.on_look: Callable[[], None] = lambda: None
         self._colours = colours
         self._dragged = False
-        self._drives = drives
-        self._guide = gui.add_html(_guide(_FIRST_MOBILE if drives else _FIRST_ARM, title))
+        self._next = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
+        self._guide = gui.add_html(_guide(_FIRST.get(scene, _WATCH if drives else _FIRST_ARM)))
         self._live = gui.add_html("")
         swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         look = gui.add_button("Look at the robot", hint="Turns the camera to where it is now")
@@ -58,7 +58,7 @@ class BeginPanel:
         """The first drag happened: go on to what comes next."""
         if not self._dragged:
             self._dragged = True
-            self._guide.content = _guide(_NEXT_MOBILE if self._drives else _NEXT_ARM)
+            self._guide.content = _guide(self._next)
 
     def update(self, now: Snapshot[MobileSettings]) -> None:
         lines = [self._line(now, level.name, level.tasks[0].unit) for level in now.settings.levels]
@@ -78,22 +78,37 @@ class BeginPanel:
         return text
 
 
-def _guide(text: tuple[str, str], above: str = "") -> str:
+def _guide(text: tuple[str, str]) -> str:
     head, rest = text
-    top = f"{esc(above)}<br>" if above else ""
-    return block(f'{top}<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
+    return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
 
 
-_FIRST_MOBILE = (
-    "Drag the two targets by their arrows.",
-    "The orange ball is for the robot's hand: <b>level 1</b>. The blue disc on the floor is for its base: "
-    "<b>level 2</b>. Drag the disc farther from the hand than the circle about the base is wide.",
+_FIRST = {
+    "ridgeback-ur10-drag": (
+        "Drag the two targets by their arrows.",
+        "The orange ball is for the robot's hand: <b>level 1</b>. The blue disc on the floor is for its base: "
+        "<b>level 2</b>. Drag the disc so far from the ball that the arm is too short for both.",
+    ),
+    "ridgeback-ur10-square": (
+        "Watch the base stop where the arm is stretched.",
+        "The hand has to stay (<b>level 1</b>); the base is sent out of reach for 8 s, then home (<b>level "
+        "2</b>). Reset and swap which comes first, or set N to 1 in <b>Control</b>.",
+    ),
+}
+_WATCH = (
+    "Watch the robot do the next task while it finishes this one.",
+    "The tab <b>Mission</b> lists the tasks; those in the window (▶ first, ▷ second) are the levels. Drag the "
+    "ball or the disc: the current task of the hand or the base goes elsewhere, at the next control step.",
 )
-_NEXT_MOBILE = (
+_NEXT_DRAG = (
     "Now swap which comes first.",
     "As long as the hand comes first, the base stops where the arm is stretched. Swap, and the base goes and "
-    "takes the hand along. The tab <b>Mission</b> has the tasks in their order; put δ and N to the test in "
-    "<b>Control</b>.",
+    "takes the hand along. Then put δ and N to the test in <b>Control</b>.",
+)
+_NEXT_MISSION = (
+    "Now change the mission.",
+    "Tasks can be moved, put earlier or later, removed and added in the tab <b>Mission</b>, and a hold that "
+    "waits for somebody is ended there by <b>Release</b>.",
 )
 _FIRST_ARM = (
     "Drag the target by its arrows.",

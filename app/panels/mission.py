@@ -19,6 +19,7 @@ from lessons.mobile.settings import MobileSettings
 
 _EARLIER, _LATER, _REMOVE = "▲ Earlier", "▼ Later", "Remove"
 _END, _NOTHING = "at the end", "–"
+_DONE_SHOWN = 3
 
 
 class MissionPanel:
@@ -141,7 +142,10 @@ def _waiting(rows: tuple[MissionRow, ...]) -> MissionRow | None:
 
 def _listed(rows: tuple[MissionRow, ...], colours: dict[str, RGB], done: bool) -> str:
     first = next((row for row in rows if row.state != "done"), None)
-    lines = "".join(_line(row, colours, first is row) for row in rows)
+    over = max(0, sum(row.state == "done" for row in rows) - _DONE_SHOWN)
+    lines = "".join(_line(row, colours, first is row) for row in rows[over:])
+    if over:
+        lines = f"<tr><td>✓</td><td colspan='3' style='opacity:0.55'>{over} more before</td></tr>{lines}"
     head = (
         badge("MISSION DONE", GOOD) if done else f"{sum(r.state == 'done' for r in rows)} of {len(rows)} done"
     )
@@ -170,7 +174,7 @@ def _when(row: MissionRow) -> str:
     if row.done_at is not None:
         return f"{row.done_at:.1f} s"
     if row.there_s is not None:
-        return "waits for release" if row.hold is None else f"holds {row.there_s:.1f} / {row.hold:g} s"
+        return "there, until released" if row.hold is None else f"holds {row.there_s:.1f} / {row.hold:g} s"
     if row.hold is None:
         return "until released"
     return f"hold {row.hold:g} s" if row.hold else ""

@@ -17,7 +17,7 @@ _ABOVE = np.array([0.0, 0.0, 0.015])
 """m, of predicted paths above the floor, so that it does not hide them."""
 _ARM = 0.55
 """m from a person's middle to the hand that takes the ball."""
-_AROUND = 2.5
+_AROUND = 1.9
 """m about a mobile base that the camera should show at least."""
 
 

@@ -1,9 +1,10 @@
-"""A goal that a hand can drag: of the robot's hand in space, or of its base on the floor."""
+"""A goal, of the robot's hand in space or of its base on the floor, that may be one a hand can drag."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from typing import Any
 
 import numpy as np
 import viser
@@ -18,8 +19,8 @@ _LIFT = 0.01  # m above the floor
 
 
 class Goal:
-    """Arrows along the world's axes; a ball, or a disc for what stays on the floor; a line from the point it
-    is for; and a label.
+    """A ball, or a disc for what stays on the floor; a line from the point it is for; a label; and, if it
+    can be dragged, arrows along the world's axes.
 
     The hand wins: for a moment after it moved the goal, `follow` leaves it where it is.
     """
@@ -32,23 +33,20 @@ class Goal:
         colour: RGB,
         start: np.ndarray,
         size: float,
-        moved: Callable[[np.ndarray], None],
+        moved: Callable[[np.ndarray], None] | None,
     ) -> None:
-        """start (3,): m; size: of the arrows, m; moved: called with the goal (3,), m, after each move."""
+        """start (3,): m; size: of the arrows, m; moved: called with the goal (3,), m, after each move; None:
+        it cannot be dragged."""
         floor = "z" not in axes
         self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
         self._touched = -float("inf")
         node = f"/goal/{role}"
-        x, y, z = (axis in axes for axis in "xyz")
-        self._gizmo = scene.add_transform_controls(
-            node,
-            scale=size,
-            position=start + self._lift,
-            active_axes=(x, y, z),
-            disable_rotations=True,
-            depth_test=False,
-            line_width=3.0,
-        )
+        position = start + self._lift
+        if moved is None:
+            self._node = scene.add_frame(node, show_axes=False, position=position)
+        else:
+            self._node = _arrows(scene, node, axes, position, size)
+            self._node.on_update(self._listener(moved))
         if floor:
             scene.add_cylinder(
                 f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6, cast_shadow=False
@@ -60,15 +58,17 @@ class Goal:
             f"/gap/{role}", np.zeros((1, 2, 3), np.float32), colour, thickness=0.008, visible=False
         )
 
-        @self._gizmo.on_update
-        async def _(_: viser.TransformControlsEvent) -> None:
+    def _listener(self, moved: Callable[[np.ndarray], None]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        async def hear(_: viser.TransformControlsEvent) -> None:
             self._touched = time.monotonic()
             moved(self.place)
+
+        return hear
 
     @property
     def place(self) -> np.ndarray:
         """(3,) m."""
-        return np.array(self._gizmo.position, float) - self._lift
+        return np.array(self._node.position, float) - self._lift
 
     def follow(self, goal: np.ndarray | None, text: str) -> None:
         """goal (3,): where the session has it, m; None: it has none, and the hand's stays."""
@@ -77,7 +77,7 @@ class Goal:
         if goal is None or time.monotonic() - self._touched < HOLD:
             return
         if not np.allclose(goal, self.place, rtol=0.0, atol=1e-4):
-            self._gizmo.position = goal + self._lift
+            self._node.position = goal + self._lift
 
     def reach_from(self, point: np.ndarray) -> None:
         """Draws the line from where the point (3,) is, m, to the goal."""
@@ -87,3 +87,18 @@ class Goal:
             self._gap.visible = shown
         if shown and not np.allclose(ends, self._gap.points, rtol=0.0, atol=1e-3):
             self._gap.points = ends
+
+
+def _arrows(
+    scene: viser.SceneApi, node: str, axes: str, position: np.ndarray, size: float
+) -> viser.TransformControlsHandle:
+    x, y, z = (axis in axes for axis in "xyz")
+    return scene.add_transform_controls(
+        node,
+        scale=size,
+        position=position,
+        active_axes=(x, y, z),
+        disable_rotations=True,
+        depth_test=False,
+        line_width=3.0,
+    )

@@ -84,7 +84,7 @@ def aim(camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray)
         low, high = points.min(axis=0), points.max(axis=0)
         at = np.array([*(0.5 * (low + high))[:2], 0.4])
         wide = 0.5 * float(np.linalg.norm((high - low)[:2])) + 0.5 * reach
-        eye = at + 1.15 * wide * np.array([0.8, -0.95, 0.85])
+        eye = at + 1.15 * wide * np.array([0.7, -0.95, 0.9])
     if phone:
         eye = at + 1.7 * (eye - at)
         down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])

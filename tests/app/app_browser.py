@@ -148,13 +148,12 @@ def target_position(page: Page) -> tuple[float, float, float]:
     return float(found[0]), float(found[1]), float(found[2])
 
 
-def drag_target(page: Page, axis: int, along: float) -> None:
-    """Pulls the gizmo's arrow of a world axis by so many metres."""
-    arm = 0.18
+def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm: float = 0.18) -> None:
+    """Pulls the gizmo's arrow of a world axis by so many metres. arm: m, where the arrow is taken hold of."""
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
-    start = page.evaluate(_PROJECT, ["/target", [arm * c for c in direction]])
-    end = page.evaluate(_PROJECT, ["/target", [(arm + along) * c for c in direction]])
+    start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
+    end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
     _drag(page, start, end)
 
 
