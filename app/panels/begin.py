@@ -86,8 +86,8 @@ def _guide(text: tuple[str, str]) -> str:
 _FIRST = {
     "ridgeback-ur10-drag": (
         "Drag the two targets by their arrows.",
-        "The orange ball is for the robot's hand: <b>level 1</b>. The blue disc on the floor is for its base: "
-        "<b>level 2</b>. Drag the disc so far from the ball that the arm is too short for both.",
+        "The orange ball is for the robot's hand: <b>level 1</b>. The blue disc on the floor is for its "
+        "base: <b>level 2</b>. Drag the disc so far from the ball that the arm is too short for both.",
     ),
     "ridgeback-ur10-square": (
         "Watch the base stop where the arm is stretched.",
@@ -97,8 +97,8 @@ _FIRST = {
 }
 _WATCH = (
     "Watch the robot do the next task while it finishes this one.",
-    "The tab <b>Mission</b> lists the tasks; those in the window (▶ first, ▷ second) are the levels. Drag the "
-    "ball or the disc: the current task of the hand or the base goes elsewhere, at the next control step.",
+    "The tab <b>Mission</b> lists the tasks; those in the window (▶ first, ▷ second) are the levels. Drag "
+    "the ball or the disc: the current task of the hand or the base goes elsewhere, at the next control step.",
 )
 _NEXT_DRAG = (
     "Now swap which comes first.",

@@ -55,7 +55,9 @@ def load_scene(
         InputError: unknown scene, a URDF where none fits or none where one is needed, or a bad one.
     """
     if name in MOBILE_SCENES:
-        raise InputError(f"scene '{name}' is driven by velocities and runs headless: himpc-lab run {name}")
+        raise InputError(
+            f"scene '{name}' is driven by velocities, and this takes torques: choose e.g. iiwa14-hold"
+        )
     if name not in SCENES:
         raise unknown_name("scene", name, (*SCENES, *MOBILE_SCENES))
     if name == "hold":

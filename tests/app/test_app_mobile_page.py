@@ -1,0 +1,147 @@
+"""The mobile manipulator's scenes in a real browser: what the fourth chapter of the page promises."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from app_browser import (
+    drag_target,
+    eventually,
+    is_drawn,
+    open_page,
+    press,
+    row,
+    set_number,
+    tab,
+    wait_for_scene,
+)
+from playwright.sync_api import Browser, Page, expect
+
+from app.learner import Learner
+from app.messages import MissionView, SceneChoice
+from app.server import PageServer
+from lessons.mobile.settings import MobileSettings
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("ridgeback-ur10-drag"), port=0, max_sessions=1, grace=2.0)
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
+    opened = open_page(browser, server.url, width=1400, height=700)
+    yield opened
+    opened.context.close()
+
+
+@pytest.fixture
+def learner(server: PageServer, page: Page) -> Learner:
+    """The simulation behind `page`, which was reset first."""
+    assert eventually(page, lambda: bool(server.sessions.learners))
+    found = server.sessions.learners[0]
+    assert eventually(page, lambda: found.status is not None and found.status.ticks > 0)
+    return found
+
+
+def mission(learner: Learner) -> MissionView:
+    assert learner.status is not None and learner.status.mission is not None
+    return learner.status.mission
+
+
+def latest(learner: Learner, field: str) -> np.ndarray:
+    """A field of the newest row of telemetry."""
+    found = learner.read(lambda _, history: history.latest[history.layout.fields[field]].copy())
+    assert found is not None
+    return found
+
+
+def error(learner: Learner, role: str) -> float:
+    return float(np.linalg.norm(latest(learner, f"error/{role}")))
+
+
+def at_rest(learner: Learner) -> bool:
+    return bool(np.abs(latest(learner, "v")).max() < 0.02)
+
+
+def load(page: Page, learner: Learner, scene: str) -> None:
+    """By the menu of the Robot tab."""
+    tab(page, "Robot")
+    row(page, "Scene").locator("input").click()
+    page.get_by_role("option", name=scene, exact=True).click()
+    press(page, "Load scene")
+    assert eventually(page, lambda: learner.ready is not None and learner.ready.choice.name == scene)
+    assert eventually(page, lambda: learner.status is not None and learner.status.mission is not None)
+    wait_for_scene(page, "/goal/base")
+
+
+def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(page: Page, learner: Learner) -> None:
+    expect(page.get_by_text("Drag the two targets by their arrows")).to_be_visible()
+    for _ in range(2):
+        drag_target(page, axis=1, along=-1.0, node="/goal/base", arm=0.5)
+    target = learner.status.targets["base"] if learner.status is not None else np.zeros(2)
+    assert np.linalg.norm(target - latest(learner, "x/ee")[:2]) > 2.2
+    worst = 0.0
+
+    def stopped() -> bool:
+        nonlocal worst
+        worst = max(worst, error(learner, "ee"))
+        return bool(latest(learner, "x/base")[1] < -0.3) and at_rest(learner)
+
+    assert eventually(page, stopped)
+    assert worst < 0.01 and error(learner, "base") > 0.3
+    expect(page.get_by_text("It rests: going on would disturb level 1")).to_be_visible()
+    expect(page.get_by_text("Now swap which comes first")).to_be_visible()
+    press(page, "Swap which comes first")
+    assert eventually(page, lambda: error(learner, "base") < 0.01)
+    assert [each.name for each in mission(learner).rows] == ["base", "ee"]
+    assert error(learner, "ee") > 0.2
+
+
+def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(page: Page, learner: Learner) -> None:
+    load(page, learner, "ridgeback-ur10-cluttered")
+    assert eventually(page, lambda: is_drawn(page, "/obstacle/1"))
+    set_number(page, "Speed", 0.2)
+    before = np.array(mission(learner).rows[1].goal)
+    tab(page, "Mission")
+    expect(page.get_by_text("0 of 2 done")).to_be_visible()
+    drag_target(page, axis=1, along=-0.5, node="/goal/base", arm=0.5)
+    assert eventually(page, lambda: not np.allclose(mission(learner).rows[1].goal, before, atol=0.1))
+    moved = np.array(mission(learner).rows[1].goal)
+    assert moved[1] < before[1] - 0.2 and not mission(learner).done
+    set_number(page, "Speed", 8)
+    expect(page.get_by_text("MISSION DONE").first).to_be_visible()
+    assert np.linalg.norm(latest(learner, "x/base") - moved) < 0.05
+    assert latest(learner, "clearance")[0] > 0.0
+
+
+def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Learner) -> None:
+    load(page, learner, "ridgeback-ur10-handover")
+    assert eventually(page, lambda: is_drawn(page, "/person/1"))
+    tab(page, "Control")
+    set_number(page, "δ [mm]", 25)
+    set_number(page, "N", 6)
+    set_number(page, "R inputs, arm", 0.05)
+
+    def adopted() -> bool:
+        settings = learner.settings
+        return (
+            isinstance(settings, MobileSettings)
+            and (settings.htmpc.delta_m, settings.htmpc.horizon) == (0.025, 6)
+            and settings.htmpc.input_effort == (0.1, 0.1, 0.1, *(0.05,) * 6)
+        )
+
+    assert eventually(page, adopted)
+    set_number(page, "Speed", 5)
+    tab(page, "Mission")
+    page.get_by_role("button", name="Release ee 1").click()
+    assert eventually(page, lambda: mission(learner).rows[1].state == "done")
+    assert eventually(page, lambda: mission(learner).people[0].balls == 1)
+    page.get_by_text("Add a task").click()
+    press(page, "Add")
+    assert eventually(page, lambda: mission(learner).rows[-1].name == "ee added")
+    assert learner.failure is None

@@ -1,0 +1,182 @@
+"""A velocity-level scene behind a page, driven by hand: no process, no clock."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.body import Body
+from app.goals import free_name, open_row
+from app.messages import MissionView, Play, Post, Ready, ResetAll, SceneChoice, Status, Step
+from app.pacing import BACKLOG, Pacer
+from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.mobile.events import InsertTask, Release, RemoveTask
+
+
+def opened(scene: str) -> Iterator[Body]:
+    made = Body(SceneChoice(scene))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def body() -> Iterator[Body]:
+    yield from opened("ridgeback-ur10-drag")
+
+
+@pytest.fixture
+def handover() -> Iterator[Body]:
+    yield from opened("ridgeback-ur10-handover")
+
+
+def mission(status: Status) -> MissionView:
+    assert status.mission is not None
+    return status.mission
+
+
+def error(body: Body, role: str) -> float:
+    row = body.block.since(0)[1][-1]
+    return float(np.linalg.norm(row[body.session.layout.fields[f"error/{role}"]]))
+
+
+def test_reports_survive_the_pipe(body: Body) -> None:
+    ready: Ready = pickle.loads(pickle.dumps(body.ready()))
+    assert [(task.name, task.kind, task.axes) for task in ready.tasks] == [
+        ("ee", "position", "xyz"),
+        ("base", "position", "xy"),
+    ]
+    assert ready.room.shape[1] == 3 and np.ptp(ready.room[:, 0]) > 2.0
+    body.tick(2)
+    status: Status = pickle.loads(pickle.dumps(body.status()))
+    assert status.path.shape == (11, 3) and status.gauge is None
+    assert {role: path.shape for role, path in mission(status).paths.items()} == {
+        "ee": (11, 3),
+        "base": (11, 3),
+    }
+    assert np.allclose(mission(status).paths["base"][:, 2], 0.015)
+    assert [row.state for row in mission(status).rows] == ["active", "active"]
+
+
+def test_the_robot_moves_between_two_control_steps(body: Body) -> None:
+    """Ten small motions and then one row, not one jump of a tenth of a second."""
+    body.handle(Post(MoveTarget("base", (0.5, 0.5))))
+    body.tick(5)
+    x, rows = [], body.block.count
+    for _ in range(10):
+        assert body.run.step_s == pytest.approx(0.01)
+        ended = body.advance()
+        body.write_poses()
+        x.append(body.block.poses()[2, 0])
+        assert body.block.count == rows + ended
+    assert body.block.count == rows + 1
+    steps = np.diff(x)
+    assert (steps > 0).all() and steps.max() < 0.015
+
+
+def test_a_pause_stands_between_two_control_steps(body: Body) -> None:
+    """The step that was begun is carried out; then edits and a reset show though no time passes."""
+    body.handle(Post(MoveTarget("base", (0.5, 0.5))))
+    for _ in range(14):
+        body.advance()
+    body.handle(Play(False))
+    assert not body.run.between and body.ticks == 2 and body.session.t == pytest.approx(0.2)
+    for event in (
+        Set("horizon", 4),
+        MoveLevel("base", 0),
+        MoveTarget("ee", (1.0, 0.5, 0.8)),
+        Set("horizn", 1),
+    ):
+        body.handle(Post(event))
+    body.settle()
+    status = body.status()
+    assert status.t == pytest.approx(0.2) and status.settings is not None and status.settings.horizon == 4
+    assert [row.name for row in mission(status).rows] == ["base", "ee"]
+    assert np.allclose(status.targets["ee"], (1.0, 0.5, 0.8))
+    assert len(status.notices) == 1 and "horizon" in status.notices[0]
+    body.handle(Step())
+    assert body.take_steps() == 1
+    body.tick()
+    assert body.session.t == pytest.approx(0.3)
+    body.handle(Post(Reset()))
+    body.settle()
+    assert body.session.t == 0.0 and body.take_steps() == 1
+    body.handle(ResetAll())
+    assert body.running and body.session.settings.horizon == 10
+
+
+def test_a_step_while_running_pauses_first(body: Body) -> None:
+    for _ in range(3):
+        body.advance()
+    body.handle(Step())
+    assert not body.running and body.ticks == 1 and body.take_steps() == 1
+
+
+def test_the_base_stops_where_the_arm_is_stretched_until_it_comes_first(body: Body) -> None:
+    body.handle(Post(MoveTarget("base", (-1.5, 0.0))))
+    worst = 0.0
+    for _ in range(60):
+        body.tick()
+        worst = max(worst, error(body, "ee"))
+    assert worst < 0.01 and error(body, "base") > 0.5
+    body.handle(Post(MoveLevel("base", 0)))
+    body.tick(40)
+    assert error(body, "base") < 0.01
+    assert body.status().notices == ()
+
+
+def test_the_list_follows_the_mission(handover: Body) -> None:
+    """Events change it, people move with their tasks and keep what they were given."""
+    before = mission(handover.status())
+    assert [row.name for row in before.rows] == ["base 1", "ee 1", "base 2", "ee 2"]
+    assert [person.balls for person in before.people] == [0, 0]
+    assert np.allclose(before.people[0].hand, (0.0, 2.0, 0.8)) and before.people[0].place[1] > 2.3
+    handover.handle(Post(InsertTask("detour", "ee", (1.0, 1.0, 1.0), before="ee 2", hold=None)))
+    handover.handle(Post(RemoveTask("base 2")))
+    handover.handle(Post(MoveTarget("ee 2", (-2.0, -0.5, 0.9))))
+    handover.handle(Post(Release("ee 1")))
+    handover.tick(90)
+    after = mission(handover.status())
+    assert [row.name for row in after.rows] == ["base 1", "ee 1", "detour", "ee 2"]
+    assert [row.state for row in after.rows] == ["done", "done", "active", "active"]
+    assert after.rows[1].done_at is not None and after.rows[2].hold is None
+    assert after.rows[2].there_s is not None and after.rows[2].there_s > 0.0
+    assert [person.balls for person in after.people] == [1, 0]
+    assert np.allclose(after.people[1].hand, (-2.0, -0.5, 0.9))
+    assert not after.done
+
+
+def test_a_role_without_an_open_task_has_no_target(handover: Body) -> None:
+    for name in ("base 1", "base 2"):
+        handover.handle(Post(RemoveTask(name)))
+    handover.tick()
+    status = handover.status()
+    assert set(status.targets) == {"ee"}
+    assert open_row(mission(status).rows, "base") is None
+    first = open_row(mission(status).rows, "ee")
+    assert first is not None and first.name == "ee 1"
+
+
+def test_what_a_kind_does_not_know_is_a_sentence(body: Body) -> None:
+    """Pushes at velocity level, missions at torque level."""
+    body.handle(Post(Push("base", (10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.1)))
+    body.tick()
+    assert len(body.status().notices) == 1
+    for torque in opened("planar3-hold"):
+        torque.handle(Post(Release("ee 1")))
+        torque.tick()
+        assert "no mission" in torque.status().notices[0]
+
+
+def test_new_names_are_free() -> None:
+    assert free_name("ee added", ["ee"]) == "ee added"
+    assert free_name("ee added", ["ee added", "ee added 2"]) == "ee added 3"
+
+
+def test_a_fast_simulation_may_owe_as_much_real_time_as_a_slow_one() -> None:
+    pacer = Pacer(0.0)
+    pacer.speed = 10.0
+    assert pacer.due(0.05, 0.01) == 50 and not pacer.capped(0.05)
+    assert pacer.due(5.0, 0.01) == round(10.0 * BACKLOG / 0.01) and pacer.capped(5.0)

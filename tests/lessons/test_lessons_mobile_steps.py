@@ -1,0 +1,160 @@
+"""A velocity-level session command by command, and what its telemetry adds for the page."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from lessons.events import MoveLevel, MoveTarget, Reset, Set
+from lessons.kinds import find_scene, prepared
+from lessons.mobile.events import MobileEvent
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.session import MobileSession
+from lessons.mobile.telemetry import AT_ACCELERATION, AT_VELOCITY
+from robots.stretch import horizontal_reach
+
+OUT_OF_REACH = MoveTarget("base", (-1.5, 0.0))
+EVENTS: dict[int, MobileEvent] = {
+    1: OUT_OF_REACH,
+    5: Set("horizon", 6),
+    9: MoveLevel("base", 0),
+    14: Set("rate_hz", 20.0),
+    20: Reset(),
+}
+
+
+def session(name: str, *assignments: str) -> MobileSession:
+    scene = prepared(find_scene(name), None, assignments)
+    assert isinstance(scene, MobileScene)
+    return MobileSession(scene, seed=3)
+
+
+def timeless(made: MobileSession, row: np.ndarray) -> np.ndarray:
+    """A row without what a clock measured."""
+    kept = row.copy()
+    for name, where in made.layout.fields.items():
+        if "_us" in name:
+            kept[where] = 0.0
+    return kept
+
+
+@pytest.mark.parametrize("mode", ["ideal", "servo"])
+def test_command_by_command_is_the_same_run_to_the_last_bit(mode: str) -> None:
+    """However often the page looks in between, and though events come in the middle of a period: they take
+    effect at the next control step."""
+    how = (f"plant.mode={mode}", "plant.position_noise=0.001", "plant.lag_ms=30")
+    whole, parts = session("ridgeback-ur10-drag", *how), session("ridgeback-ur10-drag", *how)
+    for k in range(25):
+        if k in EVENTS:
+            whole.post(EVENTS[k])
+        expected = timeless(whole, whole.tick())
+        row, steps = None, 0
+        while row is None:
+            row = parts.advance()
+            steps += 1
+            assert parts.between == (row is None)
+            parts.predicted_path("base")
+            parts.binding()
+            if steps == 3 and k + 1 in EVENTS:
+                parts.post(EVENTS[k + 1])
+        assert steps == (5 if k >= 14 else 10)
+        assert np.array_equal(timeless(parts, row), expected, equal_nan=True)
+        assert np.array_equal(parts.plant.q, whole.plant.q) and parts.t == whole.t
+        assert parts.settings == whole.settings
+
+
+def test_every_step_says_how_long_it_is() -> None:
+    """Also the first one after the rate was changed."""
+    made = session("ridgeback-ur10-drag")
+    for rate in (10.0, 50.0, 12.0):
+        made.post(Set("rate_hz", rate))
+        made.drain()
+        steps = [made.step_s]
+        t = made.plant.t
+        while made.advance() is None:
+            steps.append(made.step_s)
+        assert sum(steps) == pytest.approx(1 / rate, abs=1e-12)
+        assert made.plant.t - t == pytest.approx(1 / rate, abs=1e-9)
+
+
+def test_a_reset_between_two_commands_drops_the_rest_of_the_period() -> None:
+    made = session("ridgeback-ur10-drag")
+    first = timeless(made, made.tick())
+    made.post(OUT_OF_REACH)
+    for _ in range(14):
+        made.advance()
+    assert made.between
+    made.reset()
+    assert not made.between and made.t == 0.0
+    assert np.array_equal(timeless(made, made.tick()), first, equal_nan=True)
+
+
+# ---------------------------------------------------------------- telemetry
+
+
+def test_the_bound_of_the_first_level_holds_and_the_last_level_has_none() -> None:
+    made = session("ridgeback-ur10-drag", "delta_m=0.02")
+    fields = made.layout.fields
+    made.post(OUT_OF_REACH)
+    rows = np.array([made.tick().copy() for _ in range(40)])
+    plan = made.plan
+    assert plan is not None
+    best = plan.levels[0].best[0]
+    bound, error = rows[:, fields["bound/ee"]][:, 0], np.linalg.norm(rows[:, fields["error/ee"]], axis=1)
+    assert bound[-1] == np.linalg.norm(np.abs(best) + 0.02)
+    assert (error[1:] <= bound[:-1]).all()
+    assert np.isnan(rows[:, fields["bound/base"]]).all()
+    made.post(Set("lexicographic", "cost"))
+    assert np.isnan(made.tick()[fields["bound/ee"]]).all()
+
+
+def test_joints_at_their_bounds_are_marked() -> None:
+    """The base drives as fast as it may, and rests in the end; no other mark than at the bound."""
+    made = session("ridgeback-ur10-drag")
+    fields = made.layout.fields
+    made.post(MoveLevel("base", 0))
+    made.post(MoveTarget("base", (-3.0, 0.0)))
+    rows = np.array([made.tick().copy() for _ in range(70)])
+    marks = rows[:, fields["at_bound"]].astype(int)
+    speed = np.abs(rows[:, fields["tau"]]) / made.robot.v_limit
+    push = rows[:, fields["acceleration"]] / made.bounds.a
+    assert (marks[speed < 0.99] & AT_VELOCITY == 0).all() and (marks[speed > 0.9999] & AT_VELOCITY > 0).all()
+    assert (marks[push < 0.99] & AT_ACCELERATION == 0).all() and (
+        marks[push > 0.9999] & AT_ACCELERATION > 0
+    ).all()
+    assert np.count_nonzero(marks[:, 0] & AT_VELOCITY) > 10 and not marks[-1].any()
+
+
+def test_manipulability_is_the_arms_and_falls_when_it_is_stretched() -> None:
+    """Against J by differences, the base's joints left out."""
+    made = session("ridgeback-ur10-drag")
+    robot, data = made.robot, made.robot.model.createData()
+
+    def tip(q: np.ndarray) -> np.ndarray:
+        pin.framesForwardKinematics(robot.model, data, q)
+        return data.oMf[robot.frame_id(robot.tip)].translation.copy()
+
+    row = made.tick()
+    q = row[made.layout.fields["q"]].copy()
+    h = 1e-6 * np.eye(robot.n)
+    J = np.array([(tip(q + h[k]) - tip(q - h[k])) / 2e-6 for k in range(3, robot.n)]).T
+    at_home = float(row[made.layout.fields["manipulability"]][0])
+    assert at_home == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-5)
+    made.post(OUT_OF_REACH)
+    for _ in range(60):
+        row = made.tick()
+    assert float(row[made.layout.fields["manipulability"]][0]) < 0.5 * at_home
+
+
+def test_the_reach_circle_is_as_wide_as_the_arm_is_long() -> None:
+    """1.86 m from the base's axis; the base stops where the hand is about that far away."""
+    made = session("ridgeback-ur10-drag")
+    reach = horizontal_reach(made.robot, 3)
+    assert reach == pytest.approx(1.86, abs=0.01)
+    made.post(OUT_OF_REACH)
+    for _ in range(80):
+        row = made.tick()
+    fields = made.layout.fields
+    away = np.linalg.norm(row[fields["x/ee"]][:2] - row[fields["x/base"]])
+    assert 0.95 * reach < away <= reach + 1e-3
