@@ -1,0 +1,295 @@
+"""A user who tries everything in no order: the page must survive, and the robot must stay inside its bounds.
+
+    python tests/app/monkey.py --minutes 10 --seed 0
+
+Prints what was done as JSON; the exit code is 1 if anything broke.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from app_browser import CHROMIUM_ARGS, find_chromium, load, open_page, tab
+from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
+
+from app.block import Block
+from app.history import History
+from app.learner import Learner
+from app.messages import SceneChoice
+from app.server import PageServer
+
+STRICT = ("himpc", "hiqp", "nhimpc")
+"""Controllers that keep priorities to rounding."""
+LEAK = 1e-6
+"""m/s² or rad/s²."""
+BOUND = 1e-9
+"""N·m beyond a torque bound that is still rounding."""
+ANSWER = 60.0
+"""s: a page that shows nothing new for so long, while its robot should move, is dead."""
+_PATIENCE = 1_500
+"""ms for an element to take a click; what is covered or gone by then is not clicked."""
+_HOTKEYS = ("Space", "1", "2", "3", "?", "Escape", "ArrowLeft", "ArrowRight", "n", "b", "r", "s", "d", "l")
+_PANELS = ("Start", "Tasks", "Control", "Plant", "Robot", "Help", "Errors", "Joints", "Who binds")
+
+
+@dataclass
+class Findings:
+    """What a random walk did and what it found."""
+
+    seed: int
+    actions: Counter[str] = field(default_factory=Counter)
+    rows: int = 0
+    scenes: set[str] = field(default_factory=set)
+    worst_leak: float = 0.0
+    faults: list[str] = field(default_factory=list)
+
+    def blame(self, sentence: str) -> None:
+        if sentence not in self.faults:
+            self.faults.append(sentence)
+
+    def as_data(self) -> dict[str, Any]:
+        return {
+            "seed": self.seed,
+            "actions": dict(sorted(self.actions.items())),
+            "rows": self.rows,
+            "scenes": sorted(self.scenes),
+            "worst_leak": self.worst_leak,
+            "faults": self.faults,
+        }
+
+
+class Monkey:
+    """One browser tab, one learner, one stream of random numbers."""
+
+    def __init__(self, page: Page, server: PageServer, seed: int, complaints: Callable[[], str]) -> None:
+        """complaints: everything that was written to standard error so far."""
+        self.page, self.server = page, server
+        self.found = Findings(seed)
+        self._random = random.Random(seed)
+        self._complaints = complaints
+        self._seen = 0
+        self._block = ""
+        self._moved = (time.monotonic(), -1)
+        page.on("pageerror", lambda error: self.found.blame(f"the browser: {error}"))
+        page.on("dialog", lambda dialog: dialog.dismiss())
+
+    @property
+    def learner(self) -> Learner:
+        return self.server.sessions.learners[0]
+
+    def act(self) -> None:
+        """One thing a user may do."""
+        actions: list[tuple[Callable[[], None], float]] = [
+            (self._click, 6.0),
+            (self._tab, 5.0),
+            (self._type, 6.0),
+            (self._toggle, 3.0),
+            (self._choose, 2.0),
+            (self._key, 3.0),
+            (self._drag, 4.0),
+            (self._wait, 3.0),
+            (self._reload, 0.1),
+        ]
+        chosen = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])[0]
+        # An element may vanish, or lie below another one, between the look and the click.
+        with suppress(Error):
+            chosen()
+            self.found.actions[chosen.__name__.strip("_")] += 1
+            if os.environ.get("MONKEY_DEBUG"):
+                st = self.learner.status
+                print(chosen.__name__, None if st is None else (st.t, st.ticks, st.running, st.speed), flush=True)
+
+    # ---------------------------------------------------------------- hands
+
+    def _one(self, selector: str) -> Locator | None:
+        elements = self.page.locator(selector)
+        count = elements.count()
+        return elements.nth(self._random.randrange(count)) if count else None
+
+    def _click(self) -> None:
+        button = self._one("button:visible:enabled:not([role=tab])")
+        if button is not None:
+            button.click(timeout=_PATIENCE)
+
+    def _tab(self) -> None:
+        if self._random.random() < 0.5:
+            tab(self.page, self._random.choice(_PANELS))
+        elif (found := self._one("button[role=tab]:visible")) is not None:
+            found.click(timeout=_PATIENCE)
+
+    def _type(self) -> None:
+        box = self._one("input[type=text]:visible:enabled, input[inputmode]:visible:enabled")
+        if box is None:
+            return
+        exponent = self._random.uniform(-4, 4)
+        texts = (f"{10**exponent:.4g}", f"{-(10**exponent):.4g}", "0", "1e9", "nan", "-", "word", "[1, 2]")
+        box.fill(self._random.choices(texts, (20, 4, 2, 1, 1, 1, 1, 1))[0], timeout=_PATIENCE)
+        box.press("Enter", timeout=_PATIENCE)
+
+    def _toggle(self) -> None:
+        box = self._one("input[type=checkbox]:visible:enabled")
+        if box is not None:
+            box.click(timeout=_PATIENCE)
+
+    def _choose(self) -> None:
+        menu = self._one("input[aria-haspopup=listbox]:visible:enabled")
+        if menu is None:
+            return
+        menu.click(timeout=_PATIENCE)
+        self.page.wait_for_timeout(200)
+        option = self._one("[role=option]:visible")
+        if option is not None:
+            option.click(timeout=_PATIENCE)
+
+    def _key(self) -> None:
+        self.page.keyboard.press(self._random.choice(_HOTKEYS))
+
+    def _drag(self) -> None:
+        size = self.page.viewport_size or {"width": 1000, "height": 400}
+        place = [(self._random.uniform(0.3, 0.7) * size["width"], self._random.random() * size["height"])]
+        for _ in range(4):
+            x, y = place[-1]
+            place.append((x + self._random.gauss(0, 80), y + self._random.gauss(0, 80)))
+        self.page.mouse.move(*place[0])
+        self.page.mouse.down()
+        for point in place[1:]:
+            self.page.mouse.move(*point)
+        self.page.mouse.up()
+
+    def _wait(self) -> None:
+        self.page.wait_for_timeout(self._random.uniform(50, 1500))
+
+    def _reload(self) -> None:
+        load(self.page, self.server.url)
+
+    # ---------------------------------------------------------------- eyes
+
+    def look(self) -> None:
+        """Judges everything that happened since the last look."""
+        if "Traceback" in (said := self._complaints()):
+            self.found.blame("on the terminal: " + said[said.index("Traceback") :][-1500:])
+        learner = self.learner
+        if learner.failure is not None:
+            self.found.blame(f"the simulation: {learner.failure}")
+        if learner.ready is not None:
+            self.found.scenes.add(learner.ready.choice.name)
+        learner.read(self._judge)
+        self._is_alive(learner)
+
+    def _judge(self, block: Block, history: History) -> None:
+        if block.name != self._block:
+            self._block, self._seen = block.name, 0
+        start, rows = block.since(self._seen)
+        self._seen = start + len(rows)
+        self.found.rows += len(rows)
+        if not len(rows):
+            return
+        fields = history.layout.fields
+        for name in ("q", "v", "tau"):
+            if not np.isfinite(rows[:, fields[name]]).all():
+                self.found.blame(f"{name} is not a number in {self._where()}")
+        if "tau_lower" not in fields:
+            return
+        tau = rows[:, fields["tau"]]
+        beyond = np.fmax(rows[:, fields["tau_lower"]] - tau, tau - rows[:, fields["tau_upper"]])
+        if float(np.nanmax(beyond, initial=0.0)) > BOUND:
+            self.found.blame(f"torque {np.nanmax(beyond):.3g} N·m beyond its bound in {self._where()}")
+        settings = self.learner.settings
+        if settings is not None and settings.controller in STRICT:
+            leak = float(np.nanmax(rows[:, fields["priority_leak"]], initial=0.0))
+            self.found.worst_leak = max(self.found.worst_leak, leak)
+            if leak > LEAK:
+                self.found.blame(f"leak {leak:.3g} in {self._where()}")
+
+    def _where(self) -> str:
+        ready, settings = self.learner.ready, self.learner.settings
+        return f"{ready.choice.name if ready else '?'} with {settings.controller if settings else '?'}"
+
+    def _is_alive(self, learner: Learner) -> None:
+        status, now = learner.status, time.monotonic()
+        ticks = -1 if status is None else status.ticks
+        resting = status is not None and not status.running
+        if resting or ticks != self._moved[1]:
+            self._moved = (now, ticks)
+        if now - self._moved[0] > ANSWER:
+            asked = "" if status is None else f", speed {status.speed:g}, {status.real_time_factor:.2g} × real time"
+            self.found.blame(f"no tick after {ticks} for {ANSWER:g} s in {self._where()}{asked}")
+        try:
+            self.page.evaluate("() => document.title")
+        except Error as error:
+            self.found.blame(f"the page does not answer: {error}")
+
+
+def walk(
+    browser: Browser, server: PageServer, minutes: float, seed: int, complaints: Callable[[], str]
+) -> Findings:
+    """A random walk of so many minutes; it ends early when something broke."""
+    page = open_page(browser, server.url)
+    monkey = Monkey(page, server, seed, complaints)
+    end = time.monotonic() + 60 * minutes
+    try:
+        while time.monotonic() < end and not monkey.found.faults:
+            monkey.act()
+            monkey.look()
+    finally:
+        page.context.close()
+    return monkey.found
+
+
+class StandardError:
+    """What this process and its children write to standard error, kept and passed on."""
+
+    def __enter__(self) -> StandardError:
+        self._file = tempfile.TemporaryFile()
+        self._before = os.dup(2)
+        sys.stderr.flush()
+        os.dup2(self._file.fileno(), 2)
+        return self
+
+    def read(self) -> str:
+        sys.stderr.flush()
+        size = os.fstat(self._file.fileno()).st_size
+        return os.pread(self._file.fileno(), size, 0).decode(errors="replace")
+
+    def __exit__(self, *_: object) -> None:
+        said = self.read()
+        os.dup2(self._before, 2)
+        os.close(self._before)
+        self._file.close()
+        sys.stderr.write(said)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="A random user of the page.")
+    parser.add_argument("--minutes", type=float, default=1.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--scene", default="iiwa14-hold")
+    given = parser.parse_args()
+    with StandardError() as said, sync_playwright() as playwright:
+        server = PageServer(SceneChoice(given.scene), port=0, max_sessions=1)
+        browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
+        try:
+            found = walk(browser, server, given.minutes, given.seed, said.read)
+        finally:
+            browser.close()
+            server.close()
+    print(json.dumps(found.as_data(), indent=1))
+    return 1 if found.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
