@@ -83,7 +83,7 @@ class Bindings(Generic[S]):
             if change.client is None:
                 return  # written by `refresh`
             mirror.touched = time.monotonic()
-            self.post(event(handle.value))
+            self.post(event(on_scale(handle)))
 
     def refresh(self, settings: S) -> None:
         """Shows what the session has. Returns at once; the event loop does it."""
@@ -107,6 +107,15 @@ class Bindings(Generic[S]):
                     mirror.handle.value = value
                 elif remind:
                     _send(mirror.handle)
+
+
+def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
+    """The control's value, for a slider within its ends: its number box takes any number."""
+    value, low, high = handle.value, getattr(handle, "min", None), getattr(handle, "max", None)
+    if not isinstance(handle, viser.GuiSliderHandle) or low is None or high is None:
+        return value
+    # What is not a number compares false with both ends.
+    return value if low <= value <= high else high if value > high else low
 
 
 def _send(handle: viser.GuiInputHandle[Any]) -> None:

@@ -11,7 +11,7 @@ import viser
 from app.learner import Learner
 from app.messages import Play, Post, Speed, Step
 from app.palette import GOOD, LEVELS
-from app.panels.bind import HOLD, Wish
+from app.panels.bind import HOLD, Wish, on_scale
 from app.panels.snapshot import Snapshot
 from app.text import badge, block, stopped
 from lessons.events import Reset
@@ -56,7 +56,7 @@ class PlaybackPanel:
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
             if event.client is not None:
                 self._touched = time.monotonic()
-                learner.send(Speed(float(self._speed.value)))
+                learner.send(Speed(float(on_scale(self._speed))))
 
         for label, key, choice in (
             ("Run or pause", "space", _RUN),

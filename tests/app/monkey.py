@@ -109,9 +109,6 @@ class Monkey:
         with suppress(Error):
             chosen()
             self.found.actions[chosen.__name__.strip("_")] += 1
-            if os.environ.get("MONKEY_DEBUG"):
-                st = self.learner.status
-                print(chosen.__name__, None if st is None else (st.t, st.ticks, st.running, st.speed), flush=True)
 
     # ---------------------------------------------------------------- hands
 
@@ -226,7 +223,11 @@ class Monkey:
         if resting or ticks != self._moved[1]:
             self._moved = (now, ticks)
         if now - self._moved[0] > ANSWER:
-            asked = "" if status is None else f", speed {status.speed:g}, {status.real_time_factor:.2g} × real time"
+            asked = (
+                ""
+                if status is None
+                else f", speed {status.speed:g}, {status.real_time_factor:.2g} × real time"
+            )
             self.found.blame(f"no tick after {ticks} for {ANSWER:g} s in {self._where()}{asked}")
         try:
             self.page.evaluate("() => document.title")

@@ -78,6 +78,12 @@ def test_an_edit_is_not_lost_to_a_refresh_at_the_same_moment(panel: Panel, setti
     assert panel.slider.value == 12  # the answer is on its way
 
 
+@pytest.mark.parametrize(("typed", "posted"), [(1_000_000, 30), (-4, 1), (30, 30)])
+def test_a_number_typed_beyond_the_slider_stays_on_its_scale(panel: Panel, typed: int, posted: int) -> None:
+    panel.browser_sets(typed)
+    assert panel.posted == [Set("horizon", posted)]
+
+
 def test_what_changes_elsewhere_is_shown_and_a_refused_edit_taken_back(
     panel: Panel, settings: SceneSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
