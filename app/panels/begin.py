@@ -98,7 +98,7 @@ _FIRST = {
 _WATCH = (
     "Watch the robot do the next task while it finishes this one.",
     "The tab <b>Mission</b> lists the tasks; those in the window (▶ first, ▷ second) are the levels. Drag "
-    "the ball or the disc: the current task of the hand or the base goes elsewhere, at the next control step.",
+    "the ball or the disc: the current task of hand or base goes elsewhere at the next control step.",
 )
 _NEXT_DRAG = (
     "Now swap which comes first.",

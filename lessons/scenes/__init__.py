@@ -56,7 +56,7 @@ def load_scene(
     """
     if name in MOBILE_SCENES:
         raise InputError(
-            f"scene '{name}' is driven by velocities, and this takes torques: choose e.g. iiwa14-hold"
+            f"scene '{name}' is driven by velocities; this takes torques: choose e.g. iiwa14-hold"
         )
     if name not in SCENES:
         raise unknown_name("scene", name, (*SCENES, *MOBILE_SCENES))
