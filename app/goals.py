@@ -102,7 +102,7 @@ class Goals:
                 goal.reach_from(point(at))
                 away = float(np.linalg.norm(at - target))
                 if away > _THERE:
-                    text += f": {quantity(away, 'm') if away < 1.0 else f'{away:.2f} m'} to go"
+                    text += f": {quantity(away, 'm')} to go"
             goal.follow(None if target is None else point(target), text)
 
     @property

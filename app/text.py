@@ -21,6 +21,8 @@ def quantity(value: float, unit: str) -> str:
         size = abs(value)
         if size < 1e-6:
             return "< 1 µm"
+        if size >= 1.0:
+            return f"{value:.2f} m"
         return f"{value * 1e6:.0f} µm" if size < 1e-4 else f"{value * 1e3:.{_digits(size * 1e3)}f} mm"
     degrees = math.degrees(value)
     if abs(degrees) < 5e-3:

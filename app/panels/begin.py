@@ -72,7 +72,7 @@ class BeginPanel:
         place, error = now.number(f"level/{role}"), now.error(role)
         if place != place:
             return f"{head}: has no task now"
-        text = f"{head} (level {place:.0f}): <b>{quantity(error, unit)}</b> from its target"
+        text = f"{head} (level {place:.0f}): <b>{quantity(error, unit)}</b> off what is asked of it now"
         if unit == "m" and error > _FAR and place > 1 and bool((abs(now.field("v")) < _STILL).all()):
             text += ". It rests: going on would disturb level 1"
         return text

@@ -27,6 +27,8 @@ _WORDS = (
     ),
     ("dynamic leak", "the same with the plant's true inertia: what the wrong M̄ costs"),
     ("rung", "what was applied when a QP had no sound solution; anything but 'solved' is shown in red"),
+    ("δ", "HTMPC: by how much lower levels may enlarge a higher level's error; |e*| + δ is its bound"),
+    ("window", "HTMPC: the tasks of the mission that the controller has now, the first one highest"),
     ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
 )
 _DRAWN = (
@@ -39,6 +41,8 @@ _DRAWN = (
     ("large thin frame", "the actual hand"),
     ("line behind the hand", "where it went in the last seconds"),
     ("pink line", "the predicted path of the hand, motion enlarged as its label says"),
+    ("ball, disc with arrows", "mobile robots: the goals of the current tasks of the hand and of the base"),
+    ("circle", "mobile robots: how far the arm reaches about the base"),
 )  # fmt: skip
 
 
