@@ -182,3 +182,27 @@ def test_pacer_owes_simulated_time_but_never_piles_it_up() -> None:
     pacer.rest(7.0)
     pacer.speed = 0.1
     assert pacer.due(7.1, 1e-3) == 10
+
+
+def test_a_choice_may_bring_settings_and_a_seed() -> None:
+    """What a state code says is the scene as it was first loaded: "Reset all" goes back to it."""
+    made = Body(SceneChoice("planar3-hold", set=("order=posture,position,orientation", "horizon=3"), seed=4))
+    made.handle(Post(Set("horizon", 9)))
+    made.tick(2)
+    assert made.session.settings.horizon == 9
+    made.handle(ResetAll())
+    assert made.session.settings.horizon == 3
+    assert made.session.settings.levels[0].name == "posture"
+    assert made.session.seed == 4
+    refused = made.handle(Load(SceneChoice("planar3-hold", set=("horizn=3",))))
+    assert isinstance(refused, Refused) and "horizon" in refused.sentence
+    made.close()
+
+
+def test_late_torques_are_counted() -> None:
+    made = Body(SceneChoice("planar3-hold", set=("deadline_ms=0.5", "horizon=5")))
+    made.tick(3)
+    made.handle(Post(Set("horizon", 6)))
+    made.tick(4)
+    assert (made.status().ticks, made.status().late) == (7, 4)
+    made.close()
