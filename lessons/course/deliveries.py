@@ -152,8 +152,8 @@ MOVES = Step(
     title="People move",
     text=r"""
     The same wait, and at 8 s the second person walks over to another seat: the goals of tasks three
-    and four change, while the hand is still with the first one. At 16.5 s, the hand
-    all but there, the second person lifts the ball's place by 20 cm and shifts it by 30 cm. Nothing is planned
+    and four change, while the hand is still with the first one. At 16.5 s, the hand all but there,
+    the second person lifts the ball's place by 20 cm and shifts it by 30 cm. Nothing is planned
     again from the beginning: the references $r$ in (8) change, and the next plan, a tenth of a
     second later, has them. The ghost is HTIDKC, which has no plan.
     """,
@@ -161,7 +161,7 @@ MOVES = Step(
     why=r"""
     At 8 s the base, waiting at the edge for the old place, goes along the edge to where it is
     nearest to the new one. At 16.5 s the hand turns to the new spot, and a second later it is there
-    within a centimetre. A joint-space plan for the whole sequence would have been
+    within two centimetres. A joint-space plan for the whole sequence would have been
     void twice. What is fixed is only what the people want, in the space in which they move.
     """,
     prediction=Choice(
