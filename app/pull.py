@@ -19,7 +19,6 @@ from robots.truth import true_model
 _STIFF = 7.0  # N/m per kg of robot: a 30 kg arm feels 60 N when pulled 30 cm away
 _MOST = 3.5  # N per kg of robot
 _HELD = 0.15  # s a push lasts if the page does not renew it
-_MODIFIER = "cmd/ctrl"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +50,20 @@ class Pull:
             visible=False,
         )
         self._label = scene.add_label("/pull_label", "", visible=False)
-        for joint, mesh in view.links:
-            if joint:
+        self._links = [(joint, mesh) for joint, mesh in view.links if joint]
+        self._on = False
+
+    def _switch(self, on: bool) -> None:
+        # A link that can be dragged keeps the mouse from whatever is behind it, the target's arrows too.
+        self._on = on
+        for joint, mesh in self._links:
+            if on:
                 self._attach(joint, mesh)
+            else:
+                mesh.remove_drag_callback()
 
     def _attach(self, joint: int, mesh: viser.MeshHandle) -> None:
-        @mesh.on_drag("left", modifier=_MODIFIER)
+        @mesh.on_drag("left")
         async def _(event: viser.SceneNodeDragEvent[viser.MeshHandle]) -> None:
             if event.phase == "end" or joint > len(self._poses):
                 self._grip = None
@@ -71,10 +78,13 @@ class Pull:
                 at = grip.at
             self._grip = Grip(joint, at, hand)
 
-    def follow(self, poses: np.ndarray, plant: PlantSettings, running: bool) -> None:
-        """poses (n + 1, 7) of now; plant: tells where the link's mass is. While paused nothing is pushed."""
+    def follow(self, poses: np.ndarray, plant: PlantSettings, running: bool, on: bool) -> None:
+        """poses (n + 1, 7) of now; plant: tells where the link's mass is; on: whether links can be dragged.
+        While paused nothing is pushed."""
         self._poses = poses
-        grip = self._grip
+        if on != self._on:
+            self._switch(on)
+        grip = self._grip if on else None
         if grip is None or not running:
             if self._pulling is not None:
                 self._post(Push(self._robot.joint_names[self._pulling - 1], seconds=1e-3))

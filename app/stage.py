@@ -27,14 +27,11 @@ from app.panels.robot import RobotPanel
 from app.panels.share import SharePanel
 from app.panels.snapshot import Snapshot
 from app.panels.timeline import TimeLine
-from app.pull import Pull
 from app.text import PHONE
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
 from lessons.kinds import AnyEvent, AnySettings
-from lessons.settings import SceneSettings
-from robots import PlantSettings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -115,10 +112,7 @@ class Stage:
         self._floor = _floor(scene, self._ready.room)
         self._paint_floor(dark)
         self._robot = RobotView(scene, self._ready.robot)
-        self._face.add_scene(scene)
-        # Velocity servos do not feel a push.
-        torque_level = isinstance(self._ready.settings, SceneSettings)
-        self._pull = Pull(scene, self._robot, self._ready.robot, self._post) if torque_level else None
+        self._face.add_scene(scene, self._robot)
 
     def _change_theme(self, dark: bool) -> None:
         self._theme(dark)
@@ -163,8 +157,6 @@ class Stage:
                 self._after_reset(moment.status, first=self._resets is None)
                 self._resets = moment.status.resets
             self._face.follow(moment)
-            if self._pull is not None and isinstance(plant := self._settings().plant, PlantSettings):
-                self._pull.follow(moment.poses, plant, moment.status.running)
         if plots:
             with self._client.atomic():
                 self._face.draw(moment)

@@ -16,6 +16,7 @@ from app.moment import Moment
 from app.palette import RGB
 from app.panels.bind import Bindings
 from app.panels.snapshot import Snapshot
+from app.view.robot import RobotView
 from lessons.kinds import AnyEvent
 
 
@@ -60,7 +61,7 @@ class Face(Protocol):
         """The kind's tabs of the panel on the left."""
         ...
 
-    def add_scene(self, scene: viser.SceneApi) -> None:
+    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         """What the 3D view shows besides robot and floor."""
         ...
 

@@ -19,8 +19,9 @@ from app.panels.plots import LevelPlots
 from app.panels.snapshot import Snapshot
 from app.panels.start import StartPanel
 from app.panels.tasks import TasksPanel
+from app.pull import Pull
 from app.view.coordinates import draggable
-from app.view.robot import camera_for
+from app.view.robot import RobotView, camera_for
 from app.view.target import Frames
 from app.view.trails import Trails
 from lessons.events import Set
@@ -58,7 +59,7 @@ class TorqueFace:
         with plots.add_tab("Joints"):
             self._joint_plots = JointPlots(gui, self._context.ready.robot)
 
-    def add_scene(self, scene: viser.SceneApi) -> None:
+    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         context, ready = self._context, self._context.ready
         poses = context.poses()
         tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
@@ -76,6 +77,7 @@ class TorqueFace:
             lambda: bool(self._start.clamp.value),
             self._start.dragged,
         )
+        self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [
             (task.path, context.colours[task.level])
             for task in ready.tasks
@@ -100,6 +102,8 @@ class TorqueFace:
 
     def follow(self, moment: Moment) -> None:
         self._frames.actual(moment.poses[-1])
+        running = moment.live and moment.status.running
+        self._pull.follow(moment.poses, self._context.settings.plant, running, bool(self._start.pull.value))
 
     def after_reset(self, status: Status) -> None:
         self._hand.after_reset(status.targets)

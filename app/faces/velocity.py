@@ -20,7 +20,7 @@ from app.panels.servos import ServoPanel
 from app.panels.snapshot import Snapshot
 from app.panels.tracking import TrackingPlots
 from app.view.coordinates import full
-from app.view.robot import camera_for, look_at
+from app.view.robot import RobotView, camera_for, look_at
 from app.view.surroundings import Carried, Obstacles, People, ReachCircle
 from app.view.target import Frames
 from app.view.trails import Trails
@@ -72,7 +72,8 @@ class VelocityFace:
         with plots.add_tab("Joints"):
             self._joint_plots = JointPlots(gui, self._context.ready.robot, ACCELERATION)
 
-    def add_scene(self, scene: viser.SceneApi) -> None:
+    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
+        del robot  # velocity servos do not feel a pull
         context, ready = self._context, self._context.ready
         size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
         self._frames = Frames(scene)

@@ -11,7 +11,7 @@ _KEYS = (
     ("S", "a single control tick (pauses first)"),
     ("R", "robot back to its start, settings kept"),
     ("← →", "while paused: look back and forward, with Shift in larger steps"),
-    ("Ctrl + drag", "pull at a link of the robot; the red arrow is the force"),
+    ("G", "pull by hand or not: drag any link, the red arrow is the force"),
     ("1 … 9", "switch the level at that place on or off"),
     ("Ctrl K", "every command, searchable"),
     ("", "a field or a checkbox you just used keeps the keys: click beside it first"),

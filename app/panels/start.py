@@ -54,7 +54,12 @@ class StartPanel:
             buttons = gui.add_button_group(
                 "Push", tuple(_DIRECTIONS), hint=f"Along a world axis, for {PUSH_SECONDS:g} s"
             )
-            gui.add_html(block("Or hold <b>Ctrl</b> and drag any link: it pulls like a rubber band."))
+            self.pull = gui.add_checkbox(
+                "Pull by hand",
+                False,
+                hint="Drag any link with the mouse: it pulls like a rubber band. Key G. While this is on, a "
+                "link in front of the target keeps the mouse from it.",
+            )
             self._load = gui.add_button(_PICK_UP, hint="The controller is not told")
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand", True)
@@ -67,6 +72,12 @@ class StartPanel:
             direction = np.array(_DIRECTIONS[str(buttons.value)], float)
             vector = tuple(float(x) for x in force.value * direction)
             post(Push(str(body.value), vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
+
+        grab = gui.add_command("Pull at links by hand, or not", hotkey="G")
+
+        @grab.on_trigger
+        async def _(_: object) -> None:
+            self.pull.value = not self.pull.value
 
         @self._load.on_click
         async def _(_: object) -> None:
