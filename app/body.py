@@ -3,11 +3,14 @@ tests drive it by hand."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
-import pinocchio as pin
 
 from app.block import Block
 from app.leader import Leader
+from app.lesson.lecturer import Lecturer
 from app.messages import (
     Command,
     Lead,
@@ -15,10 +18,12 @@ from app.messages import (
     Load,
     Play,
     Post,
+    Predict,
     Ready,
     Refused,
     Report,
     ResetAll,
+    RunStep,
     SceneChoice,
     Speed,
     Status,
@@ -26,7 +31,8 @@ from app.messages import (
     Tell,
     Told,
 )
-from app.runs import start
+from app.poses import LinkPoses
+from app.runs import Run, start
 from lessons.events import Reset
 from lessons.kinds import AnyScene, AnySession, AnySettings, find_scene, prepared
 from lessons.state import settings_now
@@ -51,12 +57,9 @@ class Body:
 
     def _enter(self, choice: SceneChoice) -> None:
         scene = self._load_scene(choice)
-        self.run = start(scene, choice.seed)
-        self.scene, self.choice = scene, choice
+        self._take(choice, scene, start(scene, choice.seed))
         robot = self.session.robot
-        self._data = robot.model.createData()
-        self._tip = robot.frame_id(robot.tip)
-        self._poses = np.zeros((robot.n + 1, 7))
+        self._poses = LinkPoses(robot)
         fields = self.session.layout.fields
         self._step_us = fields["step_us"].start
         self._late = fields["late"].start if "late" in fields else None
@@ -66,6 +69,15 @@ class Body:
 
     def _load_scene(self, choice: SceneChoice) -> AnyScene:
         return scene_of(choice)
+
+    def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
+        return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.seed)
+
+    def _take(self, choice: SceneChoice, scene: AnyScene, run: Run) -> None:
+        """A run at its beginning. A lesson's robot stands still until its script begins."""
+        self.choice, self.scene, self.run = choice, scene, run
+        self.lecturer = self._lecturer(choice, run)
+        self.running, self.speed = self.lecturer is None, 1.0
 
     def _fresh_start(self) -> None:
         self.ticks = self.over_budget = self.late = self._steps = 0
@@ -82,7 +94,13 @@ class Body:
 
     def handle(self, command: Command) -> Report | None:
         """Obeys a command; the answer, if it has one, goes to the page."""
+        lecturer = self.lecturer
+        if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, Step, RunStep)):
+            self.session.notices.append("First say what you expect: this step asks for a prediction.")
+            return None
         match command:
+            case Post(Reset()) if lecturer is not None and not lecturer.waiting:
+                self._begin(own=False, fast=False)
             case Post(Reset() as event):
                 self.run.post(event)
                 self.resets += 1
@@ -90,6 +108,15 @@ class Body:
                     self._steps = max(self._steps, 1)  # a reset must show while paused, too
             case Post(event):
                 self.run.post(event)
+                if lecturer is not None:
+                    lecturer.touch(event)
+            case RunStep(own, fast):
+                self._begin(own, fast)
+            case Play(True) if lecturer is not None and lecturer.waiting:
+                self._begin(own=True, fast=False)
+            case Predict(answer):
+                if lecturer is not None:
+                    lecturer.answer = answer
             case Play(running):
                 self.running, self._steps = running, 0
                 self._finish_period()
@@ -100,10 +127,7 @@ class Body:
             case Speed(factor):
                 self.speed = factor
             case ResetAll():
-                self.run = start(self.scene, self.choice.seed)
-                self._fresh_start()
-                self.running, self.speed = True, 1.0
-                self.write_poses()
+                self._restart(self.choice, self.scene, start(self.scene, self.choice.seed))
             case Load(choice):
                 return self._load(choice)
             case Tell():
@@ -128,14 +152,42 @@ class Body:
         self.write_poses()
         self.leader.begin(self.choice, self.session)
 
-    def _load(self, choice: SceneChoice) -> Report:
+    def _restart(self, choice: SceneChoice, scene: AnyScene, run: Run) -> None:
+        self._take(choice, scene, run)
+        self._fresh_start()
+        self.write_poses()
+
+    def _begin(self, own: bool, fast: bool) -> None:
+        """The run of an exercise from its start."""
+        if self.lecturer is None:
+            return
+        settings: Any = self.lecturer.settings(own)
+        self.run = start(replace(self.scene, settings=settings), self.choice.seed)
+        self._fresh_start()
+        self.running = self.lecturer.begin(self.session, fast)
+        self.write_poses()
+
+    def _turn_to(self, choice: SceneChoice) -> bool:
+        """Another step of the same lesson: as long as it looks the same, nothing needs to be built anew."""
+        then, now = self.choice.exercise, choice.exercise
+        if then is None or now is None or then.lesson != now.lesson:
+            return False
+        scene = scene_of(choice)
+        run = start(scene, choice.seed)
+        if run.session.layout != self.session.layout:
+            return False
+        self._restart(choice, scene, run)
+        return True
+
+    def _load(self, choice: SceneChoice) -> Report | None:
         before = self.block
         try:
+            if self._turn_to(choice):
+                return None
             self._enter(choice)
         except InputError as error:
             return Refused(str(error))
         before.close()
-        self.running, self.speed = True, 1.0
         return self.ready()
 
     # ---------------------------------------------------------------- simulation
@@ -160,7 +212,21 @@ class Body:
         self.ticks += 1
         self.over_budget += bool(row[self._step_us] > 1e6 * self.session.settings.T_s)
         self.late += self._late is not None and bool(row[self._late])
+        if self.lecturer is not None and self.lecturer.follow(row):
+            # What is out of control only gets worse; the learner should see where it ended.
+            self.running = self.session.diverged_at is None
         return True
+
+    @property
+    def pace(self) -> float:
+        """Simulated seconds per second that are asked for."""
+        pace = None if self.lecturer is None else self.lecturer.pace
+        return self.speed if pace is None else pace
+
+    @property
+    def busy(self) -> bool:
+        """There is something to compute, though perhaps nothing runs."""
+        return self.running or (self.lecturer is not None and self.lecturer.busy)
 
     def _finish_period(self) -> None:
         # A pause stands between two control periods: what is changed meanwhile takes effect at once, and
@@ -171,18 +237,14 @@ class Body:
     def settle(self) -> None:
         """While paused: what was asked for takes effect at once, though no time passes."""
         self.session.drain()
+        if self.lecturer is not None and self.lecturer.idle():
+            self.running = True
 
     def write_poses(self) -> None:
         """The plant's true link poses, for the 3D view."""
-        model, data, poses = self.session.robot.model, self._data, self._poses
-        q = np.asarray(self.session.plant.q)
-        if not np.isfinite(q).all():
-            return
-        pin.framesForwardKinematics(model, data, q)
-        for joint in range(1, model.njoints):
-            poses[joint - 1] = _pose(data.oMi[joint])
-        poses[-1] = _pose(data.oMf[self._tip])
-        self.block.write_poses(poses, self.session.t)
+        poses = self._poses.at(np.asarray(self.session.plant.q))
+        if poses is not None:
+            self.block.write_poses(poses, self.session.t)
 
     # ---------------------------------------------------------------- reports
 
@@ -223,6 +285,7 @@ class Body:
             settings=settings if changed else None,
             gauge=None if self.running else run.gauge(),
             mission=run.mission(),
+            lecture=None if self.lecturer is None else self.lecturer.report(),
         )
 
     def close(self) -> None:
@@ -232,9 +295,6 @@ class Body:
 
 def scene_of(choice: SceneChoice) -> AnyScene:
     """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
+    if choice.exercise is not None:
+        return choice.exercise.run.prepared()
     return prepared(find_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text), None, choice.set)
-
-
-def _pose(placement: pin.SE3) -> np.ndarray:
-    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-    return np.array([*placement.translation, w, x, y, z])

@@ -7,6 +7,7 @@ from multiprocessing.connection import Connection
 
 from app.body import Body
 from app.messages import Begin, Command, Follow, Quit, Reached, Refused, SceneChoice
+from app.runs import Run
 from lessons.follow import Follower, followed
 from lessons.kinds import AnyScene
 from robots import InputError
@@ -28,6 +29,9 @@ class Shadow(Body):
 
     def _load_scene(self, choice: SceneChoice) -> AnyScene:
         return followed(super()._load_scene(choice), self._leader, self._own)
+
+    def _lecturer(self, choice: SceneChoice, run: Run) -> None:
+        """A lesson judges the robot, not its ghost."""
 
     def catch_up(self, until: float) -> bool:
         """Runs what is due, but not longer than to a moment of `perf_counter`; whether anything was."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +18,9 @@ from app.view.coordinates import draggable, full, raw, xyzw
 from app.view.target import Frames, TargetGizmo
 from lessons.events import MoveTarget
 from lessons.settings import SceneSettings
+
+_OWN = 1.0
+"""s after a drag in which targets that change are taken to be the hand's own."""
 
 
 class Hand:
@@ -39,6 +44,8 @@ class Hand:
         reached; dragged: called at every move."""
         self.verdict: Verdict | None = None
         self._post, self._clamp, self._dragged = post, clamp, dragged
+        self._targets = targets
+        self._moved_at = -math.inf
         self._gizmo: TargetGizmo | None = None
         self._judge: Judge | None = None
         position, orientation = draggable(ready.tasks)
@@ -60,6 +67,7 @@ class Hand:
         gizmo = self._gizmo
         assert gizmo is not None and self._judge is not None
         self._dragged()
+        self._moved_at = time.monotonic()
         self._judge.ask(Question(position, rotation, gizmo.position.frame))
         if rotation is not None and gizmo.orientation is not None:
             self._post(MoveTarget(gizmo.orientation.name, xyzw(rotation)))
@@ -87,6 +95,13 @@ class Hand:
             turned = None if gizmo.orientation is None else targets.get(gizmo.orientation.name)
             gizmo.put(full(gizmo.position, targets.get(gizmo.position.name), gizmo.raw), turned)
         self.verdict = None
+
+    def follow(self, targets: dict[str, np.ndarray]) -> None:
+        """Where a script, not the hand, moves the session's targets, the gizmo goes along."""
+        before, self._targets = self._targets, targets
+        by_hand = time.monotonic() - self._moved_at < _OWN
+        if not by_hand and any(not np.array_equal(before.get(name, at), at) for name, at in targets.items()):
+            self.after_reset(targets)
 
     def show(
         self,

@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from queue import Empty, Queue
 
 from app.ghost import Ghost
-from app.messages import Lead, Leash, Load, Ready, Report, ResetAll, SceneChoice, Script, Tell, Told
+from app.lesson.exercise import Lecture
+from app.messages import (
+    Lead,
+    Leash,
+    Load,
+    Ready,
+    Report,
+    ResetAll,
+    SceneChoice,
+    Script,
+    Status,
+    Tell,
+    Told,
+)
 from app.process import Process, Spares
 from app.simulation import Simulation
 from lessons import lesson
@@ -21,6 +35,7 @@ class Learner(Simulation):
         self.attached = False
         self.left_at = time.monotonic()
         self.ghost: Ghost | None = None
+        self.lecture: Lecture | None = None
         self._asking: Queue[Told] | None = None
         super().__init__(spares)
 
@@ -49,10 +64,13 @@ class Learner(Simulation):
 
     def _enter(self, ready: Ready) -> None:
         super()._enter(ready)
-        self.choice = ready.choice
+        self.choice, self.lecture = ready.choice, None
 
     def _hear(self, process: Process, report: Report) -> None:
         super()._hear(process, report)
+        if isinstance(report, Status) and report.lecture is not None and process is self._process:
+            self.lecture = report.lecture
+            self.choice = replace(SceneChoice.of_lesson(self.lecture.exercise), seed=self.choice.seed)
         if isinstance(report, Told) and self._asking is not None:
             self._asking.put(report)
         ghost = self.ghost

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from app.lesson.exercise import Exercise, Lecture, Predict, RunStep
 from himpc.telemetry import Layout
 from lessons.kinds import AnyEvent, AnySettings
 from robots import Robot
@@ -15,7 +16,7 @@ from robots import Robot
 @dataclass(frozen=True)
 class SceneChoice:
     """Which scene to load, for `hold` which robot, and with which settings and seed: assignments
-    "PATH=VALUE" on top of the scene's own."""
+    "PATH=VALUE" on top of the scene's own. The step of a lesson brings all of it, and its script."""
 
     name: str
     urdf: str | None = None
@@ -23,6 +24,13 @@ class SceneChoice:
     urdf_text: str | None = None
     set: tuple[str, ...] = ()
     seed: int = 0
+    exercise: Exercise | None = None
+
+    @classmethod
+    def of_lesson(cls, exercise: Exercise) -> SceneChoice:
+        """A step of a lesson. Raises InputError if there is no such lesson."""
+        run = exercise.run
+        return cls(run.scene, run.urdf, set=run.set, exercise=exercise)
 
 
 # ------------------------------------------------------------------ page → simulation
@@ -110,7 +118,9 @@ class Quit:
     """End the process."""
 
 
-Command = Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Tell | Quit
+Command = (
+    Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Tell | Predict | RunStep | Quit
+)
 
 
 # ------------------------------------------------------------------ simulation → page
@@ -205,7 +215,8 @@ class Status:
     over_budget: ticks whose control step took longer than T_s; late: ticks that missed their deadline;
     resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
     path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
-    I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one.
+    I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one; lecture:
+    of a lesson, when there is news.
     """
 
     t: float
@@ -224,6 +235,7 @@ class Status:
     settings: AnySettings | None = field(default=None)
     gauge: tuple[float, float] | None = None
     mission: MissionView | None = None
+    lecture: Lecture | None = None
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,12 @@ import asyncio
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import viser
 
 from app.learner import Learner
+from app.lesson.progress import Notebook
 from app.messages import Load, Ready, SceneChoice
 from app.stage import Stage
 from app.text import block, stopped
@@ -31,6 +33,7 @@ class Page:
         dark: bool,
         by_path: bool,
         loop: asyncio.AbstractEventLoop,
+        notebook: Notebook,
     ) -> None:
         """by_path: whether this page may name files of the machine; loop: viser's event loop."""
         self.learner = learner
@@ -39,6 +42,7 @@ class Page:
         self._dark = dark
         self._by_path = by_path
         self._event_loop = loop
+        self._notebook = notebook
         self._phone = False
         self._seen: tuple[SceneChoice, str] | None = None  # what the camera was last turned to
         self._stage: Stage | None = None
@@ -105,10 +109,12 @@ class Page:
         if learner.failure != self._failure:
             self._failure = learner.failure
             stage.show_failure(self._failure)
-        stage.follow(
-            plots=self._plots_due(),
-            texts=frame % _TEXTS == 0,
-        )
+        try:
+            stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
+        except Exception:
+            # Another scene may come in at any moment: its rows and poses do not fit this stage.
+            if learner.changed == self._built:
+                raise
 
     def _plots_due(self) -> bool:
         now = time.perf_counter()
@@ -152,8 +158,9 @@ class Page:
                 self._theme,
                 self._by_path,
                 self._event_loop,
+                self._notebook,
             )
-            seen = (ready.choice, ready.robot.name)
+            seen = (replace(ready.choice, exercise=None, set=()), ready.robot.name)
             if seen != self._seen:  # a restart leaves the learner's view as it was
                 aim(self._client.camera, ready.robot, self._phone, ready.room)
                 self._seen = seen

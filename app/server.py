@@ -18,6 +18,7 @@ import viser
 from viser import _messages, infra
 
 from app.body import scene_of
+from app.lesson.progress import Notebook, Progress, progress_from
 from app.messages import SceneChoice
 from app.page import Page
 from app.runs import start
@@ -29,6 +30,7 @@ from robots.shapes import link_shapes
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
+_PROGRESS = "himpc-lab-lessons"
 FIRST = SceneChoice("iiwa14-hold")
 """What the page shows if nothing else is asked for."""
 
@@ -130,18 +132,20 @@ class PageServer:
         try:
             tokens = _tokens(client.local_storage.get_item(_TOKENS, timeout=5.0))
             dark = client.local_storage.get_item(_DARK, timeout=5.0) == "1"
+            progress = progress_from(client.local_storage.get_item(_PROGRESS, timeout=5.0))
         except (RuntimeError, TimeoutError):
-            tokens, dark = [], False  # storage is blocked, or the tab is gone already
-        self._admit(client, tokens, dark)
+            tokens, dark, progress = [], False, Progress()  # storage is blocked, or the tab is gone already
+        notebook = Notebook(progress, lambda text: client.local_storage.set_item(_PROGRESS, text))
+        self._admit(client, tokens, dark, notebook)
 
-    def _admit(self, client: viser.ClientHandle, tokens: list[str], dark: bool) -> bool:
+    def _admit(self, client: viser.ClientHandle, tokens: list[str], dark: bool, notebook: Notebook) -> bool:
         learner = self.sessions.enter(tokens)
         if learner is None:
-            self._turn_away(client, tokens, dark)
+            self._turn_away(client, tokens, dark, notebook)
             return False
         kept = [token for token in tokens if token != learner.token][-7:]
         client.local_storage.set_item(_TOKENS, json.dumps([*kept, learner.token]))
-        page = Page(client, learner, dark, self._local, self._viser.get_event_loop())
+        page = Page(client, learner, dark, self._local, self._viser.get_event_loop(), notebook)
         page.on_dark = lambda on: client.local_storage.set_item(_DARK, "1" if on else "0")
         with self._lock:
             self._pages[client.client_id] = page
@@ -150,7 +154,9 @@ class PageServer:
             self._disconnect(client)  # left while we were building
         return True
 
-    def _turn_away(self, client: viser.ClientHandle, tokens: list[str], dark: bool) -> None:
+    def _turn_away(
+        self, client: viser.ClientHandle, tokens: list[str], dark: bool, notebook: Notebook
+    ) -> None:
         client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
         modal = client.gui.add_modal("All places are taken")
         with modal:
@@ -166,7 +172,7 @@ class PageServer:
         @again.on_click
         def _(_: object) -> None:
             modal.close()
-            self._admit(client, tokens, dark)
+            self._admit(client, tokens, dark, notebook)
 
     def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:

@@ -14,12 +14,14 @@ import viser
 from app.faces import Context, face_for
 from app.ghost import Ghost
 from app.learner import Learner
+from app.lesson.progress import Notebook
 from app.messages import Post, Ready, SceneChoice, Status
 from app.moment import Moment, moment_of
 from app.palette import level_colours
 from app.panels.bind import Bindings
 from app.panels.binding import BindingPanel
 from app.panels.compare import ComparePanel
+from app.panels.course import Course
 from app.panels.export import ExportPanel
 from app.panels.help import HelpPanel
 from app.panels.playback import PlaybackPanel
@@ -50,6 +52,7 @@ class Stage:
         theme: Callable[[bool], None],
         by_path: bool,
         loop: asyncio.AbstractEventLoop,
+        notebook: Notebook,
     ) -> None:
         self._client, self._learner, self._ready = client, learner, ready
         self._theme = theme
@@ -61,7 +64,7 @@ class Stage:
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: Ghost | None = None
-        self._build_panels(client.gui, scenes, choose, by_path, loop)
+        self._build_panels(client.gui, scenes, choose, by_path, loop, notebook)
         self._build_scene(client.scene, dark)
 
     # ---------------------------------------------------------------- building
@@ -73,12 +76,16 @@ class Stage:
         choose: Callable[[SceneChoice], None],
         by_path: bool,
         loop: asyncio.AbstractEventLoop,
+        notebook: Notebook,
     ) -> None:
         gui.add_html(PHONE)
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
         self._time_line = TimeLine(gui, self._learner, loop)
-        tabs = gui.add_tab_group()
+        self._course = Course(gui, self._learner, notebook, choose, self._settings, loop)
+        tabs, plots = gui.add_tab_group(), gui.add_panel()
+        self._course.add_first_tabs(tabs, plots)
         self._face.add_tabs(gui, tabs)
+        self._course.add_last_tab(tabs)
         with tabs.add_tab("Compare"):
             self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
         with tabs.add_tab("Export"):
@@ -87,10 +94,9 @@ class Stage:
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):
-            HelpPanel(gui)
+            self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS[: len(self._settings().levels)]):
             self._level_hotkey(gui, place, key)
-        plots = gui.add_panel()
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):
             self._binding = BindingPanel(gui, self._colours)
@@ -184,18 +190,22 @@ class Stage:
     def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self._settings()
         found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
-        if found is None or learner.status is None or found[1] == 0:
+        if found is None or learner.status is None:
             return
         shown = Snapshot(self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s)
         now = replace(shown, status=learner.status)
         with self._client.atomic():
             self._playback.update(now)
-            self._compare.update(now)
-            self._face.write(shown)
-            self._binding.update(shown)
+            if found[1] > 0:
+                self._compare.update(now)
+                self._face.write(shown)
+                self._binding.update(shown)
+            self._course.follow(settings)
             self._bindings.refresh(settings)
 
     def close(self) -> None:
+        self._course.close()
+        self._help.close()
         self._bindings.close()
         self._playback.close()
         self._time_line.close()

@@ -83,7 +83,7 @@ def _simulate(pipe: Connection, body: Body) -> None:
             if answer is not None:
                 pipe.send(answer)
                 pacer.rest(time.perf_counter())
-        pacer.speed = body.speed
+        pacer.speed = body.pace
         now = time.perf_counter()
         ran = 0
         if body.running:
@@ -98,7 +98,9 @@ def _simulate(pipe: Connection, body: Body) -> None:
             body.write_poses()
             next_pose = now + POSE_PERIOD
         if now >= next_status:
-            pipe.send(body.status(pacer.real_time_factor(now), pacer.capped(now)))
+            # A run as fast as it goes is no computer that cannot keep up.
+            capped = pacer.capped(now) and body.pace == body.speed
+            pipe.send(body.status(pacer.real_time_factor(now), capped))
             next_status = now + STATUS_PERIOD
         if now >= next_script:
             script = body.leader.script(body.session)
@@ -106,7 +108,7 @@ def _simulate(pipe: Connection, body: Body) -> None:
                 pipe.send(script)
             next_script = now + SCRIPT_PERIOD
         if ran == 0:
-            pipe.poll(0.001 if body.running else 0.02)
+            pipe.poll(0.001 if body.busy else 0.02)
 
 
 def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:

@@ -6,6 +6,7 @@ from robots import InputError
 
 
 def serve(
+    lesson: str | None = None,
     scene: str | None = None,
     urdf: str | None = None,
     tip: str | None = None,
@@ -18,6 +19,7 @@ def serve(
     """Open the page: a robot under HIMPC whose target you can drag.
 
     Args:
+        lesson: lesson to start with; himpc-lab lessons lists them.
         scene: scene to start with; iiwa14-hold by default, hold with --urdf.
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
@@ -27,19 +29,24 @@ def serve(
         port: port to listen on.
         no_browser: do not open a browser.
     """
+    from app.lesson.exercise import Exercise
     from app.messages import SceneChoice
     from app.server import FIRST
     from app.server import serve as serve_page
 
-    if state is None:
-        choice = SceneChoice(scene or ("hold" if urdf else FIRST.name), urdf, tip)
-    else:
+    bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
+    if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
+        others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
+        raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
+    if lesson is not None:
+        choice = SceneChoice.of_lesson(Exercise(lesson))
+    elif state is not None:
         from lessons.state import decode
 
-        if (scene, urdf, tip) != (None, None, None):
-            raise InputError("--state brings its own scene and robot: leave out --scene, --urdf and --tip")
         given = decode(state)
         choice = SceneChoice(given.scene, given.urdf, given.tip, set=given.set, seed=given.seed)
+    else:
+        choice = SceneChoice(scene or ("hold" if urdf else FIRST.name), urdf, tip)
     return serve_page(
         choice,
         host=host,

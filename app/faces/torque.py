@@ -66,6 +66,7 @@ class TorqueFace:
         status = context.learner.status
         reach = camera_for(ready.robot)[2]
         self._frames = Frames(scene)
+        self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until there is a tick to tell
         self._hand = Hand(
             scene,
             ready,
@@ -102,6 +103,8 @@ class TorqueFace:
 
     def follow(self, moment: Moment) -> None:
         self._frames.actual(moment.poses[-1])
+        if moment.live:
+            self._hand.follow(moment.status.targets)
         running = moment.live and moment.status.running
         self._pull.follow(moment.poses, self._context.settings.plant, running, bool(self._start.pull.value))
 

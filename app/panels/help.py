@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import viser
 
+from app.lesson.glossary import words
+from app.panels.window import Window
 from app.text import block
 
 _KEYS = (
@@ -12,20 +14,19 @@ _KEYS = (
     ("R", "robot back to its start, settings kept"),
     ("← →", "while paused: look back and forward, with Shift in larger steps"),
     ("G", "pull by hand or not: drag any link, the red arrow is the force"),
+    ("L", "all lessons"),
+    ("P, N, B", "in a lesson: play the step's script, next step, step before"),
+    ("?", "this help"),
     ("1 … 9", "switch the level at that place on or off"),
     ("Ctrl K", "every command, searchable"),
     ("", "a field or a checkbox you just used keeps the keys: click beside it first"),
 )
-_WORDS = (
-    ("level", "priority, 1 is the highest; a lower level never disturbs a higher one"),
+_MARKS = (
     ("Q, R", "weights of the residual and of the changes of torque"),
-    ("M̄", "the controller's constant, diagonal guess of the inertia matrix"),
-    ("N", "horizon: knots the controller looks ahead, T_s apart"),
     (
-        "priority leak",
-        "how far lower levels move higher ones in the controller's own prediction; should be 0",
+        "dynamic leak",
+        "the leak with the plant's true inertia instead of M̄: what the wrong M̄ costs",
     ),
-    ("dynamic leak", "the same with the plant's true inertia: what the wrong M̄ costs"),
     ("rung", "what was applied when a QP had no sound solution; anything but 'solved' is shown in red"),
     ("δ", "HTMPC: by how much lower levels may enlarge a higher level's error; |e*| + δ is its bound"),
     ("window", "HTMPC: the tasks of the mission that the controller has now, the first one highest"),
@@ -47,14 +48,23 @@ _DRAWN = (
 
 
 class HelpPanel:
-    """Plain text; nothing here changes."""
+    """Plain text; nothing here changes. It also opens as a window."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        for title, rows in (("Keys", _KEYS), ("In the scene", _DRAWN), ("Words", _WORDS)):
-            with gui.add_folder(title):
+        self._gui = gui
+        self._fill()
+        self._window = Window(gui, "Help", "?", self._fill, shift=True)
+
+    def _fill(self) -> None:
+        known = (*words().items(), *_MARKS)
+        for title, rows in (("Keys", _KEYS), ("In the scene", _DRAWN), ("Words", known)):
+            with self._gui.add_folder(title):
                 cells = "".join(
-                    f'<tr><td style="white-space:nowrap;vertical-align:top;padding-right:0.8em"><b>{word}</b>'
+                    f'<tr><td style="vertical-align:top;padding-right:0.8em;max-width:9em"><b>{word}</b>'
                     f"</td><td>{meaning}</td></tr>"
                     for word, meaning in rows
                 )
-                gui.add_html(block(f'<table style="border-spacing:0 0.2em">{cells}</table>'))
+                self._gui.add_html(block(f'<table style="border-spacing:0 0.2em">{cells}</table>'))
+
+    def close(self) -> None:
+        self._window.close()

@@ -27,11 +27,11 @@ def find_chromium() -> str | None:
     return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
-def open_page(browser: Browser, url: str, width: int = 1300, height: int = 480) -> Page:
+def open_page(browser: Browser, url: str, width: int = 1300, height: int = 480, scale: float = 0.5) -> Page:
     """A fresh browser profile with the page loaded and the robot drawn."""
     page = browser.new_context(
         viewport={"width": width, "height": height},
-        device_scale_factor=0.5,  # a quarter of the pixels: they are drawn without a graphics card
+        device_scale_factor=scale,  # 0.5: a quarter of the pixels: they are drawn without a graphics card
     ).new_page()
     page.set_default_timeout(SLOW)
     load(page, url)

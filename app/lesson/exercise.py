@@ -1,0 +1,127 @@
+"""Which step of which lesson is on, and what is known about its run: frozen and picklable data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from lessons.challenge import Challenge, Result
+from lessons.course import load_lesson
+from lessons.lesson import Lesson, Run, Step
+from lessons.measure import Signal
+from lessons.prediction import Grade
+
+Answer = int | float | tuple[tuple[float, float], ...]
+"""A prediction: place of an option, a value, or the points (t in s, value) of a sketch."""
+
+Phase = Literal["waiting", "preparing", "running", "done"]
+"""Before the run; the ghost is still being computed; the scripted run goes on; it is over and the robot is
+free."""
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """A step of a lesson, or, at the place after the last step, its challenge.
+
+    Attributes:
+        lesson: its name.
+        place: 0-based.
+    """
+
+    lesson: str
+    place: int = 0
+
+    @property
+    def whole(self) -> Lesson:
+        """The lesson. Raises InputError if there is none of that name."""
+        return load_lesson(self.lesson)
+
+    @property
+    def part(self) -> Step | Challenge:
+        """What is to be done."""
+        lesson = self.whole
+        parts = parts_of(lesson)
+        return parts[min(max(self.place, 0), len(parts) - 1)]
+
+    @property
+    def run(self) -> Run:
+        """What is run."""
+        return self.whole.run_of(self.part)
+
+
+@dataclass(frozen=True)
+class Predict:
+    """A command: what the learner says the run of a step will show."""
+
+    answer: Answer
+
+
+@dataclass(frozen=True)
+class RunStep:
+    """A command: a step's script from its start. own: with the lesson's settings (a challenge always takes
+    the learner's); fast: as fast as it goes."""
+
+    own: bool = True
+    fast: bool = False
+
+
+def parts_of(lesson: Lesson) -> tuple[Step | Challenge, ...]:
+    """A lesson's steps, and its challenge if it has one."""
+    return lesson.steps if lesson.challenge is None else (*lesson.steps, lesson.challenge)
+
+
+def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
+    """What to look at while it runs."""
+    if isinstance(part, Step):
+        return part.plots
+    return tuple(dict.fromkeys(measure.signal for measure in part.measures))
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A signal over the run so far: t (k,) s, values (k,) in its unit, thinned so that no spike is lost."""
+
+    t: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Lecture:
+    """How far an exercise is.
+
+    Attributes:
+        exercise: which.
+        phase: see `Phase`.
+        attempt: counts runs since the exercise was opened.
+        t: s, how much of the run is judged; duration: s, how long it is.
+        answer: the learner's prediction.
+        changed: one sentence if the run is not the lesson's own: settings differ, or a hand interfered.
+        values: measured, per claim or goal; NaN while there is nothing to measure.
+        holds: whether each claim or goal holds so far; None while there is nothing to measure.
+        truth: what the prediction is about, as measured.
+        grade: how the prediction did, after the run.
+        curves: per signal of the step; ghosts: the same of the second robot, where it was computed.
+        sketched: what a sketch is about.
+        result, points_for: of a challenge, after the run: the result and the number that gives its points.
+        lost_at: s, when the robot went out of control, which ends the run.
+    """
+
+    exercise: Exercise
+    phase: Phase
+    attempt: int
+    t: float
+    duration: float
+    answer: Answer | None = None
+    changed: str = ""
+    values: tuple[float, ...] = ()
+    holds: tuple[bool | None, ...] = ()
+    truth: float = float("nan")
+    grade: Grade | None = None
+    curves: tuple[Curve, ...] = ()
+    ghosts: tuple[Curve, ...] = ()
+    sketched: Curve | None = None
+    result: Result | None = None
+    points_for: float = float("nan")
+    lost_at: float | None = None

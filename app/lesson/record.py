@@ -1,0 +1,52 @@
+"""The rows of a run that is still going on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from himpc.telemetry import Layout
+
+BUCKETS = 120
+
+
+class Record:
+    """Telemetry rows since the run's start; `record[field]` is (ticks, width), like a finished recording."""
+
+    def __init__(self, layout: Layout, room: int, rows: np.ndarray | None = None) -> None:
+        """room: how many rows are expected; rows: those there are already."""
+        self._layout = layout
+        self._rows = np.empty((max(room, 1), layout.size)) if rows is None else rows
+        self._count = 0 if rows is None else len(rows)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, field: str) -> np.ndarray:
+        return self._rows[: self._count, self._layout.fields[field]]
+
+    def add(self, row: np.ndarray) -> None:
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[self._count] = row
+        self._count += 1
+
+    def until(self, t: float) -> Record:
+        """The rows up to a time, s."""
+        count = int(np.searchsorted(self["t"][:, 0], t + 1e-9, "right"))
+        return Record(self._layout, count, self._rows[:count])
+
+
+def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A curve with at most 2 · BUCKETS points: of each bucket the least and the greatest finite value, in the
+    order they came."""
+    if len(t) <= 2 * BUCKETS:
+        return t.copy(), values.copy()
+    size = -(-len(t) // BUCKETS)
+    known = np.isfinite(values)
+    low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
+    rest = size * BUCKETS - len(t)
+    low = np.concatenate([low, np.full(rest, np.inf)]).reshape(BUCKETS, size).argmin(axis=1)
+    high = np.concatenate([high, np.full(rest, -np.inf)]).reshape(BUCKETS, size).argmax(axis=1)
+    places = np.sort(np.arange(BUCKETS)[:, None] * size + np.stack([low, high], axis=1), axis=1).ravel()
+    places = places[places < len(t)]
+    return t[places], values[places]

@@ -1,0 +1,51 @@
+"""A window over the page, opened and closed by key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+
+class Window:
+    """Filled afresh each time it opens."""
+
+    def __init__(
+        self, gui: viser.GuiApi, title: str, hotkey: str, fill: Callable[[], None], shift: bool = False
+    ) -> None:
+        """hotkey: opens and closes it; shift: together with Shift."""
+        self._gui, self._title, self._fill = gui, title, fill
+        self._modal: Any = None  # viser does not name the type
+        command = gui.add_command(
+            title,
+            hotkey=hotkey,  # pyright: ignore[reportArgumentType]
+            modifier="shift" if shift else None,
+        )
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            if self._modal is None:
+                self.open()
+            else:
+                self.close()
+
+    def open(self) -> None:
+        if self._modal is not None:
+            return
+        self._modal = self._gui.add_modal(self._title)
+        with self._modal:
+            self._button()
+            self._fill()
+
+    def _button(self) -> None:
+        shut = self._gui.add_button("Close", color="gray")
+
+        @shut.on_click
+        async def _(_: object) -> None:
+            self.close()
+
+    def close(self) -> None:
+        modal, self._modal = self._modal, None
+        if modal is not None:
+            modal.close()

@@ -1,0 +1,33 @@
+"""Where a robot's links are, for the 3D view."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from robots import Robot
+
+
+class LinkPoses:
+    """Of joints 1 … n and the tip: (n + 1, 7), position, m, and quaternion wxyz."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._model = robot.model
+        self._data = robot.model.createData()
+        self._tip = robot.frame_id(robot.tip)
+        self._poses = np.zeros((robot.n + 1, 7))
+
+    def at(self, q: np.ndarray) -> np.ndarray | None:
+        """At joint positions q, in a buffer that the next call uses again; None if they are not finite."""
+        if not np.isfinite(q).all():
+            return None
+        pin.framesForwardKinematics(self._model, self._data, q)
+        for joint in range(1, self._model.njoints):
+            self._poses[joint - 1] = _pose(self._data.oMi[joint])
+        self._poses[-1] = _pose(self._data.oMf[self._tip])
+        return self._poses
+
+
+def _pose(placement: pin.SE3) -> np.ndarray:
+    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+    return np.array([*placement.translation, w, x, y, z])

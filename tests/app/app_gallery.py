@@ -1,0 +1,112 @@
+"""Walks through every lesson in a real browser and keeps what it saw: docs/lessons/NAME.webp and an index.
+
+python tests/app/app_gallery.py [NAME …] [--out docs/lessons]
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+from pathlib import Path
+
+from app_browser import CHROMIUM_ARGS, find_chromium, open_page
+from app_lessons import hurry, open_lesson, predict, run, title_of
+from PIL import Image, ImageDraw
+from playwright.sync_api import Page, sync_playwright
+
+from app.lesson.exercise import parts_of
+from app.messages import SceneChoice
+from app.server import PageServer
+from lessons.course import COURSE, load_lesson
+from lessons.lesson import Lesson, Step
+
+ROOT = Path(__file__).parents[2]
+WIDTH, HEIGHT = 1200, 920
+PLOTS = 404  # width of the panel on the left, which has nothing to show before a run
+SHOWN = 0.66  # of the pixels, in the pictures that are kept
+QUALITY = 36
+
+
+def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image]]:
+    """(title, before, after the run) of every step and of the challenge's start."""
+    open_lesson(page, lesson)
+    parts, found = parts_of(lesson), []
+    for part in parts:
+        if isinstance(part, Step) and part.prediction is not None:
+            predict(page, part.prediction)
+        before = look(page).crop((PLOTS, 0, WIDTH, HEIGHT))
+        hurry(page)
+        run(page, "Run this step" if isinstance(part, Step) else "Start the run")
+        found.append((title_of(part), before, look(page)))
+        if part is not parts[-1]:
+            page.get_by_role("button", name="Next: ").click()
+            page.get_by_text("DONE", exact=True).wait_for(state="detached")
+    return found
+
+
+def look(page: Page) -> Image.Image:
+    page.mouse.move(PLOTS + 100, HEIGHT - 20)  # or a hint would cover something
+    page.wait_for_timeout(1200)
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def sheet(screens: list[tuple[str, Image.Image, Image.Image]]) -> Image.Image:
+    """A row per step."""
+    line = 18
+    height = round(HEIGHT * SHOWN) + line
+    left = round((WIDTH - PLOTS) * SHOWN)
+    paper = Image.new("RGB", (left + round(WIDTH * SHOWN), len(screens) * height), "white")
+    pen = ImageDraw.Draw(paper)
+    for k, (title, before, after) in enumerate(screens):
+        for x, words, screen in ((0, "before", before), (left, "after", after)):
+            pen.text((x + 6, k * height + 3), f"{title}: {words} the run", fill="black")
+            size = (round(screen.width * SHOWN), height - line)
+            paper.paste(screen.resize(size, Image.Resampling.LANCZOS), (x, k * height + line))
+    return paper
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", default=list(COURSE))
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "lessons")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
+            page = open_page(browser, server.url, WIDTH, HEIGHT, scale=1.0)
+            for name in options.names:
+                lesson = load_lesson(name)
+                sheet(walk(page, lesson)).save(options.out / f"{name}.webp", quality=QUALITY, method=6)
+                print(f"{name}: {(options.out / f'{name}.webp').stat().st_size / 1000:.0f} kB", flush=True)
+            browser.close()
+    finally:
+        server.close()
+    write_index(options.out)
+
+
+def write_index(out: Path) -> None:
+    """A page with all pictures."""
+    lines = [
+        "# The lessons, walked through",
+        "",
+        "Every step before and after its run, as the page shows it. `python tests/app/app_gallery.py` makes",
+        "these pictures; the predictions are the tempting ones, so many of them are wrong.",
+    ]
+    for number, name in enumerate(COURSE, start=1):
+        if (out / f"{name}.webp").exists():
+            card = load_lesson(name).card
+            lines += [
+                "",
+                f"## {number}. {card.title}",
+                "",
+                card.question,
+                "",
+                f"![{card.title}]({name}.webp)",
+            ]
+    (out / "README.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

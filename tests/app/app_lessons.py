@@ -1,0 +1,68 @@
+"""How a learner goes through a lesson in the page: opens it, predicts, runs, reads, goes on."""
+
+from __future__ import annotations
+
+from app_browser import BETWEEN, key, press, row
+from playwright.sync_api import Locator, Page, expect
+
+from app.lesson.exercise import parts_of
+from lessons.challenge import Challenge
+from lessons.course import COURSE
+from lessons.lesson import Lesson, Step
+from lessons.prediction import Choice, Prediction, Sketch
+
+RUN = 120_000  # ms for a scripted run on a busy machine
+
+
+def open_lesson(page: Page, lesson: Lesson) -> None:
+    """By its card in the list of all lessons."""
+    label = f"{COURSE.index(lesson.name) + 1} · {lesson.card.title}"
+    key(page, "l")
+    page.locator(".mantine-Modal-content").get_by_role("button", name=label).click()
+    expect(page.get_by_text(f"Lesson {COURSE.index(lesson.name) + 1}: {lesson.card.title}")).to_be_visible()
+    expect_part(page, lesson, lesson.steps[0])
+
+
+def title_of(part: Step | Challenge) -> str:
+    return part.title if isinstance(part, Step) else "Challenge"
+
+
+def expect_part(page: Page, lesson: Lesson, part: Step | Challenge) -> None:
+    """The part is shown, and nothing of it has run."""
+    parts = parts_of(lesson)
+    expect(page.get_by_text(f"{parts.index(part) + 1} of {len(parts)}")).to_be_visible()
+    expect(page.get_by_text(title_of(part), exact=True).first).to_be_visible()
+    expect(page.get_by_text("DONE", exact=True)).to_have_count(0)
+
+
+def predict(page: Page, prediction: Prediction) -> None:
+    """Says something, as the controls allow."""
+    if isinstance(prediction, Choice):
+        press(page, "ABCDEFG"[prediction.tempting])
+        expect(page.get_by_text("(your answer)")).to_be_visible()
+        return
+    label = f"at {prediction.until / 5:.2g} s" if isinstance(prediction, Sketch) else "My guess"
+    thumb = row(page, label).get_by_role("slider")
+    thumb.focus()
+    for _ in range(5):
+        thumb.press("ArrowRight")
+        page.wait_for_timeout(BETWEEN)
+
+
+def hurry(page: Page) -> None:
+    """The run as fast as it goes."""
+    box = row(page, "As fast as it goes").get_by_role("checkbox")
+    if not box.is_checked():
+        box.click()
+        page.wait_for_timeout(BETWEEN)
+
+
+def run(page: Page, button: str = "Run this step") -> None:
+    """Presses the button and waits for the end."""
+    page.get_by_role("button", name=button, exact=True).click()
+    expect(page.get_by_text("DONE", exact=True)).to_be_visible(timeout=RUN)
+
+
+def marks(page: Page, sign: str) -> Locator:
+    """The claims or goals with a mark: "✓", "✗" or "…"."""
+    return page.get_by_text(sign, exact=True)

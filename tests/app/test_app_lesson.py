@@ -1,0 +1,215 @@
+"""Following a lesson without a page: the run, its judgement, the prediction, the ghost, the challenge."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from app.block import Block
+from app.body import Body
+from app.lesson.exercise import Curve, Exercise, Lecture
+from app.lesson.kinds import setting_at
+from app.lesson.record import BUCKETS, Record, thinned
+from app.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep, SceneChoice
+from himpc.telemetry import Layout
+from lessons.check import measured
+from lessons.course import COURSE, load_lesson
+from lessons.events import MoveTarget, Set
+from lessons.kinds import changed_any
+from lessons.lesson import Step
+from lessons.run import parse_assignment
+from robots import InputError
+
+
+class Learner:
+    """A body, driven by hand; `lecture` is the last that was reported."""
+
+    def __init__(self, exercise: Exercise) -> None:
+        self.body = Body(SceneChoice.of_lesson(exercise))
+        self.lecture = self.look()
+
+    def look(self) -> Lecture:
+        self.lecture = self.body.status().lecture or self.lecture
+        return self.lecture
+
+    def does(self, *commands: Command) -> Lecture:
+        for command in commands:
+            self.body.handle(command)
+        return self.look()
+
+    def runs(self, *commands: Command) -> Lecture:
+        """Commands, then everything until the run is over."""
+        self.does(*commands)
+        while not self.body.running:
+            self.body.settle()
+        while self.look().phase != "done":
+            self.body.tick()
+        return self.lecture
+
+
+@pytest.fixture
+def learn() -> Iterator[Callable[[str, int], Learner]]:
+    made: list[Learner] = []
+
+    def start(lesson: str, place: int = 0) -> Learner:
+        made.append(Learner(Exercise(lesson, place)))
+        return made[-1]
+
+    yield start
+    for learner in made:
+        learner.body.close()
+
+
+Start = Callable[..., Learner]
+
+
+def test_a_run_in_the_page_measures_what_the_headless_one_does(learn: Start) -> None:
+    """To the bit, ghost included; the report survives the pipe."""
+    learner = learn("your-robot", 2)
+    lesson = load_lesson("your-robot")
+    step = lesson.steps[2]
+    lecture = pickle.loads(pickle.dumps(learner.runs(RunStep(fast=True))))
+    run = lesson.run_of(step)
+    assert step.ghost is not None and step.claims[0].measure.over_ghost
+    alone = [claim.measure.alone for claim in step.claims]
+    own = measured((run, tuple(alone))).values
+    ghost = measured((run.but(*step.ghost.set), tuple(alone))).values
+    assert lecture.values == (own[alone[0]] / ghost[alone[0]], own[alone[1]])
+    assert lecture.holds == (True, True) and lecture.changed == "" and lecture.attempt == 1
+    assert lecture.t == pytest.approx(step.duration) and len(lecture.curves) == len(step.plots)
+    assert len(lecture.ghosts) == len(step.plots)
+
+
+def test_nothing_moves_before_the_prediction_and_marks_come_while_it_runs(learn: Start) -> None:
+    learner = learn("deadlines", 2)
+    step = load_lesson("deadlines").steps[2]
+    assert learner.lecture.phase == "waiting" and not learner.body.running
+    assert learner.lecture.holds == (None,) * len(step.claims)
+    learner.does(RunStep())
+    learner.does(Play(True))
+    learner.body.settle()
+    assert not learner.body.running and learner.body.ticks == 0
+    learner.does(Predict(1), RunStep())
+    while not learner.body.running:
+        learner.body.settle()
+    assert learner.body.pace == 1.0
+    learner.body.tick(600)
+    for _ in range(5):  # twice a second
+        learner.look()
+    assert learner.lecture.phase == "running" and 0.5 < learner.lecture.t < 0.7
+    assert None not in learner.lecture.holds and learner.lecture.grade is None
+    while learner.look().phase == "running":
+        learner.body.tick(20)
+    lecture = learner.lecture
+    assert lecture.grade is not None and lecture.grade.score in (0.0, 1.0) and math.isfinite(lecture.truth)
+    assert learner.body.running  # free play
+    learner.body.tick(50)
+    assert learner.look() is lecture  # what was measured stays
+
+
+def test_a_run_of_ones_own_is_called_that_and_leaves_the_prediction_alone(learn: Start) -> None:
+    learner = learn("one-task", 3)
+    first = learner.runs(Predict(0), RunStep(fast=True))
+    assert first.changed == "" and learner.body.pace == 1.0
+    own = learner.runs(Post(Set("damping", True)), RunStep(own=False, fast=True))
+    assert "settings" in own.changed and own.attempt == 2 and own.values != first.values
+    assert own.truth == first.truth and own.grade == first.grade
+    again = learner.runs(RunStep(own=True, fast=True))
+    assert again.changed == "" and again.values == first.values
+    learner.does(RunStep())
+    learner.body.tick(100)
+    learner.does(Post(MoveTarget("position", (0.4, 0.2))))
+    assert "moved" in learner.runs().changed
+    fresh = learner.does(ResetAll())
+    assert fresh.phase == "waiting" and fresh.answer is None and fresh.attempt == 0
+
+
+def test_a_robot_that_is_lost_ends_the_run_as_headless(learn: Start) -> None:
+    learner = learn("stretched-out", 0)
+    step = load_lesson("stretched-out").steps[0]
+    lecture = learner.runs(Predict(0), RunStep(fast=True))
+    values = measured((load_lesson("stretched-out").run_of(step), (step.claims[0].measure,))).values
+    assert lecture.values == tuple(values.values())
+    if lecture.lost_at is not None:
+        assert not learner.body.running and lecture.t < step.duration
+
+
+def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -> None:
+    learner = learn("a-redundant-arm", 0)
+    block, session = learner.body.block, learner.body.session
+    name = block.name
+    assert learner.body.handle(Load(SceneChoice.of_lesson(Exercise("a-redundant-arm", 2)))) is None
+    assert learner.body.block is block
+    lecture = learner.look()
+    assert lecture.exercise.place == 2 and lecture.phase == "waiting"
+    assert not learner.body.session.settings.levels[1].enabled  # the step's own settings
+    other = learner.body.handle(Load(SceneChoice.of_lesson(Exercise("one-task"))))
+    assert isinstance(other, Ready)
+    Block.for_robot(session.robot, session.layout.size, name).close(unlink=True)
+
+
+def test_a_challenge_is_graded_and_cannot_be_cheated(learn: Start) -> None:
+    name = "deadlines"
+    lesson = load_lesson(name)
+    challenge = lesson.challenge
+    assert challenge is not None
+    learner = learn(name, len(lesson.steps))
+    start = learner.runs(RunStep(fast=True))
+    assert start.result is not None and not start.result.passed
+    knobs = [Post(Set(*parse_assignment(each))) for each in challenge.solutions[0]]
+    good = learner.runs(*knobs, RunStep(fast=True))
+    assert good.result is not None and good.result.passed and good.result.score > 0 and not good.changed
+    run = lesson.run_of(challenge).but(*challenge.solutions[0])
+    assert good.points_for == measured((run, (challenge.score.measure,))).values[challenge.score.measure]
+    cheat = learner.runs(Post(Set("plant.delay_ms", 0.0)), RunStep(fast=True))
+    assert cheat.result is not None and "none of this challenge's" in cheat.changed
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_every_control_reads_what_it_sets(name: str) -> None:
+    lesson = load_lesson(name)
+    for part in (*lesson.steps, *([lesson.challenge] if lesson.challenge else [])):
+        settings = lesson.run_of(part).prepared().settings
+        for control in part.controls if isinstance(part, Step) else part.knobs:
+            for value in control.choices or (control.low, control.high):
+                now = setting_at(settings, control.path)
+                value = int(value) if isinstance(now, int) and not isinstance(now, bool) else value
+                assert setting_at(changed_any(settings, control.path, value), control.path) == value
+
+
+def test_what_a_script_changes_is_undone_before_the_next_run(learn: Start) -> None:
+    """Else a challenge whose script hangs on a load would begin with the load the second time."""
+    challenge = load_lesson("no-model-needed").challenge
+    assert challenge is not None and any(isinstance(event, Set) for _, event in challenge.events)
+    learner = learn("no-model-needed", 3)
+    first = learner.runs(RunStep(fast=True))
+    assert learner.body.session.settings != learner.body.scene.settings
+    second = learner.runs(RunStep(fast=True))
+    assert second.values == first.values and second.changed == first.changed == ""
+
+
+def test_an_unknown_lesson_is_one_sentence() -> None:
+    with pytest.raises(InputError, match="deadlines"):
+        SceneChoice.of_lesson(Exercise("deadline"))
+
+
+def test_thinning_keeps_every_spike() -> None:
+    t = np.linspace(0.0, 1.0, 5000)
+    values = np.sin(9 * t)
+    values[777], values[3210], values[:40] = 50.0, -50.0, np.nan
+    curve = Curve(*thinned(t, values))
+    assert len(curve.t) <= 2 * BUCKETS + 2 and 50.0 in curve.values and -50.0 in curve.values
+    assert (np.diff(curve.t) >= 0).all()
+
+
+def test_a_record_grows_and_can_be_cut() -> None:
+    layout = Layout(2, {"t": slice(0, 1), "x": slice(1, 2)}, (), (), ())
+    record = Record(layout, 3)
+    for k in range(10):
+        record.add(np.array([0.1 * k, k]))
+    assert record["x"][:, 0].tolist() == list(range(10))
+    assert record.until(0.35)["x"][:, 0].tolist() == [0, 1, 2, 3]

@@ -1,0 +1,81 @@
+"""Progress, texts, words and pictures of the lessons."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app.lesson.drawing import Bound, chart, figure, scale, sketch
+from app.lesson.exercise import Curve
+from app.lesson.glossary import explained, words
+from app.lesson.markdown import rendered, rendered_line
+from app.lesson.progress import Notebook, Progress, progress_from
+from app.panels.knobs import STEPS, place_of, value_at
+from lessons.course import COURSE, load_lesson
+
+
+def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
+    progress = Progress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("deadlines", 40.0)
+    progress = progress.with_points("deadlines", 30.0)
+    assert progress.best["deadlines"] == 40.0 and progress.next_place("deadlines", 4) == 1
+    assert progress.next_place("one-task", 4) == 0
+    assert progress_from(progress.dumped()) == progress
+    for text in (None, "", "{", "[]", "3", '{"seen": 3, "best": []}', "[" * 100_000):
+        assert progress_from(text) == Progress()
+    hostile = '{"seen": {"deadlines": [0, "1", -2, 1e9, true], "<b>": [1]}, "best": {"deadlines": 1e400}}'
+    assert progress_from(hostile) == Progress({"deadlines": frozenset({0})})
+
+
+def test_a_notebook_saves_only_what_is_new() -> None:
+    saved: list[str] = []
+    notebook = Notebook(Progress(), saved.append)
+    for _ in range(3):
+        notebook.note(notebook.progress.with_step("one-task", 1))
+    assert len(saved) == 1 and progress_from(saved[0]) == notebook.progress
+
+
+@pytest.mark.parametrize("name", COURSE)
+def test_every_text_renders(name: str) -> None:
+    lesson = load_lesson(name)
+    texts = [text for step in lesson.steps for text in (step.text, step.why, step.do)]
+    for text in (*texts, *([lesson.challenge.text] if lesson.challenge else [])):
+        html = rendered(text)
+        assert "$" not in html and "\ue000" not in html and "<pre>" not in html
+        assert html.count("<math") >= text.count("$$") // 2
+
+
+def test_texts_are_markdown_with_equations_and_explained_words() -> None:
+    html = rendered(r"The *level* has $a_1 < b_2$ and `level`; a level again.")
+    assert html.count("<abbr") == 1 and "<em><abbr" in html and "<code>level</code>" in html
+    assert "<math" in html and "&#x0003C;" in html
+    assert "&lt;script&gt;" in rendered("<script>") and "<p>" not in rendered_line("a *b*")
+    assert "<p><div" not in rendered("Before\n\n$$x = 1$$\n\nafter")
+
+
+def test_words_are_explained_outside_of_tags_only() -> None:
+    html = explained('<math><mi>plant</mi></math> <a title="plant">the plant</a>')
+    assert html.count("<abbr") == 1 and '<a title="plant">the <abbr' in html
+    assert {"level", "leak", "horizon", "plant", "M̄"} <= set(words())
+    assert all(sentence.endswith(".") for sentence in words().values())
+
+
+def test_places_of_a_logarithmic_slider_come_back() -> None:
+    for low, high in ((0.1, 40.0), (1e-5, 100.0), (0.1, 1e6)):
+        assert [place_of(value_at(k, low, high), low, high) for k in range(STEPS + 1)] == list(
+            range(STEPS + 1)
+        )
+
+
+def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
+    assert figure(0.012345, "mm") == "0.0123 mm" and figure(math.nan) == "–" and figure(30.0, "deg") == "30°"
+    assert figure(-2.5e-9) == "−2.5·10⁻⁹"
+    drawn = scale(0.1, 100.0, 5.0, 16.0, 1.5, "mm")
+    assert "your guess 5 mm" in drawn and "measured 16 mm" in drawn
+    assert "measured" not in scale(0.1, 100.0, 5.0, math.nan, 1.5, "mm")
+    curve = Curve(np.array([0.0, 0.5, 1.0]), np.array([math.nan, math.inf, 3.0]))
+    assert "nan" not in chart("error", "mm", curve, curve, [Bound(1.0, "<b>")], 1.0)
+    nothing = Curve(np.array([0.0]), np.array([math.nan]))
+    assert chart("error", "mm", nothing, None, [], 1.0) == ""
+    assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")
