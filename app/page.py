@@ -38,6 +38,7 @@ class Page:
         """by_path: whether this page may name files of the machine; loop: viser's event loop."""
         self.learner = learner
         self.on_dark: Callable[[bool], None] = lambda _: None
+        self.greet: Callable[[viser.GuiApi], None] = lambda _: None  # whenever the panel is built
         self._client = client
         self._dark = dark
         self._by_path = by_path
@@ -148,6 +149,7 @@ class Page:
         with self._client.atomic():
             self._client.scene.reset()
             self._client.gui.reset()
+            self.greet(self._client.gui)
             self._stage = Stage(
                 self._client,
                 self.learner,

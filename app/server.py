@@ -11,16 +11,18 @@ import socket
 import threading
 import warnings
 import webbrowser
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from urllib.parse import urlsplit
 
 import viser
 from viser import _messages, infra
 
 from app.body import scene_of
+from app.classroom import Classroom, Watcher
 from app.lesson.progress import Notebook, Progress, progress_from
 from app.messages import SceneChoice
 from app.page import Page
+from app.panels.watching import add_watching
 from app.runs import start
 from app.sessions import GRACE, Sessions
 from app.text import block
@@ -41,15 +43,21 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     max_sessions: int = 4,
+    classroom: bool = False,
     open_browser: bool = True,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host or port that
-    cannot be used."""
-    server = PageServer(choice, host, port, max_sessions)
+    cannot be used.
+
+    With `classroom` all pages show one session; who types the printed token into the page steers it.
+    """
+    server = PageServer(choice, host, port, max_sessions, classroom=classroom)
     stop = threading.Event()
     try:
         with _ended_by_signals(stop):
             print(f"himpc-lab ready at {server.url}", flush=True)
+            if isinstance(server.sessions, Classroom):
+                print(f"instructor's token: {server.sessions.token}", flush=True)
             if open_browser:
                 threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
             while not stop.wait(0.5):
@@ -84,6 +92,7 @@ class PageServer:
         port: int = 8080,
         max_sessions: int = 4,
         grace: float = GRACE,
+        classroom: bool = False,
     ) -> None:
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
@@ -92,7 +101,7 @@ class PageServer:
         _check_address(host, port)
         # A tab may close between two lines of ours; that is no news for the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
-        self.sessions = Sessions(choice, max_sessions, grace)
+        self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
         self._pages: dict[int, Page] = {}
         self._lock = threading.Lock()
         self._local = host in _LOOPBACK
@@ -147,12 +156,35 @@ class PageServer:
         client.local_storage.set_item(_TOKENS, json.dumps([*kept, learner.token]))
         page = Page(client, learner, dark, self._local, self._viser.get_event_loop(), notebook)
         page.on_dark = lambda on: client.local_storage.set_item(_DARK, "1" if on else "0")
+        if isinstance(learner, Watcher):
+            self._let_watch(client, page, learner, lambda given: self._admit(client, given, dark, notebook))
         with self._lock:
             self._pages[client.client_id] = page
         page.start()
         if client.client_id not in self._viser.get_clients():
             self._disconnect(client)  # left while we were building
         return True
+
+    def _let_watch(
+        self,
+        client: viser.ClientHandle,
+        page: Page,
+        watcher: Watcher,
+        admit: Callable[[list[str]], object],
+    ) -> None:
+        """A page that only watches, until it has the instructor's token."""
+
+        def take(token: str) -> bool:
+            right = isinstance(self.sessions, Classroom) and token == self.sessions.token
+            if right:
+                page.close()
+                admit([token])
+            return right
+
+        page.greet = lambda gui: add_watching(gui, take)
+        watcher.on_refusal = lambda sentence: client.add_notification(
+            "Not steered", sentence, color="orange", auto_close_seconds=4.0
+        )
 
     def _turn_away(
         self, client: viser.ClientHandle, tokens: list[str], dark: bool, notebook: Notebook

@@ -12,6 +12,7 @@ def serve(
     tip: str | None = None,
     state: str | None = None,
     max_sessions: int = 4,
+    classroom: bool = False,
     host: str = "127.0.0.1",
     port: int = 8080,
     no_browser: bool = False,
@@ -24,7 +25,8 @@ def serve(
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
         state: a state code, as the page shows it: its scene, robot, settings and seed.
-        max_sessions: how many people may use it at once.
+        max_sessions: how many people may use it at once, each with a robot of their own.
+        classroom: one robot for all pages; who has the printed token steers it.
         host: address to listen on; only this machine can reach the default.
         port: port to listen on.
         no_browser: do not open a browser.
@@ -52,5 +54,6 @@ def serve(
         host=host,
         port=port,
         max_sessions=max_sessions,
+        classroom=classroom,
         open_browser=not no_browser,
     )

@@ -1,0 +1,65 @@
+"""A classroom: one robot for all pages, steered by who has the token."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, cast
+
+import pytest
+from app_browser import open_page, press, write
+from playwright.sync_api import Browser, expect
+
+from app.classroom import STEERING, Classroom, Watcher
+from app.learner import Learner
+from app.messages import Play, SceneChoice
+from app.process import wait_until
+from app.server import PageServer
+
+
+@pytest.fixture(scope="module")
+def classroom() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("planar3-hold"), port=0, classroom=True)
+    yield running
+    running.close()
+
+
+def test_watchers_change_nothing() -> None:
+    sent: list[Any] = []
+
+    class Shown:
+        choice, settings = "a scene", "settings"
+
+        def send(self, command: object) -> None:
+            sent.append(command)
+
+    watcher = Watcher(cast(Learner, Shown()))
+    refused: list[str] = []
+    watcher.on_refusal = refused.append
+    watcher.send(Play(False))
+    watcher.reset_all()
+    watcher.restart()
+    watcher.stop_ghost()
+    assert sent == []
+    assert refused == [STEERING] * 4
+    assert (watcher.choice, watcher.settings) == ("a scene", "settings")
+    assert watcher.take_messages() == ([], [])
+
+
+def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
+    """A page without it sees the same robot and cannot stop it; with it the page can."""
+    assert isinstance(classroom.sessions, Classroom)
+    (learner,) = classroom.sessions.learners
+    page = open_page(browser, classroom.url, 1300, 700)
+    watching = page.get_by_text("you are watching")
+    expect(watching).to_be_visible()
+    press(page, "Pause")
+    expect(page.get_by_text(STEERING).first).to_be_attached()
+    assert learner.status is not None
+    assert learner.status.running
+    write(page, "Instructor's token", "wrong")
+    expect(page.get_by_text("That is not the token.")).to_be_visible()
+    write(page, "Instructor's token", classroom.sessions.token)
+    expect(watching).to_have_count(0)
+    press(page, "Pause")
+    assert wait_until(lambda: learner.status is not None and not learner.status.running, 60)
+    page.context.close()
