@@ -14,6 +14,9 @@ BUCKETS = 160  # in a window
 KEPT = 60.0  # s of simulated time that one can look back
 _SPAN = WINDOW / BUCKETS
 _SLOTS = round((KEPT + WINDOW) / _SPAN)
+_HELD = round(
+    1.0 / _SPAN
+)  # buckets without a row of their own that show the one before: a slow rate's period
 _SLOW = 0.85  # of the velocity limit: the controller keeps a few per cent free of its own
 
 Take = Callable[[np.ndarray], None]
@@ -23,6 +26,7 @@ class History:
     """Per bucket of simulated time and per column: the least and the greatest value, in the order they came,
     and the bucket's last row.
 
+    A row counts until the next one comes: of a controller slower than the buckets there is none in between.
     Buckets are aligned to simulated time, so that a curve slides instead of shimmering, and two robots on one
     clock have the same buckets. Each row is looked at once, whatever the window. A reset, which turns the
     time back, drops the curves: a jump in a curve would look like a motion.
@@ -71,6 +75,7 @@ class History:
             self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
         numbers = np.floor(rows[:, self._t] / _SPAN + 1e-6).astype(np.int64)
         for bucket in np.unique(numbers):
+            self._hold(int(bucket))
             of_bucket = numbers == bucket
             slot = self._merge(int(bucket), rows[of_bucket])
             self._bits[slot] |= np.bitwise_or.reduce(bits[of_bucket], axis=0)
@@ -84,6 +89,16 @@ class History:
         slow = np.abs(rows[:, fields["v"]]) < _SLOW * rows[:, fields["v_limit"]]
         by_position = (bits & AT_VELOCITY != 0) & slow
         return np.where(by_position, (bits & ~AT_VELOCITY) | AT_POSITION, bits)
+
+    def _hold(self, until: int) -> None:
+        """Fills the buckets since the newest one up to another one, which is left out."""
+        before = self.bucket % _SLOTS
+        if self.bucket < 0 or until - self.bucket > _HELD:
+            return
+        for bucket in range(self.bucket + 1, until):
+            slot = bucket % _SLOTS
+            self._numbers[slot], self._bits[slot] = bucket, self._bits[before]
+            self._pairs[slot] = self._lasts[slot] = self._lasts[before]
 
     def _merge(self, bucket: int, rows: np.ndarray) -> int:
         slot = bucket % _SLOTS
@@ -107,6 +122,7 @@ class History:
         """What the plots show when the clock reads `until` (s); None: now."""
         end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
         wanted = np.arange(end - BUCKETS + 1, end + 1)
+        wanted[(wanted > self.bucket) & (wanted <= self.bucket + _HELD)] = self.bucket
         slots = wanted % _SLOTS
         known = self._numbers[slots] == wanted
         known &= wanted >= 0

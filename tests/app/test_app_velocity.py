@@ -10,6 +10,7 @@ import pytest
 
 from app.body import Body
 from app.goals import free_name, open_row
+from app.history import History
 from app.messages import MissionView, Play, Post, Ready, ResetAll, SceneChoice, Status, Step
 from app.pacing import BACKLOG, Pacer
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
@@ -180,3 +181,22 @@ def test_a_fast_simulation_may_owe_as_much_real_time_as_a_slow_one() -> None:
     pacer.speed = 10.0
     assert pacer.due(0.05, 0.01) == 50 and not pacer.capped(0.05)
     assert pacer.due(5.0, 0.01) == round(10.0 * BACKLOG / 0.01) and pacer.capped(5.0)
+
+
+def test_a_row_counts_until_the_next_one_comes(body: Body) -> None:
+    """At 10 Hz a bucket of the plots in two has no row: the curve has no holes, and looking back finds it."""
+    body.tick(30)
+    layout = body.session.layout
+    history = History(body.block, layout)
+    history.pull()
+    t = layout.fields["t"]
+    times = history.window(3.0).columns(t)[:, 0]
+    known = times[np.isfinite(times)]
+    assert len(known) == 2 * round(3.0 / 0.05 + 1)
+    assert np.array_equal(np.unique(known), history_times(body)) and (np.diff(known) >= 0).all()
+    assert history.at(1.37)[t][0] == pytest.approx(1.3)
+    assert np.isnan(history.window(8.0).columns(t)[-1]).all()
+
+
+def history_times(body: Body) -> np.ndarray:
+    return body.block.since(0)[1][:, body.session.layout.fields["t"]][:, 0]
