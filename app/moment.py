@@ -62,34 +62,43 @@ def moment_of(learner: Learner, past: float | None) -> Moment | None:
     beside = None if ghost is None else ghost.look()
     if ghost is not None and (ghost.ready is None or ghost.ready.choice != learner.choice):
         beside = None  # still the ghost of another scene
-    if t is None or learner.status is None:
+    status = learner.status
+    if t is None or status is None:
         return None
     if past is not None:
         t = past
     elif beside is not None and 0.0 < t - beside < _FAR:
         t = beside  # a ghost shown later than the robot would look like one that follows badly
-    frame = learner.tape.at(t)
+    # Within `read` no other scene can come between what belongs together.
+    shown = t
     found = learner.read(
-        lambda _, history: (history.window(t), history.latest if past is None else history.at(t))
+        lambda _, history: (
+            learner.tape.at(shown),
+            history.window(shown),
+            history.latest if past is None else history.at(shown),
+            _way(learner, shown),
+        )
     )
-    if frame is None or found is None:
+    if found is None:
+        return None
+    frame, window, latest, way = found
+    if frame is None:
         return None
     return Moment(
         t=t,
         live=past is None,
         poses=frame.poses,
-        status=learner.status if past is None else frame.status or learner.status,
-        latest=found[1],
-        window=found[0],
-        way=_way(learner, t),
+        status=status if past is None else frame.status or status,
+        latest=latest,
+        window=window,
+        way=way,
         ghost=None if ghost is None or beside is None else _shade(ghost, t),
     )
 
 
 def _shade(ghost: Ghost, t: float) -> Shade | None:
-    frame = ghost.tape.at(t)
-    window = ghost.read(lambda _, history: history.window(t))
-    return None if frame is None or window is None else Shade(frame.poses, window, _way(ghost, t))
+    found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t)))
+    return None if found is None or found[0] is None else Shade(found[0].poses, found[1], found[2])
 
 
 def _way(simulation: Simulation, t: float) -> np.ndarray:

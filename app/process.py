@@ -33,6 +33,7 @@ class Process:
         theirs.close()
         self._sending = threading.Lock()
         self._closed = False
+        self._listening: threading.Thread | None = None
 
     @property
     def pid(self) -> int | None:
@@ -44,7 +45,8 @@ class Process:
 
     def listen(self, listener: Callable[[Report], None]) -> None:
         """Calls `listener` with every report, and with a last `Failed` if the child dies unasked."""
-        threading.Thread(target=self._hear, args=(self._pipe, listener), daemon=True).start()
+        self._listening = threading.Thread(target=self._hear, args=(self._pipe, listener), daemon=True)
+        self._listening.start()
 
     def _hear(self, pipe: Connection, listener: Callable[[Report], None]) -> None:
         failed = False
@@ -72,6 +74,9 @@ class Process:
         if self._child.is_alive():
             self._child.kill()
             self._child.join()
+        # What the child said last is still heard: it may name memory that must be freed.
+        if self._listening is not None and self._listening is not threading.current_thread():
+            self._listening.join(_END)
         self._pipe.close()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from typing import TypeVar
@@ -56,6 +57,7 @@ class Simulation:
     def _hear(self, process: Process, report: Report) -> None:
         with self._lock:
             if self._closed or process is not self._process:
+                _discard(report)
                 return
             match report:
                 case Ready():
@@ -118,3 +120,10 @@ class Simulation:
         self._process.close()
         with self._lock:
             self._free()
+
+
+def _discard(report: Report) -> None:
+    """Frees what came too late to be used."""
+    if isinstance(report, Ready):
+        with contextlib.suppress(FileNotFoundError):
+            Block.for_robot(report.robot, report.layout.size, report.block).close(unlink=True)

@@ -152,8 +152,8 @@ class Stage:
         if learner.status is not None:
             self._time_line.update(learner.status.running)
         moment = moment_of(learner, self._time_line.past)
-        if moment is None:
-            return
+        if moment is None or learner.ready is not self._ready:
+            return  # nothing yet, or already another scene, which the page will build
         with self._client.atomic():
             self._robot.move(moment.poses[:-1])
             self._show_ghost(moment)

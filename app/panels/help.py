@@ -12,7 +12,7 @@ _KEYS = (
     ("Space", "run or pause"),
     ("S", "a single control tick (pauses first)"),
     ("R", "robot back to its start, settings kept"),
-    ("← →", "while paused: look back and forward, with Shift in larger steps"),
+    ("J, L", "while paused: look back and forward, with Shift in larger steps"),
     ("G", "pull by hand or not: drag any link, the red arrow is the force"),
     ("L", "all lessons"),
     ("P, N, B", "in a lesson: play the step's script, next step, step before"),

@@ -33,7 +33,7 @@ class TimeLine:
             initial_value=0.0,
             visible=False,
             hint="Robot, targets, traces and plots as they were, up to a minute ago. "
-            f"← and →: {_SHORT:g} s, with Shift {_LONG:g} s.",
+            f"J and L: {_SHORT:g} s, with Shift {_LONG:g} s; in the slider also ← and →.",
         )
         self._live = gui.add_button("Back to now", visible=False)
         self._words = gui.add_html("", visible=False)
@@ -47,11 +47,12 @@ class TimeLine:
         async def _(_: object) -> None:
             self._set(0.0)
 
+        # The arrow keys turn viser's camera; these two are what video players have.
         for words, key, modifier, seconds in (
-            ("Look back a little", "arrowleft", None, -_SHORT),
-            ("Look forward a little", "arrowright", None, _SHORT),
-            ("Look back a second", "arrowleft", "shift", -_LONG),
-            ("Look forward a second", "arrowright", "shift", _LONG),
+            ("Look back a little", "J", None, -_SHORT),
+            ("Look forward a little", "L", None, _SHORT),
+            ("Look back a second", "J", "shift", -_LONG),
+            ("Look forward a second", "L", "shift", _LONG),
         ):
             self._hotkey(gui, words, key, modifier, seconds)
 

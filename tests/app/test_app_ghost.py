@@ -160,6 +160,18 @@ def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Callable
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
 
 
+def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Learner]) -> None:
+    """Ready is on its way while the learner leaves: nobody else would free the block it names."""
+    learner = start("planar3-hold")
+    learner.close()
+    late = Body(SceneChoice("planar3-hold"))
+    memory = Path("/dev/shm", late.block.name)
+    assert memory.exists()
+    learner._hear(learner._process, late.ready())
+    assert not memory.exists()
+    late.block.close()
+
+
 def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], Learner]) -> None:
     learner = start("planar3-hold")
     learner.start_ghost(Ghost("N = 1", ("horizon=1",)))

@@ -43,7 +43,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
 
     assert eventually(page, shows_now)
     for _ in range(20):
-        key(page, "Shift+ArrowLeft")
+        key(page, "Shift+J")
     expect(page.get_by_text("before the pause")).to_be_visible()
     assert eventually(page, lambda: not shows_now())
     assert eventually(page, lambda: not is_drawn(page, "/target") and is_drawn(page, "/target_then"))
