@@ -13,6 +13,12 @@ CHROMIUM_ARGS = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swi
 SLOW = 60_000  # ms: WebGL in software on two shared cores
 BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
 
+_SELDOM = """(() => {
+  const frame = window.requestAnimationFrame.bind(window);
+  window.requestAnimationFrame = (draw) => window.setTimeout(() => frame(draw), 300);
+  window.cancelAnimationFrame = (id) => window.clearTimeout(id);
+})()"""
+
 _PROJECT = """([name, at]) => {
   const m = window.__viserMutable, node = m.nodeRefFromName[name];
   node.updateWorldMatrix(true, false); m.camera.updateMatrixWorld(true);
@@ -34,6 +40,8 @@ def open_page(browser: Browser, url: str, width: int = 1300, height: int = 480, 
         device_scale_factor=scale,  # 0.5: a quarter of the pixels: they are drawn without a graphics card
     ).new_page()
     page.set_default_timeout(SLOW)
+    if seldom:
+        page.add_init_script(_SELDOM)
     load(page, url)
     return page
 

@@ -29,7 +29,7 @@ def school() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, school.url, 1000, 700)
+    opened = open_page(browser, school.url, 1000, 700, seldom=True)
     yield opened
     opened.context.close()
 
