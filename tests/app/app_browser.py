@@ -33,8 +33,19 @@ def find_chromium() -> str | None:
     return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
-def open_page(browser: Browser, url: str, width: int = 1300, height: int = 480, scale: float = 0.5) -> Page:
-    """A fresh browser profile with the page loaded and the robot drawn."""
+def open_page(
+    browser: Browser,
+    url: str,
+    width: int = 1300,
+    height: int = 480,
+    scale: float = 0.5,
+    seldom: bool = False,
+) -> Page:
+    """A fresh browser profile with the page loaded and the robot drawn.
+
+    seldom: three pictures a second, for tests that drag nothing in 3D. Without a graphics card every picture
+    takes both cores a tenth of a second.
+    """
     page = browser.new_context(
         viewport={"width": width, "height": height},
         device_scale_factor=scale,  # 0.5: a quarter of the pixels: they are drawn without a graphics card
