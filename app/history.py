@@ -126,7 +126,9 @@ class History:
         slots = wanted % _SLOTS
         known = self._numbers[slots] == wanted
         known &= wanted >= 0
-        return Window(self.layout, known, slots, self._pairs, self._bits)
+        # A control period longer than a bucket leaves some empty: what was last seen still holds there.
+        latest = np.maximum.accumulate(np.where(known, np.arange(BUCKETS), -1))
+        return Window(self.layout, latest >= 0, slots[np.maximum(latest, 0)], self._pairs, self._bits)
 
     def at(self, t: float) -> np.ndarray:
         """The row that was the newest one when the clock read t (s), as near as is known."""

@@ -12,7 +12,7 @@ from himpc.telemetry import Layout
 @dataclass(frozen=True)
 class Result:
     """seconds: of the run; rmse: per task, of ‖x̃‖, m or rad; torque_share: largest |τ| asked for over its
-    bound; unsolved: QPs; step_ms, slow_ms: the control step's median and 99th percentile, to 3 %."""
+    bound, NaN where no torque is asked for; unsolved: QPs; step_ms, slow_ms: the control step's median and 99th percentile, to 3 %."""
 
     seconds: float
     rmse: dict[str, float]
@@ -66,7 +66,7 @@ class Score:
     def _torque_share(self, rows: np.ndarray) -> float:
         fields = self._layout.fields
         if "tau_lower" not in fields:
-            return float("nan")
+            return 0.0
         tau = rows[:, fields["tau_demand"]]
         with np.errstate(all="ignore"):
             share = np.maximum(tau / rows[:, fields["tau_upper"]], tau / rows[:, fields["tau_lower"]])
@@ -83,7 +83,7 @@ class Score:
                 name: float(np.sqrt(total / self._known[name])) if self._known[name] else float("nan")
                 for name, total in self._squares.items()
             },
-            torque_share=self._share,
+            torque_share=self._share if "tau_lower" in self._layout.fields else float("nan"),
             unsolved=self._unsolved,
             step_ms=self._quantile(0.5),
             slow_ms=self._quantile(0.99),

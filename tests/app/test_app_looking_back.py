@@ -122,6 +122,19 @@ def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
     assert np.array_equal(found[0], found[1], equal_nan=True)
 
 
+def test_a_period_longer_than_a_bucket_leaves_no_gaps(layout: Layout) -> None:
+    block = Block(layout.size, 1)
+    history = History(block, layout)
+    for row in rows_at(layout, 0.12 * np.arange(20), "step_us", 1.0 + np.arange(20.0)):
+        block.write(row)
+    history.pull()
+    seen = history.window().columns(layout.fields["step_us"])[:, 0]
+    known = seen[np.isfinite(seen)]
+    assert len(known) == 2 * (1 + round(19 * 0.12 / 0.05 - 0.1)) and (np.diff(known) >= 0).all()
+    assert set(known) == set(1.0 + np.arange(20.0))
+    block.close(unlink=True)
+
+
 # ---------------------------------------------------------------- figures and files
 
 
