@@ -11,8 +11,15 @@ from himpc.telemetry import Layout
 
 @dataclass(frozen=True)
 class Result:
-    """seconds: of the run; rmse: per task, of ‖x̃‖, m or rad; torque_share: largest |τ| asked for over its
-    bound, NaN where no torque is asked for; unsolved: QPs; step_ms, slow_ms: the control step's median and 99th percentile, to 3 %."""
+    """How well a run went.
+
+    Attributes:
+        seconds: of the run.
+        rmse: per task, of ‖x̃‖, m or rad.
+        torque_share: largest |τ| asked for over its bound, NaN where no torque is asked for.
+        unsolved: QPs.
+        step_ms, slow_ms: the control step's median and 99th percentile, to 3 %.
+    """
 
     seconds: float
     rmse: dict[str, float]
