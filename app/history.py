@@ -126,9 +126,7 @@ class History:
         slots = wanted % _SLOTS
         known = self._numbers[slots] == wanted
         known &= wanted >= 0
-        # A control period longer than a bucket leaves some empty: what was last seen still holds there.
-        latest = np.maximum.accumulate(np.where(known, np.arange(BUCKETS), -1))
-        return Window(self.layout, latest >= 0, slots[np.maximum(latest, 0)], self._pairs, self._bits)
+        return Window(self.layout, known, slots, self._pairs, self._bits)
 
     def at(self, t: float) -> np.ndarray:
         """The row that was the newest one when the clock read t (s), as near as is known."""
@@ -152,11 +150,6 @@ class Window:
         self.layout = layout
         self._known, self._slots = known, slots
         self._pairs, self._bits = pairs, bits
-
-    @property
-    def empty(self) -> bool:
-        """Whether nothing at all was recorded in it."""
-        return not bool(self._known.any())
 
     def columns(self, which: slice) -> np.ndarray:
         """(2 · BUCKETS, k) of some columns; NaN where nothing was recorded."""
