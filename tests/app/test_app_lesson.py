@@ -165,7 +165,7 @@ def test_a_challenge_is_graded_and_cannot_be_cheated(learn: Start) -> None:
     assert good.result is not None and good.result.passed and good.result.score > 0 and not good.changed
     run = lesson.run_of(challenge).but(*challenge.solutions[0])
     assert good.points_for == measured((run, (challenge.score.measure,))).values[challenge.score.measure]
-    cheat = learner.runs(Post(Set("plant.delay_ms", 0.0)), RunStep(fast=True))
+    cheat = learner.runs(Post(Set("plant.payload_kg", 0.1)), RunStep(fast=True))
     assert cheat.result is not None and "none of this challenge's" in cheat.changed
 
 
