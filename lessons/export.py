@@ -73,7 +73,7 @@ import numpy as np
 '''
 
 _CAUTION = """
-Its deadlines were judged by measured computing times, so every repetition comes out a little different."""
+Measured computing times took part in it, so every repetition comes out a little different."""
 
 _IMPORTS = """from lessons.kinds import arrays_of, find_scene, prepared, run_scene, summary_of
 """
@@ -94,10 +94,13 @@ def _arguments(state: State) -> tuple[str | None, ...]:
 
 
 def _measures_time(settings: AnySettings, events: Log) -> bool:
-    """Whether a deadline was ever judged by the clock on the wall."""
+    """Whether the clock on the wall ever decided anything."""
     for event in (None, *(event for _, event in events)):
         settings = settings if event is None else settings_after(settings, (event,))
-        if isinstance(settings, SceneSettings) and settings.deadline_ms and not settings.solve_ms_per_knot:
+        if not isinstance(settings, SceneSettings):
+            if settings.delay_measured:
+                return True
+        elif settings.deadline_ms and not settings.solve_ms_per_knot:
             return True
     return False
 

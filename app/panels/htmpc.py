@@ -65,6 +65,15 @@ class HtmpcPanel:
                 lambda s: s.compensate_delay,
                 "Predict the measured state forward by the plant's lag before planning",
             )
+            add_box(
+                gui,
+                bindings,
+                settings,
+                "Delay as measured",
+                "delay_measured",
+                lambda s: s.delay_measured,
+                "Commands arrive later by the time that planning took, as on a robot that does not wait",
+            )
 
     def _menu(self, label: str, path: str, choices: tuple[str, ...], hint: str) -> None:
         read = (lambda s: s.controller) if path == "controller" else _of_htmpc(path)
@@ -209,12 +218,13 @@ class HtmpcPanel:
         step_ms, lag = 1e-3 * now.number("step_us"), settings.plant.latency_ms
         self._lag.content = block(
             f"Lag of the plant: <b>{lag:g} ms</b>{_compensated(settings)}. The last control step took "
-            f"{step_ms:.1f} ms of {1e3 * htmpc.period:.3g} ms; simulated time waits for it: it adds no lag."
+            f"{step_ms:.1f} ms of {1e3 * htmpc.period:.3g} ms; "
+            + ("the robot feels that, too." if settings.delay_measured else "simulated time waits for it.")
         )
 
 
 def _compensated(settings: MobileSettings) -> str:
-    if settings.plant.latency_ms == 0.0:
+    if settings.plant.latency_ms == 0.0 and not settings.delay_measured:
         return ""
     return ", predicted away" if settings.compensate_delay else ", not compensated"
 

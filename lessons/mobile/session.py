@@ -86,6 +86,7 @@ class MobileSession:
         self.plan: VelocityPlan | None = None
         self.controller: VelocityController | None = None
         self.diverged_at: float | None = None
+        self._solve_ms = 0.0
         self._commands: Commands | None = None
         self._commanded = self._input = np.zeros(self.robot.n)
         self._nearest = math.inf
@@ -145,7 +146,7 @@ class MobileSession:
 
     def _for_controller(self, settings: MobileSettings) -> HTMPCSettings:
         """The controller's settings for the levels of this tick."""
-        lag = 1e-3 * settings.plant.latency_ms if settings.compensate_delay else 0.0
+        lag = 1e-3 * settings.felt(self._solve_ms).latency_ms if settings.compensate_delay else 0.0
         hold = settings.htmpc.hold
         if settings.options.decoupled and self.progress.window:
             base = base_joints(self.robot)
@@ -226,7 +227,9 @@ class MobileSession:
             name: reference.preview(ahead, htmpc.dt, htmpc.horizon) for name, reference in references.items()
         }
         plan = controller.step(state.q, state.v, previews)
-        self.plan = plan
+        self.plan, self._solve_ms = plan, 1e-3 * plan.step_us
+        if (felt := settings.felt(self._solve_ms)) != self.plant.settings:
+            self.plant.configure(felt)
         row = self._row
         row.fill(np.nan)
         fields = self.layout.fields

@@ -38,6 +38,8 @@ class MobileSettings:
         htmpc: the controller's; its stack holds one level per role, and the mission's window orders them.
         controller: which of VELOCITY_CONTROLLERS.
         compensate_delay: predict the measured state forward by the plant's lag before planning.
+        delay_measured: a plan's commands arrive later by the time its computation really took, on top of
+            `plant.delay_ms`, as on a robot that does not wait; no two runs are the same then.
         plant: what the plant really is.
         options: the scene's own choices.
     """
@@ -45,6 +47,7 @@ class MobileSettings:
     htmpc: HTMPCSettings
     controller: str = "htmpc"
     compensate_delay: bool = True
+    delay_measured: bool = False
     plant: VelocityPlantSettings = field(default_factory=VelocityPlantSettings)
     options: MobileOptions = field(default_factory=Stay)
 
@@ -52,6 +55,12 @@ class MobileSettings:
         """Raises InputError for a controller that does not exist."""
         if self.controller not in VELOCITY_CONTROLLERS:
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
+
+    def felt(self, solve_ms: float) -> VelocityPlantSettings:
+        """The plant that the commands of a plan meet which took so many ms to compute."""
+        if not self.delay_measured:
+            return self.plant
+        return replace(self.plant, delay_ms=min(self.plant.delay_ms + solve_ms, LONGEST_DELAY))
 
     @property
     def levels(self) -> Stack:
@@ -75,8 +84,10 @@ class MobileSettings:
         return self.htmpc.delta_m if by_error else None
 
 
+LONGEST_DELAY = 1e3
+"""ms between a command and the plant at most."""
 _PARTS = ("limits", "plant")
-_OWN = ("controller", "compensate_delay")
+_OWN = ("controller", "compensate_delay", "delay_measured")
 _LEVEL_KEYS = ("Q", "enabled")
 _NOT_SETTABLE = ("stack", "limits", "obstacles", "delay_s")
 
@@ -85,9 +96,9 @@ def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
     """The settings with the value at a path replaced.
 
     Paths: a field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
-    "compensate_delay", the fields of the scene's options ("peak", "seats", …; "order" takes effect when a
-    run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation brings its own),
-    "levels.NAME.Q|enabled" with the level's name or its place 1 … r, and "obstacles.NAME" for a ball
+    "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order" takes
+    effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation brings its
+    own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r, and "obstacles.NAME" for a ball
     [x, y, z, radius], new or instead of the obstacle of that name.
 
     Raises:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from himpc.htmpc import HTMPC, VelocityPlan
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.kinds import find_scene, prepared
 from lessons.mobile.events import MobileEvent
@@ -156,3 +159,27 @@ def test_the_reach_circle_is_as_wide_as_the_arm_is_long() -> None:
     fields = made.layout.fields
     away = np.linalg.norm(row[fields["x/ee"]][:2] - row[fields["x/base"]])
     assert 0.95 * reach < away <= reach + 1e-3
+
+
+def test_the_robot_feels_the_time_of_planning_if_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The commands of a plan arrive later by what its computation took; the controller expects what the one
+    before took; switched off, the plant is as it was set."""
+    made = session("ridgeback-ur10-square", "delay_measured=true", "plant.delay_ms=10")
+    solve = HTMPC.step
+    taken = iter((20_000.0, 60_000.0, 5e9, 20_000.0))
+
+    def slow(self: HTMPC, *args: Any) -> VelocityPlan:
+        return solve(self, *args)._replace(step_us=next(taken))
+
+    monkeypatch.setattr(HTMPC, "step", slow)
+    felt, expected = [], []
+    for _ in range(3):
+        made.tick()
+        felt.append(made.plant.settings.delay_ms)
+        assert made.controller is not None
+        expected.append(made.controller.settings.delay_s)
+    assert felt == [30.0, 70.0, 1000.0]
+    assert expected == pytest.approx([0.01, 0.03, 0.07])
+    made.post(Set("delay_measured", False))
+    made.tick()
+    assert made.plant.settings == made.settings.plant
