@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from lessons.kinds import AnyScene, AnySession, AnySettings
+from lessons.control import Control
+from lessons.kinds import AnyScene, AnySession, AnySettings, changed_any
 from lessons.mobile.session import MobileSession
 from lessons.mobile.settings import value_at as mobile_value_at
 from lessons.scene import Scene
@@ -29,3 +30,16 @@ def setting_at(settings: AnySettings, path: str) -> Any:
     if isinstance(settings, SceneSettings):
         return value_at(settings, path)
     return mobile_value_at(settings, path)
+
+
+def chosen(settings: AnySettings, control: Control) -> Any:
+    """Which of a control's choices the settings have: the one that would change nothing; None if none is."""
+    fitting = (each for each in control.choices if changed_any(settings, control.path, each) == settings)
+    return next(fitting, None)
+
+
+def within(settings: AnySettings, control: Control) -> bool:
+    """Whether a setting stands where its control could have put it."""
+    if control.choices:
+        return chosen(settings, control) is not None
+    return control.takes(setting_at(settings, control.path))

@@ -14,7 +14,7 @@ import numpy as np
 
 from app.lesson.exercise import Answer, Curve, Exercise, Lecture, Phase, signals_of
 from app.lesson.ghost import ghost_of
-from app.lesson.kinds import mission_over, setting_at
+from app.lesson.kinds import mission_over, setting_at, within
 from app.lesson.record import Record, thinned
 from lessons.challenge import Challenge
 from lessons.kinds import AnyEvent, AnySession, AnySettings, changed_any, settings_after
@@ -152,7 +152,7 @@ class Lecturer:
         for knob in self._part.knobs:
             value: Any = setting_at(now, knob.path)
             if value != setting_at(self._own, knob.path):
-                if not knob.takes(value):
+                if not within(now, knob):
                     return f"{knob.words} is outside the range this challenge allows."
                 allowed = changed_any(allowed, knob.path, value)
         return "" if allowed == now else "A setting was changed that is none of this challenge's."

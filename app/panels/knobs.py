@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from app.lesson.drawing import figure
-from app.lesson.kinds import setting_at
+from app.lesson.kinds import chosen, setting_at
 from app.panels.bind import Bindings, scalar
 from lessons.control import Control
 from lessons.events import Set
@@ -40,7 +40,7 @@ def add_control(
 ) -> None:
     """The control, showing what the settings have and posting what the learner sets."""
     now = setting_at(settings, control.path)
-    if set(control.choices) == {False, True}:
+    if control.choices == (False, True):
         switch = gui.add_checkbox(control.words, bool(now))
         bindings.bind(
             switch,
@@ -48,12 +48,14 @@ def add_control(
             lambda value: Set(control.path, bool(value)),
         )
     elif control.choices:
-        of = {str(choice): choice for choice in control.choices}
-        menu = gui.add_dropdown(control.words, tuple(of), initial_value=str(now) if str(now) in of else None)
+        of = {_words(choice): choice for choice in control.choices}
+        menu = gui.add_dropdown(
+            control.words, tuple(of), initial_value=_shown(settings, control, next(iter(of)))
+        )
         bindings.bind(
             menu,
             # What the menu does not offer cannot be shown in it.
-            lambda s: _offered(str(setting_at(s, control.path)), of, str(menu.value)),
+            lambda s: _shown(s, control, str(menu.value)),
             lambda value: Set(control.path, of[str(value)]),
         )
     elif control.log:
@@ -75,8 +77,16 @@ def add_control(
         )
 
 
-def _offered(value: str, of: dict[str, Any], shown: str) -> str:
-    return value if value in of else shown
+def _words(value: Any) -> str:
+    """A choice in a menu."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_words, value))
+    return figure(value) if isinstance(value, float) else str(value)
+
+
+def _shown(settings: AnySettings, control: Control, otherwise: str) -> str:
+    found = chosen(settings, control)
+    return otherwise if found is None else _words(found)
 
 
 def _inside(value: float, control: Control) -> Any:

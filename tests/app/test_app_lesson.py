@@ -12,7 +12,7 @@ import pytest
 from app.block import Block
 from app.body import Body
 from app.lesson.exercise import Curve, Exercise, Lecture
-from app.lesson.kinds import setting_at
+from app.lesson.kinds import chosen, setting_at
 from app.lesson.record import BUCKETS, Record, thinned
 from app.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep, SceneChoice
 from himpc.telemetry import Layout
@@ -175,9 +175,10 @@ def test_every_control_reads_what_it_sets(name: str) -> None:
     for part in (*lesson.steps, *([lesson.challenge] if lesson.challenge else [])):
         settings = lesson.run_of(part).prepared().settings
         for control in part.controls if isinstance(part, Step) else part.knobs:
-            for value in control.choices or (control.low, control.high):
-                now = setting_at(settings, control.path)
-                value = int(value) if isinstance(now, int) and not isinstance(now, bool) else value
+            for choice in control.choices:
+                assert chosen(changed_any(settings, control.path, choice), control) == choice
+            for end in () if control.choices else (control.low, control.high):
+                value = int(end) if type(setting_at(settings, control.path)) is int else end
                 assert setting_at(changed_any(settings, control.path, value), control.path) == value
 
 
