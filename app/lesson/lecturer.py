@@ -202,6 +202,8 @@ class Lecturer:
     def _ghost_so_far(self) -> Record | None:
         if self._ghost is None or not len(self._record) or not len(self._ghost.record):
             return None
+        if self._phase == "done":  # a mission may take one of the two longer than the other
+            return self._ghost.record
         return self._ghost.record.until(float(self._record["t"][-1, 0]))
 
     def _words_of_change(self) -> str:
