@@ -9,11 +9,11 @@ import viser
 
 from app.learner import Learner
 from app.lesson.progress import Notebook
-from app.messages import Post, SceneChoice
+from app.messages import SceneChoice
 from app.panels.cards import add_cards, add_invitation
 from app.panels.lesson import LessonPanel
 from app.panels.window import Window
-from lessons.kinds import AnyEvent, AnySettings
+from lessons.kinds import AnySettings
 
 
 class Course:
@@ -47,8 +47,7 @@ class Course:
             tabs.add_tab("Lesson"),
             pictures,
             exercise,
-            self._learner.send,
-            self._post,
+            self._learner,
             self._choose,
             self._list.open,
             self._notebook,
@@ -61,9 +60,6 @@ class Course:
         if self._panel is None:
             with tabs.add_tab("Lessons"):
                 self._fill()
-
-    def _post(self, event: AnyEvent) -> None:
-        self._learner.send(Post(event))
 
     def _fill(self) -> None:
         add_cards(self._gui, self._notebook, self._leave_for)

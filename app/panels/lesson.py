@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 
 import viser
 
+from app.learner import Learner
 from app.lesson.exercise import Exercise, Lecture, parts_of
 from app.lesson.progress import Notebook
-from app.messages import Command, Predict, ResetAll, RunStep, SceneChoice
+from app.messages import Post, Predict, ResetAll, RunStep, SceneChoice
 from app.palette import LEVELS
 from app.panels.asking import Asking
-from app.panels.bind import Bindings, Post
+from app.panels.bind import Bindings
 from app.panels.knobs import add_control
 from app.panels.verdict import after, heading, idea, pictures, state
 from lessons.challenge import Challenge
-from lessons.kinds import AnySettings
+from lessons.kinds import AnyEvent, AnySettings
 from lessons.lesson import Step
 
 _AGAIN, _MINE, _RESET = "Run again", "Run with my settings", "Reset this step"
@@ -32,8 +34,7 @@ class LessonPanel:
         tab: viser.GuiTabHandle,
         pictures: viser.GuiHtmlHandle,
         exercise: Exercise,
-        send: Callable[[Command], None],
-        post: Post,
+        learner: Learner,
         choose: Callable[[SceneChoice], None],
         all_lessons: Callable[[], None],
         notebook: Notebook,
@@ -42,9 +43,9 @@ class LessonPanel:
     ) -> None:
         """pictures: where the curves of the run are drawn."""
         self._gui, self._tab, self._pictures, self._loop = gui, tab, pictures, loop
-        self._send, self._post, self._choose = send, post, choose
+        self._learner, self._send, self._choose = learner, learner.send, choose
         self._all_lessons, self._notebook, self._settings = all_lessons, notebook, settings
-        self._fast = False
+        self._fast = self._beside = False
         self._turn_to(exercise)
         for label, key, does in (
             ("Lesson: run this step", "P", self.run),
@@ -59,6 +60,9 @@ class LessonPanel:
         @command.on_trigger
         async def _(_: object) -> None:
             does()
+
+    def _post(self, event: AnyEvent) -> None:
+        self._send(Post(event))
 
     # ---------------------------------------------------------------- building
 
@@ -95,6 +99,12 @@ class LessonPanel:
                 for control in part.controls:
                     add_control(gui, self._bindings, control, self._settings())
             self._rerun = gui.add_button_group("The script", (_AGAIN, _MINE, _RESET))
+        self._second = gui.add_checkbox(
+            "Ghost in the scene",
+            self._beside,
+            visible=isinstance(part, Step) and part.ghost is not None,
+            hint="The second robot, translucent, in the same scene. Both start again together.",
+        )
         self._where = gui.add_button_group("Lesson", (_BACK, _SKIP, _ALL), hint="Keys B, N and L")
         self._listen()
 
@@ -108,6 +118,12 @@ class LessonPanel:
             if event.client is not None:
                 self._fast = bool(self._hurry.value)
 
+        @self._second.on_update
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # in a thread: processes begin and end
+            if event.client is not None:
+                self._beside = bool(self._second.value)
+                self._show_ghost()
+
         @self._next.on_click
         async def _(_: object) -> None:
             self.next()
@@ -120,6 +136,14 @@ class LessonPanel:
         @self._where.on_click
         async def _(_: object) -> None:
             {_BACK: self.back, _SKIP: self.next, _ALL: self._all_lessons}[str(self._where.value)]()
+
+    def _show_ghost(self) -> None:
+        """Sees to it that the ghost in the scene is this step's, if one is wanted."""
+        ghost = self._part.ghost if isinstance(self._part, Step) else None
+        if ghost is not None and self._beside:
+            self._learner.start_ghost(ghost)
+        elif self._learner.ghost is not None:
+            self._learner.stop_ghost()
 
     def _next_label(self) -> str:
         lesson = self._exercise.whole
@@ -168,6 +192,8 @@ class LessonPanel:
             self._bindings.close()
             self._all.remove()
             self._turn_to(lecture.exercise)
+            if self._beside:
+                threading.Thread(target=self._show_ghost, daemon=True).start()
         if lecture is not self._lecture:
             self._lecture = lecture
             self._note(lecture)
