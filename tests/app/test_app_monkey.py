@@ -1,0 +1,21 @@
+"""A minute of a user who tries everything in no order."""
+
+from __future__ import annotations
+
+from monkey import StandardError, walk
+from playwright.sync_api import Browser
+
+from app.messages import SceneChoice
+from app.server import PageServer
+
+
+def test_a_minute_of_anything_breaks_nothing(browser: Browser) -> None:
+    with StandardError() as said:
+        server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+        try:
+            found = walk(browser, server, minutes=1.0, seed=0, complaints=said.read)
+        finally:
+            server.close()
+    assert found.faults == []
+    assert found.rows > 0
+    assert sum(found.actions.values()) > 3
