@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 
 from robots.errors import InputError, unknown_name
@@ -33,7 +36,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise unknown_name("command", name, COMMANDS, "see himpc-lab --help")
         if name == "serve" and arguments[:1] in (["-h"], ["--help"]):
             _print_commands()
-        return _call(name, arguments)
+        with _terminated_is_interrupted():
+            return _call(name, arguments)
     except InputError as error:
         print(f"himpc-lab: {error}", file=sys.stderr)
         return 2
@@ -43,6 +47,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader of our output has gone (e.g. `| head`): nothing is left to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+@contextmanager
+def _terminated_is_interrupted() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does: what is done is kept, and no process is left behind."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _call(name: str, arguments: list[str]) -> int:

@@ -96,9 +96,10 @@ def gone(group: int, within: float) -> bool:
     return False
 
 
-def test_a_sweep_stopped_by_ctrl_c_carries_on(tmp_path: Path) -> None:
-    """Interrupted like from a terminal: it says how far it got, leaves no process behind, and the same
-    command ends in the same results as an uninterrupted one."""
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals) -> None:
+    """Interrupted like from a terminal, or told to end: it says how far it got, leaves no process
+    behind, and the same command ends in the same results as an uninterrupted one."""
     # Cells long enough that the second is not done when the first is seen.
     what = ["planar3-circle", "--over", "Q=100:200:6", "--duration", "0.4"]
     command = [sys.executable, "-m", "app", "sweep", *what, "--out"]
@@ -115,7 +116,10 @@ def test_a_sweep_stopped_by_ctrl_c_carries_on(tmp_path: Path) -> None:
     give_up = time.monotonic() + 120
     while not cells(part) and time.monotonic() < give_up:
         time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)
+    if stop == signal.SIGINT:
+        os.killpg(process.pid, stop)
+    else:
+        process.send_signal(stop)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "the same command carries on" in err
