@@ -32,6 +32,7 @@ def example_urdf() -> Callable[[str], str]:
     return find
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """For `-n`: all tests of the page share one browser, those of another file its fixtures."""
     for item in items:
