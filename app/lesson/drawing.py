@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -21,10 +22,19 @@ def figure(value: float, unit: str = "") -> str:
     if not math.isfinite(value):
         return "–"
     size = abs(value)
-    number = f"{value:.3g}" if 1e-3 <= size < 1e5 or size == 0 else _power(value)
+    if size == 0 or 1e-3 <= size < 1e5:
+        number = f"{value:.0f}" if size >= 999.5 else f"{value:.3g}"
+    else:
+        number = _power(value)
     return f"{number} {unit}".rstrip().replace(" deg", "°").replace("-", "−")
 
 
+def readable(words: str) -> str:
+    """A sentence whose numbers and units are written as `figure` does."""
+    return _EXPONENT.sub(lambda found: figure(float(found[0])), words).replace(" deg", "°")
+
+
+_EXPONENT = re.compile(r"-?\d+(?:\.\d+)?e[+-]\d+")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -157,7 +167,9 @@ def _axis(values: np.ndarray, marks: list[float]) -> Axis:
             min([float(np.quantile(above, 0.02)), *(mark for mark in marks if mark > 0)]), 1e-8 * high
         )
         return math.floor(math.log10(least)), math.ceil(math.log10(high)), True
-    low = min(low, 0.0) if low > -1e-12 or high > 0 else low
+    low = min(low, 0.0)
+    if low > -0.02 * high:
+        low = 0.0  # a touch of undershoot would only blur where zero is
     room = 0.06 * (high - low) or 1.0
     return (low if low == 0 else low - room), high + room, False
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from app.lesson.drawing import figure, scale, sketch
+from app.lesson.drawing import figure, readable, scale, sketch
 from app.lesson.exercise import Answer, Lecture
 from app.lesson.markdown import rendered_line
 from app.palette import BAD, GOOD, LEVELS, css
@@ -138,7 +138,7 @@ class Asking:
             )
             html += (
                 self._pictured(lecture)
-                + f"<div>{badge(word, colour)} {rendered_line(grade.words.replace(' deg', '°'))}</div>"
+                + f"<div>{badge(word, colour)} {rendered_line(readable(grade.words))}</div>"
             )
         else:
             html += self._pictured(None)

@@ -65,14 +65,14 @@ def after(part: Part, lecture: Lecture) -> str:
         return ""
     return block(
         f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0"
-    ) + block(
-        f"<b>Now you:</b> {rendered_line(part.do)}"
-        f'<div style="opacity:0.75">The robot is free now; the marks above judge {_judged_on(lecture)}.</div>'
-    )
+    ) + block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
 
 
-def _judged_on(lecture: Lecture) -> str:
-    return "your last run" if lecture.changed else "the scripted run"
+def _free(lecture: Lecture) -> str:
+    judged = "your last run" if lecture.changed else "the scripted run"
+    if lecture.lost_at is not None:
+        return f"The robot stands where it was lost: run again. The marks above judge {judged}."
+    return f"The robot is free now; the marks above judge {judged}."
 
 
 def _progress(lecture: Lecture) -> str:

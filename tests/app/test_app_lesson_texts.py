@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app.lesson.drawing import Bound, chart, figure, scale, sketch
+from app.lesson.drawing import Bound, chart, figure, readable, scale, sketch
 from app.lesson.exercise import Curve
 from app.lesson.glossary import explained, words
 from app.lesson.markdown import rendered, rendered_line
@@ -70,6 +70,8 @@ def test_places_of_a_logarithmic_slider_come_back() -> None:
 
 def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     assert figure(0.012345, "mm") == "0.0123 mm" and figure(math.nan) == "–" and figure(30.0, "deg") == "30°"
+    assert figure(3850.0, "%") == "3850 %" and figure(2e5) == "2·10⁵"
+    assert readable("It was 3.56e+03 %, not 2.1e-07 deg.") == "It was 3560 %, not 2.1·10⁻⁷°."
     assert figure(-2.5e-9) == "−2.5·10⁻⁹"
     drawn = scale(0.1, 100.0, 5.0, 16.0, 1.5, "mm")
     assert "your guess 5 mm" in drawn and "measured 16 mm" in drawn
