@@ -30,11 +30,3 @@ def example_urdf() -> Callable[[str], str]:
         pytest.skip(f"{path} of example-robot-data is not installed: pip install -e '.[meshes]'")
 
     return find
-
-
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """For `-n`: all tests of the page share one browser, those of another file its fixtures."""
-    for item in items:
-        group = "page" if item.path.parent.name == "app" else item.path.stem
-        item.add_marker(pytest.mark.xdist_group(group))
