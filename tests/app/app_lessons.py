@@ -30,7 +30,7 @@ def title_of(part: Step | Challenge) -> str:
 def expect_part(page: Page, lesson: Lesson, part: Step | Challenge) -> None:
     """The part is shown, and nothing of it has run."""
     parts = parts_of(lesson)
-    expect(page.get_by_text(f"{parts.index(part) + 1} of {len(parts)}")).to_be_visible()
+    expect(page.get_by_text(f"{parts.index(part) + 1} of {len(parts)}")).to_be_visible(timeout=RUN)
     expect(page.get_by_text(title_of(part), exact=True).first).to_be_visible()
     expect(page.get_by_text("DONE", exact=True)).to_have_count(0)
 

@@ -8,7 +8,9 @@ import numpy as np
 from app_browser import eventually, is_drawn, key, position, press, row, tab
 from playwright.sync_api import Page, expect
 
+from app.messages import Post
 from app.server import PageServer
+from lessons.events import MoveTarget
 
 
 def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
@@ -27,10 +29,11 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     expect(page.get_by_text("position [mm], ghost")).to_be_visible()
     expect(page.get_by_text("99 % below")).to_be_visible()
 
-    # A push moves both; then time stands and the view goes back to before it.
-    tab(page, "Start")
-    press(page, "+y")
-    assert eventually(page, lambda: abs(position(page, "/actual")[1]) > 2e-3)
+    # Both follow the target aside; then time stands and the view goes back to before that.
+    assert learner.status is not None
+    x, y, z = learner.status.targets["position"]
+    learner.send(Post(MoveTarget("position", (float(x), float(y) + 0.08, float(z)))))
+    assert eventually(page, lambda: abs(position(page, "/actual")[1]) > 0.04)
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 1.5)
     key(page, "Space")
     assert eventually(page, lambda: learner.status is not None and not learner.status.running)
