@@ -11,7 +11,8 @@ from pathlib import Path
 
 from app_browser import CHROMIUM_ARGS, find_chromium, open_page
 from app_lessons import hurry, open_lesson, predict, run, title_of
-from PIL import Image, ImageDraw
+from matplotlib.font_manager import findfont
+from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Page, sync_playwright
 
 from app.lesson.exercise import parts_of
@@ -23,8 +24,8 @@ from lessons.lesson import Lesson, Step
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT = 1200, 920
 PLOTS = 404  # width of the panel on the left, which has nothing to show before a run
-SHOWN = 0.66  # of the pixels, in the pictures that are kept
-QUALITY = 36
+SHOWN = 0.58  # of the pixels, in the pictures that are kept
+QUALITY = 32
 
 
 def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image]]:
@@ -56,10 +57,10 @@ def sheet(screens: list[tuple[str, Image.Image, Image.Image]]) -> Image.Image:
     height = round(HEIGHT * SHOWN) + line
     left = round((WIDTH - PLOTS) * SHOWN)
     paper = Image.new("RGB", (left + round(WIDTH * SHOWN), len(screens) * height), "white")
-    pen = ImageDraw.Draw(paper)
+    pen, font = ImageDraw.Draw(paper), ImageFont.truetype(findfont("DejaVu Sans"), 12)
     for k, (title, before, after) in enumerate(screens):
         for x, words, screen in ((0, "before", before), (left, "after", after)):
-            pen.text((x + 6, k * height + 3), f"{title}: {words} the run", fill="black")
+            pen.text((x + 6, k * height + 3), f"{title}: {words} the run", fill="black", font=font)
             size = (round(screen.width * SHOWN), height - line)
             paper.paste(screen.resize(size, Image.Resampling.LANCZOS), (x, k * height + line))
     return paper

@@ -42,11 +42,12 @@ def predict(page: Page, prediction: Prediction) -> None:
         expect(page.get_by_text("(your answer)")).to_be_visible()
         return
     label = f"at {prediction.until / 5:.2g} s" if isinstance(prediction, Sketch) else "My guess"
-    thumb = row(page, label).get_by_role("slider")
-    thumb.focus()
-    for _ in range(5):
-        thumb.press("ArrowRight")
-        page.wait_for_timeout(BETWEEN)
+    # Not by arrow keys: viser turns the camera with them, too.
+    track = row(page, label).locator(".mantine-Slider-trackContainer")
+    box = track.bounding_box()
+    assert box is not None
+    track.click(position={"x": 0.62 * box["width"], "y": 0.5 * box["height"]})
+    page.wait_for_timeout(BETWEEN)
 
 
 def hurry(page: Page) -> None:
