@@ -49,7 +49,7 @@ class CircleOptions(SceneOptions):
 
     def __post_init__(self) -> None:
         value = self.q1_amplitude_deg
-        if isinstance(value, tuple) or not abs(value) <= 360:
+        if not abs(value) <= 360:
             raise InputError(f"q1_amplitude_deg is {value}: give a number from -360 to 360, in degrees")
 
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:

@@ -165,8 +165,8 @@ def test_settings_before_a_reset_become_settings_of_the_script() -> None:
 
 def test_a_script_of_measured_deadlines_says_that_it_cannot_repeat() -> None:
     measured = [(0.1, Set("solve_ms_per_knot", 0.0)), (0.2, Set("deadline_ms", 1.0))]
-    assert "measured" in script(State("planar3-hold"), measured, 0.5)
-    assert "measured" not in script(State("planar3-hold"), measured[:1], 0.5)
+    assert "Measured computing times" in script(State("planar3-hold"), measured, 0.5)
+    assert "Measured computing times" not in script(State("planar3-hold"), measured[:1], 0.5)
 
 
 def test_a_robot_from_a_file_and_its_tip_are_named(tmp_path: Path) -> None:

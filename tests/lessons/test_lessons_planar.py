@@ -249,7 +249,7 @@ def test_options_are_settings() -> None:
         (circle, "q1_amplitude", 3.0, "did you mean 'q1_amplitude_deg'"),
         (circle, "smooth", True, "There is no setting 'smooth'"),
         (circle, "q1_amplitude_deg", "far", "give a number"),
-        (circle, "q1_amplitude_deg", [1.0, 2.0], "give a number from -360 to 360"),
+        (circle, "q1_amplitude_deg", [1.0, 2.0], "give a number"),
         (circle, "q1_amplitude_deg", 1e6, "give a number from -360 to 360"),
         (singular, "smooth", 1, "give true or false"),
     ):
