@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.block import Block
+from app.choice import SceneChoice
 from app.leader import Leader
 from app.lesson.lecturer import Lecturer
 from app.messages import (
@@ -24,7 +25,6 @@ from app.messages import (
     Report,
     ResetAll,
     RunStep,
-    SceneChoice,
     Speed,
     Status,
     Step,
@@ -33,8 +33,9 @@ from app.messages import (
 )
 from app.poses import LinkPoses
 from app.runs import Run, start
-from lessons.events import Reset
-from lessons.kinds import AnyScene, AnySession, AnySettings, find_scene, prepared
+from lessons.events import Reset, Set
+from lessons.kinds import AnyScene, AnySession, AnySettings
+from lessons.run import parse_assignment
 from lessons.state import settings_now
 from robots import InputError
 
@@ -46,14 +47,12 @@ class Body:
         """Raises InputError for a scene or robot that cannot be loaded."""
         self.running = True
         self.speed = 1.0
-        self.ticks = 0
-        self.over_budget = 0
-        self.late = 0
+        self.ticks = self.over_budget = self.late = self._steps = 0
         self.resets = 0
-        self._steps = 0
         self._sent: AnySettings | None = None
         self.leader = Leader()
         self._enter(choice)
+        self._make_mine(choice)
 
     def _enter(self, choice: SceneChoice) -> None:
         scene = self._load_scene(choice)
@@ -68,7 +67,7 @@ class Body:
         self.write_poses()
 
     def _load_scene(self, choice: SceneChoice) -> AnyScene:
-        return scene_of(choice)
+        return choice.scene()
 
     def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
         return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.seed)
@@ -172,7 +171,7 @@ class Body:
         then, now = self.choice.exercise, choice.exercise
         if then is None or now is None or then.lesson != now.lesson:
             return False
-        scene = scene_of(choice)
+        scene = choice.scene()
         run = start(scene, choice.seed)
         if run.session.layout != self.session.layout:
             return False
@@ -182,13 +181,20 @@ class Body:
     def _load(self, choice: SceneChoice) -> Report | None:
         before = self.block
         try:
-            if self._turn_to(choice):
-                return None
-            self._enter(choice)
+            if not self._turn_to(choice):
+                self._enter(choice)
+            self._make_mine(choice)
         except InputError as error:
             return Refused(str(error))
+        if self.block is before:
+            return None
         before.close()
         return self.ready()
+
+    def _make_mine(self, choice: SceneChoice) -> None:
+        for each in choice.mine:
+            self.handle(Post(Set(*parse_assignment(each))))
+        self.session.drain()
 
     # ---------------------------------------------------------------- simulation
 
@@ -291,10 +297,3 @@ class Body:
     def close(self) -> None:
         """Frees the memory; for use without a page, which otherwise does it."""
         self.block.close(unlink=True)
-
-
-def scene_of(choice: SceneChoice) -> AnyScene:
-    """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
-    if choice.exercise is not None:
-        return choice.exercise.run.prepared()
-    return prepared(find_scene(choice.name, choice.urdf, choice.tip, choice.urdf_text), None, choice.set)

@@ -6,8 +6,9 @@ import secrets
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import Command, SceneChoice
+from app.messages import Command
 from app.process import Spares
 from lessons import lesson
 

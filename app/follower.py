@@ -6,7 +6,8 @@ import time
 from multiprocessing.connection import Connection
 
 from app.body import Body
-from app.messages import Begin, Command, Follow, Quit, Reached, Refused, SceneChoice
+from app.choice import SceneChoice
+from app.messages import Begin, Command, Follow, Quit, Reached, Refused
 from app.runs import Run
 from lessons.follow import Follower, followed
 from lessons.kinds import AnyScene

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from app.messages import Begin, SceneChoice, Script
+from app.choice import SceneChoice
+from app.messages import Begin, Script
 from lessons.kinds import AnySession
 
 

@@ -6,21 +6,10 @@ import time
 from dataclasses import replace
 from queue import Empty, Queue
 
+from app.choice import SceneChoice
 from app.ghost import Ghost
 from app.lesson.exercise import Lecture
-from app.messages import (
-    Lead,
-    Leash,
-    Load,
-    Ready,
-    Report,
-    ResetAll,
-    SceneChoice,
-    Script,
-    Status,
-    Tell,
-    Told,
-)
+from app.messages import Lead, Leash, Load, Ready, Report, ResetAll, Script, Status, Tell, Told
 from app.process import Process, Spares
 from app.simulation import Simulation
 from lessons import lesson

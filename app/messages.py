@@ -7,31 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from app.lesson.exercise import Exercise, Lecture, Predict, RunStep
+from app.choice import SceneChoice
+from app.lesson.exercise import Lecture, Predict, RunStep
 from himpc.telemetry import Layout
 from lessons.kinds import AnyEvent, AnySettings
 from robots import Robot
-
-
-@dataclass(frozen=True)
-class SceneChoice:
-    """Which scene to load, for `hold` which robot, and with which settings and seed: assignments
-    "PATH=VALUE" on top of the scene's own. The step of a lesson brings all of it, and its script."""
-
-    name: str
-    urdf: str | None = None
-    tip: str | None = None
-    urdf_text: str | None = None
-    set: tuple[str, ...] = ()
-    seed: int = 0
-    exercise: Exercise | None = None
-
-    @classmethod
-    def of_lesson(cls, exercise: Exercise) -> SceneChoice:
-        """A step of a lesson. Raises InputError if there is no such lesson."""
-        run = exercise.run
-        return cls(run.scene, run.urdf, set=run.set, exercise=exercise)
-
 
 # ------------------------------------------------------------------ page → simulation
 

@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import viser
 
+from app.choice import SceneChoice
 from app.learner import Learner
 from app.lesson.progress import Notebook
-from app.messages import Load, Ready, SceneChoice
+from app.messages import Load, Ready
 from app.stage import Stage
 from app.text import block, stopped
 from app.view.robot import aim

@@ -17,10 +17,9 @@ from urllib.parse import urlsplit
 import viser
 from viser import _messages, infra
 
-from app.body import scene_of
+from app.choice import SceneChoice
 from app.classroom import Classroom, Watcher
 from app.lesson.progress import Notebook, Progress, progress_from
-from app.messages import SceneChoice
 from app.page import Page
 from app.panels.watching import add_watching
 from app.runs import start
@@ -97,7 +96,7 @@ class PageServer:
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         # Loaded here once, so that a wrong name or file is one sentence on the terminal, not in a page.
-        robot = start(scene_of(choice), choice.seed).session.robot
+        robot = start(choice.scene(), choice.seed).session.robot
         _check_address(host, port)
         # A tab may close between two lines of ours; that is no news for the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)

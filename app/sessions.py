@@ -8,8 +8,8 @@ import threading
 import time
 from collections.abc import Sequence
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import SceneChoice
 from app.process import Spares
 
 GRACE = 10.0  # s a session outlives its tab: the time of a reload

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.choice import SceneChoice
 from app.faces import Context, face_for
 from app.ghost import Ghost
 from app.learner import Learner
 from app.lesson.progress import Notebook
-from app.messages import Post, Ready, SceneChoice, Status
+from app.messages import Post, Ready, Status
 from app.moment import Moment, moment_of
 from app.palette import level_colours
 from app.panels.bind import Bindings

@@ -10,8 +10,9 @@ import traceback
 from multiprocessing.connection import Connection
 
 from app.body import Body
+from app.choice import SceneChoice
 from app.follower import follow
-from app.messages import Command, Failed, Follow, Load, Quit, Refused, SceneChoice
+from app.messages import Command, Failed, Follow, Load, Quit, Refused
 from app.pacing import Pacer
 from robots import InputError
 

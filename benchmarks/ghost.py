@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import SceneChoice
 from app.process import wait_until
 from app.server import PageServer
 from app.simulation import Simulation

@@ -20,8 +20,9 @@ from pathlib import Path
 
 import psutil
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import Load, SceneChoice
+from app.messages import Load
 from app.process import wait_until
 from app.server import PageServer
 from app.simulation import Simulation

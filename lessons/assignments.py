@@ -11,7 +11,7 @@ from lessons.mobile.settings import value_at as mobile_value_at
 from lessons.run import parse_assignment
 from lessons.settings import SceneSettings, value_at
 from robots import InputError
-from robots.collision import Ball
+from robots.collision import Ball, Floor
 
 _SHORTHANDS = ("Q", "R")
 """Paths that set every level at once."""
@@ -60,8 +60,8 @@ def differences(scene: AnyScene, settings: AnySettings) -> tuple[str, ...]:
             found.append(assignment(path, value))
             now = changed_any(now, *parse_assignment(found[-1]))
     if isinstance(now, MobileSettings) and isinstance(settings, MobileSettings):
-        now, balls = _with_balls(now, settings)
-        found += balls
+        now, obstacles = _with_obstacles(now, settings)
+        found += obstacles
     if now != settings:
         raise InputError(
             f"these settings of scene '{scene.name}' cannot be told as assignments: reset them and try again"
@@ -82,25 +82,28 @@ def _value(settings: AnySettings, path: str) -> Any:
     return mobile_value_at(settings, path)
 
 
-def _with_balls(now: MobileSettings, wanted: MobileSettings) -> tuple[MobileSettings, list[str]]:
+def _with_obstacles(now: MobileSettings, wanted: MobileSettings) -> tuple[MobileSettings, list[str]]:
     """Obstacles that appeared or were moved stand at the end, in the order in which that happened."""
     obstacles = wanted.htmpc.obstacles
-    balls: list[str] = []
+    told: list[str] = []
     result = now
     for count in range(len(obstacles) + 1):
         last = obstacles[len(obstacles) - count :]
-        if not all(isinstance(each, Ball) for each in last):
+        if any(isinstance(each, Floor) for each in last):
             break
-        balls = [
-            assignment(f"obstacles.{ball.name}", (*ball.centre, ball.radius))
-            for ball in last
-            if isinstance(ball, Ball)
+        told = [
+            assignment(
+                f"obstacles.{each.name}",
+                (*each.centre, each.radius) if isinstance(each, Ball) else each.centre,
+            )
+            for each in last
+            if not isinstance(each, Floor)
         ]
         result = now
-        for each in balls:
+        for each in told:
             changed = changed_any(result, *parse_assignment(each))
             assert isinstance(changed, MobileSettings)
             result = changed
         if result.htmpc.obstacles == obstacles:
             break
-    return result, balls
+    return result, told

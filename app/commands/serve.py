@@ -24,15 +24,15 @@ def serve(
         scene: scene to start with; iiwa14-hold by default, hold with --urdf.
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
-        state: a state code, as the page shows it: its scene, robot, settings and seed.
+        state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
         max_sessions: how many people may use it at once, each with a robot of their own.
         classroom: one robot for all pages; who has the printed token steers it.
         host: address to listen on; only this machine can reach the default.
         port: port to listen on.
         no_browser: do not open a browser.
     """
+    from app.choice import SceneChoice
     from app.lesson.exercise import Exercise
-    from app.messages import SceneChoice
     from app.server import FIRST
     from app.server import serve as serve_page
 
@@ -45,8 +45,7 @@ def serve(
     elif state is not None:
         from lessons.state import decode
 
-        given = decode(state)
-        choice = SceneChoice(given.scene, given.urdf, given.tip, set=given.set, seed=given.seed)
+        choice = SceneChoice.of_state(decode(state))
     else:
         choice = SceneChoice(scene or ("hold" if urdf else FIRST.name), urdf, tip)
     return serve_page(

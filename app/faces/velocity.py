@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.faces.face import Context
-from app.goals import Goals
+from app.goals import Goals, free_name
 from app.messages import Status, TaskView
 from app.moment import Moment
 from app.panels.begin import BeginPanel
@@ -20,14 +20,19 @@ from app.panels.servos import ServoPanel
 from app.panels.snapshot import Snapshot
 from app.panels.tracking import TrackingPlots
 from app.view.coordinates import full
+from app.view.obstacles import Obstacles
 from app.view.robot import RobotView, camera_for, look_at
-from app.view.surroundings import Carried, Obstacles, People, ReachCircle
+from app.view.surroundings import Carried, People, ReachCircle
 from app.view.target import Frames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Set
+from lessons.mobile.events import Appear
 from lessons.mobile.settings import MobileSettings
 from robots.stretch import horizontal_reach
+
+_AHEAD, _RADIUS = 0.7, 0.2
+"""m: where a new obstacle appears in front of the hand, and its radius."""
 
 
 class VelocityFace:
@@ -65,6 +70,7 @@ class VelocityFace:
         self._begin.on_theme = context.theme
         self._begin.on_swap = self._swap
         self._begin.on_look = self._look
+        self._begin.on_obstacle = self._add_obstacle
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
         with plots.add_tab("Errors"):
@@ -77,7 +83,7 @@ class VelocityFace:
         context, ready = self._context, self._context.ready
         size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
         self._frames = Frames(scene)
-        self._obstacles = Obstacles(scene)
+        self._obstacles = Obstacles(scene, self._put)
         self._people = People(scene)
         self._carried = Carried(scene)
         self._goals = Goals(
@@ -108,6 +114,22 @@ class VelocityFace:
         if status is not None and status.mission is not None:
             swap(status.mission.rows, self._context.post)
 
+    def _put(self, name: str, centre: tuple[float, float, float]) -> None:
+        self._context.post(Set(f"obstacles.{name}", centre))
+
+    def _add_obstacle(self) -> None:
+        """A ball, in front of the hand as seen from the base: near enough to be felt, not yet in the way."""
+        poses = self._context.poses()
+        if poses is None:
+            return
+        base = poses[len(self._base) - 1, :2] if self._base else np.zeros(2)
+        ahead = poses[-1, :2] - base
+        ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
+        x, y = poses[-1, :2] + _AHEAD * ahead
+        taken = [each.name for each in self._settings().htmpc.obstacles]
+        name = free_name("ball", taken)
+        self._context.post(Appear(name, (float(x), float(y), float(poses[-1, 2])), _RADIUS))
+
     def _look(self) -> None:
         poses = self._context.poses()
         if poses is not None:
@@ -136,7 +158,7 @@ class VelocityFace:
         status, latest, settings = moment.status, moment.latest, self._settings()
         fields = self._context.ready.layout.fields
         self._goals.follow(status, latest, fields)
-        self._obstacles.show(settings.htmpc.obstacles)
+        self._obstacles.show(settings.htmpc.obstacles, bool(self._begin.arrows.value))
         self._frames.show(bool(self._begin.frames.value))
         if self._circle is not None:
             self._circle.show(bool(self._begin.reach.value))

@@ -12,6 +12,7 @@ from lessons.course import load_lesson
 from lessons.lesson import Lesson, Run, Step
 from lessons.measure import Signal
 from lessons.prediction import Grade
+from robots import InputError
 
 Answer = int | float | tuple[tuple[float, float], ...]
 """A prediction: place of an option, a value, or the points (t in s, value) of a sketch."""
@@ -32,6 +33,14 @@ class Exercise:
 
     lesson: str
     place: int = 0
+
+    @classmethod
+    def at(cls, lesson: str, step: int) -> Exercise:
+        """The step (1 being the first) of a lesson. Raises InputError if there is no such lesson or step."""
+        count = len(parts_of(load_lesson(lesson)))
+        if not 1 <= step <= count:
+            raise InputError(f"lesson '{lesson}' has no step {step}: choose one from 1 to {count}")
+        return cls(lesson, step - 1)
 
     @property
     def whole(self) -> Lesson:

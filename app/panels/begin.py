@@ -27,6 +27,7 @@ class BeginPanel:
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_swap: Callable[[], None] = lambda: None
         self.on_look: Callable[[], None] = lambda: None
+        self.on_obstacle: Callable[[], None] = lambda: None
         self._colours = colours
         self._dragged = False
         self._next = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
@@ -34,10 +35,14 @@ class BeginPanel:
         self._live = gui.add_html("")
         swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         look = gui.add_button("Look at the robot", hint="Turns the camera to where it is now")
+        obstacle = gui.add_button(
+            "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
+        )
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand and the base", True)
             self.prediction = gui.add_checkbox("Predicted paths", True)
             self.reach = gui.add_checkbox("Reach of the arm", True, visible=drives)
+            self.arrows = gui.add_checkbox("Arrows of obstacles", True)
             self.frames = gui.add_checkbox("Target and actual frames", True)
         self.dark = gui.add_checkbox("Dark theme", dark)
 
@@ -48,6 +53,10 @@ class BeginPanel:
         @look.on_click
         async def _(_: object) -> None:
             self.on_look()
+
+        @obstacle.on_click
+        async def _(_: object) -> None:
+            self.on_obstacle()
 
         @self.dark.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:

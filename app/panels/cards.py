@@ -8,9 +8,9 @@ from importlib.resources import files
 
 import viser
 
+from app.choice import SceneChoice
 from app.lesson.exercise import Exercise, parts_of
 from app.lesson.progress import Notebook, Progress
-from app.messages import SceneChoice
 from app.palette import GOOD, LEVELS, css
 from app.text import badge, block, esc
 from lessons.course import COURSE, load_lesson

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import viser
 
+from app.choice import SceneChoice
 from app.learner import Learner
 from app.lesson.progress import Notebook
-from app.messages import SceneChoice
 from app.panels.cards import add_cards, add_invitation
 from app.panels.lesson import LessonPanel
 from app.panels.window import Window

@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 import viser
 
+from app.choice import SceneChoice
 from app.learner import Learner
 from app.lesson.exercise import Exercise, Lecture, parts_of
 from app.lesson.progress import Notebook
-from app.messages import Post, Predict, ResetAll, RunStep, SceneChoice
+from app.messages import Post, Predict, ResetAll, RunStep
 from app.palette import LEVELS
 from app.panels.asking import Asking
 from app.panels.bind import Bindings

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 
 import viser
 
-from app.messages import Ready, SceneChoice
+from app.choice import SceneChoice
+from app.messages import Ready
 from app.palette import BAD, DAMPING, GOOD, LEVELS
 from app.text import badge, block, esc
 from robots import CATALOG

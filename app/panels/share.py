@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import viser
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import SceneChoice, Told
+from app.messages import Told
 from app.text import block
 from lessons.export import script
 from lessons.state import State, command_line, decode, encode, state_of
@@ -43,8 +45,7 @@ class SharePanel:
         @take.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             try:
-                state = decode(str(given.value))
-                choose(SceneChoice(state.scene, state.urdf, state.tip, set=state.set, seed=state.seed))
+                choose(SceneChoice.of_state(decode(str(given.value))))
             except InputError as error:
                 _refuse(event.client, error)
 
@@ -60,6 +61,8 @@ class SharePanel:
     def _write(self, told: Told) -> None:
         choice = _from_a_name(told.choice)
         state = state_of(choice.name, told.settings, urdf=choice.urdf, tip=choice.tip, seed=choice.seed)
+        if choice.exercise is not None:
+            state = replace(state, lesson=choice.exercise.lesson, step=choice.exercise.place + 1)
         self._line.value = command_line(state)
         self._line.visible = True
         self._code.visible = False

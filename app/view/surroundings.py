@@ -1,60 +1,17 @@
-"""What stands around a mobile robot: obstacles, people with balls, and the circle its arm reaches."""
+"""What stands around a mobile robot: people with balls, and the circle its arm reaches."""
 
 from __future__ import annotations
 
 import numpy as np
 import viser
-import viser.transforms as vtf
 
 from app.messages import Person
 from app.palette import BOUND, JOINTS, RGB
-from robots.collision import Ball, Box, Obstacle
 
-_OBSTACLE: RGB = (180, 120, 110)
 _BALL: RGB = (245, 190, 30)
 _BALL_RADIUS = 0.06  # m
 _POINTS = 96
 _TALL, _WIDE, _HEAD = 1.25, 0.17, 0.12  # m, of a person
-
-
-class Obstacles:
-    """Boxes and balls; drawn anew when they change. The floor is there anyway."""
-
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._scene = scene
-        self._shown: tuple[Obstacle, ...] = ()
-        self._handles: list[viser.SceneNodeHandle] = []
-
-    def show(self, obstacles: tuple[Obstacle, ...]) -> None:
-        if obstacles == self._shown:
-            return
-        self._shown = obstacles
-        for handle in self._handles:
-            handle.remove()
-        self._handles = []
-        for index, obstacle in enumerate(obstacles):
-            node = f"/obstacle/{index}"
-            if isinstance(obstacle, Box):
-                self._handles.append(
-                    self._scene.add_box(
-                        node,
-                        color=_OBSTACLE,
-                        dimensions=obstacle.size,
-                        position=obstacle.centre,
-                        wxyz=vtf.SO3.from_z_radians(obstacle.yaw).wxyz,
-                        cast_shadow=False,
-                    )
-                )
-            elif isinstance(obstacle, Ball):
-                self._handles.append(
-                    self._scene.add_icosphere(
-                        node,
-                        radius=obstacle.radius,
-                        color=_OBSTACLE,
-                        position=obstacle.centre,
-                        cast_shadow=False,
-                    )
-                )
 
 
 class People:

@@ -12,7 +12,7 @@ from lessons.levels import ordered
 from lessons.mobile.options import MobileOptions, Stay
 from lessons.values import fitting, typed, weight
 from robots import InputError, VelocityPlantSettings
-from robots.collision import Ball, Obstacle
+from robots.collision import Ball, Floor, Obstacle
 from robots.errors import unknown_name
 
 VELOCITY_CONTROLLERS: dict[str, str] = {
@@ -99,7 +99,7 @@ def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
     "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order" takes
     effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation brings its
     own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r, and "obstacles.NAME" for a ball
-    [x, y, z, radius], new or instead of the obstacle of that name.
+    [x, y, z, radius], new or instead of the obstacle of that name, or for where one is now, [x, y, z].
 
     Raises:
         InputError: unknown path (naming the nearest), or a value of the wrong type or range.
@@ -107,7 +107,7 @@ def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
     head, _, rest = path.partition(".")
     htmpc = settings.htmpc
     if head == "obstacles" and rest:
-        return with_obstacle(settings, _ball(path, rest, value))
+        return with_obstacle(settings, _obstacle(htmpc.obstacles, path, rest, value))
     if path not in paths(settings):
         raise unknown_name("setting", path, paths(settings))
     if path == "order":
@@ -178,12 +178,19 @@ def with_obstacle(settings: MobileSettings, obstacle: Obstacle) -> MobileSetting
     return replace(settings, htmpc=replace(settings.htmpc, obstacles=(*others, obstacle)))
 
 
-def _ball(path: str, name: str, value: Any) -> Ball:
+def _obstacle(obstacles: tuple[Obstacle, ...], path: str, name: str, value: Any) -> Obstacle:
     numbers = weight(path, value)
-    if not isinstance(numbers, tuple) or len(numbers) != 4:
-        raise InputError(f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]")
-    x, y, z, radius = numbers
-    return Ball(name, (x, y, z), radius)
+    known = {each.name: each for each in obstacles if not isinstance(each, Floor)}
+    if isinstance(numbers, tuple) and len(numbers) == 4:
+        x, y, z, radius = numbers
+        return Ball(name, (x, y, z), radius)
+    if isinstance(numbers, tuple) and len(numbers) == 3 and name in known:
+        x, y, z = numbers
+        return replace(known[name], centre=(x, y, z))
+    movable = f", or move {', '.join(known)} to [x, y, z]" if known else ""
+    raise InputError(
+        f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]{movable}"
+    )
 
 
 def _names(part: Any) -> list[str]:

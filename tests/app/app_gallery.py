@@ -15,8 +15,8 @@ from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Page, sync_playwright
 
+from app.choice import SceneChoice
 from app.lesson.exercise import parts_of
-from app.messages import SceneChoice
 from app.server import PageServer
 from lessons.course import COURSE, load_lesson
 from lessons.lesson import Lesson, Step

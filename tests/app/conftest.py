@@ -9,7 +9,7 @@ import pytest
 from app_browser import CHROMIUM_ARGS, find_chromium, open_page, press, tab, wait_for_scene
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from app.messages import SceneChoice
+from app.choice import SceneChoice
 from app.server import PageServer
 
 

@@ -27,9 +27,9 @@ from app_browser import CHROMIUM_ARGS, find_chromium, load, open_page, tab
 from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
 from app.block import Block
+from app.choice import SceneChoice
 from app.history import History
 from app.learner import Learner
-from app.messages import SceneChoice
 from app.server import PageServer
 
 STRICT = ("himpc", "hiqp", "nhimpc")

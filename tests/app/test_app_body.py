@@ -10,8 +10,9 @@ import pytest
 
 from app.block import Block
 from app.body import Body
+from app.choice import SceneChoice
 from app.history import BUCKETS, History
-from app.messages import Load, Play, Post, Ready, Refused, ResetAll, SceneChoice, Speed, Step
+from app.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
 from app.pacing import BACKLOG, Pacer
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.session import TRUTH_TICKS

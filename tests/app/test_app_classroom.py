@@ -9,9 +9,10 @@ import pytest
 from app_browser import open_page, press, write
 from playwright.sync_api import Browser, expect
 
+from app.choice import SceneChoice
 from app.classroom import STEERING, Classroom, Watcher
 from app.learner import Learner
-from app.messages import Play, SceneChoice
+from app.messages import Play
 from app.process import wait_until
 from app.server import PageServer
 

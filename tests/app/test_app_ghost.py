@@ -11,9 +11,10 @@ import pytest
 
 from app.block import Block
 from app.body import Body
+from app.choice import SceneChoice
 from app.follower import Shadow
 from app.learner import Learner
-from app.messages import Lead, Leash, Load, Play, Post, ResetAll, SceneChoice, Script
+from app.messages import Lead, Leash, Load, Play, Post, ResetAll, Script
 from app.process import Spares, wait_until
 from lessons.events import Push, Reset, Set
 from lessons.lesson import Ghost

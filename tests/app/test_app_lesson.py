@@ -11,17 +11,19 @@ import pytest
 
 from app.block import Block
 from app.body import Body
+from app.choice import SceneChoice
 from app.lesson.exercise import Curve, Exercise, Lecture
 from app.lesson.kinds import chosen, setting_at
 from app.lesson.record import BUCKETS, Record, thinned
-from app.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep, SceneChoice
+from app.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep
 from himpc.telemetry import Layout
 from lessons.check import measured
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
-from lessons.kinds import changed_any
+from lessons.kinds import changed_any, find_scene, prepared
 from lessons.lesson import Step
 from lessons.run import parse_assignment
+from lessons.state import State, decode, encode, state_of
 from robots import InputError
 
 
@@ -150,6 +152,42 @@ def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -
     other = learner.body.handle(Load(SceneChoice.of_lesson(Exercise("one-task"))))
     assert isinstance(other, Ready)
     Block.for_robot(session.robot, session.layout.size, name).close(unlink=True)
+
+
+def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
+    """They are a learner's changes: they stand until the step's own run, and a challenge counts them."""
+    lesson = load_lesson("deadlines")
+    challenge, last = lesson.challenge, len(lesson.steps) + 1
+    assert challenge is not None
+    run = lesson.run_of(challenge)
+    solved = prepared(find_scene(run.scene, run.urdf), None, (*run.set, *challenge.solutions[0]))
+    code = encode(state_of(run.scene, solved.settings, urdf=run.urdf, seed=3, lesson="deadlines", step=last))
+    choice = SceneChoice.of_state(decode(code))
+    assert choice.exercise == Exercise("deadlines", last - 1) and choice.seed == 3
+    body = Body(choice)
+    assert body.session.settings == solved.settings and not body.running
+    body.handle(RunStep(fast=True))
+    while not body.running:
+        body.settle()
+    while body.running and body.session.t < challenge.duration + 0.01:
+        body.tick()
+    lecture = body.status().lecture
+    assert lecture is not None and lecture.result is not None and lecture.result.passed
+    body.handle(ResetAll())
+    assert body.session.settings == run.prepared().settings
+    body.close()
+
+
+@pytest.mark.parametrize(
+    ("state", "says"),
+    [
+        (State("planar3-circle", lesson="deadlines", step=99), "no step 99: choose one from 1 to"),
+        (State("iiwa14-hold", lesson="first-hold-then-reach", step=1), "another scene"),
+    ],
+)
+def test_a_code_of_a_step_that_is_not_there_is_refused(state: State, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        SceneChoice.of_state(state)
 
 
 def test_a_challenge_is_graded_and_cannot_be_cheated(learn: Start) -> None:

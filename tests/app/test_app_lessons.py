@@ -11,8 +11,9 @@ from app_browser import eventually, key, open_page, press
 from app_lessons import expect_part, hurry, marks, open_lesson, predict, run
 from playwright.sync_api import Browser, Page, expect
 
+from app.choice import SceneChoice
 from app.lesson.exercise import Exercise, parts_of
-from app.messages import Post, SceneChoice
+from app.messages import Post
 from app.server import PageServer
 from lessons.challenge import Challenge
 from lessons.course import COURSE, load_lesson

@@ -14,8 +14,8 @@ import pytest
 
 from app.block import Block
 from app.body import Body
+from app.choice import SceneChoice
 from app.history import KEPT, WINDOW, History
-from app.messages import SceneChoice
 from app.pull import Grip, pulled, push_at
 from app.record import MOST, Record
 from app.score import Score

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from app_browser import (
     eventually,
     is_drawn,
     open_page,
+    position,
     press,
     row,
     set_number,
@@ -19,10 +21,12 @@ from app_browser import (
 )
 from playwright.sync_api import Browser, Page, expect
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import MissionView, SceneChoice
+from app.messages import MissionView
 from app.server import PageServer
 from lessons.mobile.settings import MobileSettings
+from robots.collision import Ball, Box, Floor
 
 
 @pytest.fixture(scope="module")
@@ -156,3 +160,33 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Lear
     press(page, "Add")
     assert eventually(page, lambda: mission(learner).rows[-1].name == "ee added")
     assert learner.failure is None
+
+
+def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Learner) -> None:
+    load(page, learner, "ridgeback-ur10-cluttered")
+    assert eventually(page, lambda: is_drawn(page, "/obstacle_arrows/1"))
+
+    def obstacles() -> dict[str, Ball | Box]:
+        settings = learner.settings
+        assert isinstance(settings, MobileSettings)
+        return {each.name: each for each in settings.htmpc.obstacles if not isinstance(each, Floor)}
+
+    before = obstacles()
+    place = sorted(before).index("table")
+    press(page, "Pause")
+    press(page, "Look at the robot")
+    drag_target(page, axis=1, along=0.5, node=f"/obstacle_arrows/{place}", arm=0.6)
+    assert eventually(page, lambda: obstacles()["table"].centre[1] > before["table"].centre[1] + 0.2)
+    moved = obstacles()["table"]
+    assert replace(moved, centre=before["table"].centre) == before["table"]
+    assert eventually(
+        page, lambda: bool(np.allclose(position(page, f"/obstacle/{place}"), moved.centre, atol=1e-3))
+    )
+    press(page, "Put an obstacle in the way")
+    assert eventually(page, lambda: len(obstacles()) == len(before) + 1)
+    page.get_by_text("Show", exact=True).click()
+    row(page, "Arrows of obstacles").locator("input").click()
+    assert eventually(page, lambda: not is_drawn(page, f"/obstacle_arrows/{place}"))
+    tab(page, "Start")
+    press(page, "Reset all")
+    assert eventually(page, lambda: obstacles() == before)

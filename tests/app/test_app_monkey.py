@@ -5,7 +5,7 @@ from __future__ import annotations
 from monkey import StandardError, walk
 from playwright.sync_api import Browser
 
-from app.messages import SceneChoice
+from app.choice import SceneChoice
 from app.server import PageServer
 
 

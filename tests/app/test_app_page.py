@@ -30,8 +30,9 @@ from app_browser import (
 )
 from playwright.sync_api import Browser, Page, expect
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import Load, SceneChoice
+from app.messages import Load
 from app.process import wait_until
 from app.server import PageServer
 from lessons.settings import SceneSettings

@@ -10,8 +10,9 @@ import numpy as np
 import psutil
 import pytest
 
+from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import Play, Post, SceneChoice, Speed, Step
+from app.messages import Play, Post, Speed, Step
 from app.process import Process, Spares, wait_until
 from app.sessions import Sessions
 from lessons.events import MoveTarget, Set

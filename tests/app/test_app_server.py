@@ -17,7 +17,7 @@ import websockets.exceptions
 from viser import __version__, _messages
 from websockets.sync.client import connect
 
-from app.messages import SceneChoice
+from app.choice import SceneChoice
 from app.process import wait_until
 from app.server import PageServer, serve
 from robots import InputError

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from app.body import Body
+from app.choice import SceneChoice
 from app.goals import free_name, open_row
 from app.history import History
-from app.messages import MissionView, Play, Post, Ready, ResetAll, SceneChoice, Status, Step
+from app.messages import MissionView, Play, Post, Ready, ResetAll, Status, Step
 from app.pacing import BACKLOG, Pacer
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.mobile.events import InsertTask, Release, RemoveTask

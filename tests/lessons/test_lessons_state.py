@@ -46,7 +46,7 @@ def values(n: int) -> st.SearchStrategy[Any]:
 
 @st.composite
 def events(draw: st.DrawFn, scene: AnyScene) -> MobileEvent:
-    kind = draw(st.sampled_from(["Set", "Set", "Set", "Set", "MoveLevel", "order", "Appear"]))
+    kind = draw(st.sampled_from(["Set", "Set", "Set", "Set", "MoveLevel", "order", "Appear", "moved"]))
     stack = scene.settings.levels if isinstance(scene, Scene) else scene.settings.htmpc.stack
     names = [level.name for level in stack]
     if kind == "MoveLevel":
@@ -56,6 +56,9 @@ def events(draw: st.DrawFn, scene: AnyScene) -> MobileEvent:
     if kind == "Appear":
         centre = draw(st.tuples(NUMBERS, NUMBERS, NUMBERS))
         return Appear(draw(st.sampled_from(["visitor", "bin", "lamp"])), centre, draw(st.floats(0.1, 1.0)))
+    if kind == "moved":
+        place = list(draw(st.tuples(NUMBERS, NUMBERS, NUMBERS)))
+        return Set(f"obstacles.{draw(st.sampled_from(['table', 'bin', 'visitor', 'floor']))}", place)
     return Set(draw(st.sampled_from(paths_of(scene))), draw(values(scene.robot.n)))
 
 

@@ -1,0 +1,53 @@
+"""A setting is passed on: as a command line, as a code and as a script, in a real browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app_browser import eventually, press, row, set_number, tab, write
+from playwright.sync_api import Page, expect
+
+from app.learner import Learner
+from app.server import PageServer
+from lessons.settings import SceneSettings
+from lessons.state import decode
+
+
+def horizon(learner: Learner) -> int:
+    assert isinstance(learner.settings, SceneSettings)
+    return learner.settings.horizon
+
+
+def test_a_code_brings_the_setting_back_and_a_script_repeats_the_run(page: Page, server: PageServer) -> None:
+    learner = server.sessions.learners[0]
+    before = horizon(learner)
+    tab(page, "Control")
+    set_number(page, "N", before + 2)
+    assert eventually(page, lambda: horizon(learner) == before + 2)
+    tab(page, "Export")
+    press(page, "Write it down")
+    line, code = (row(page, label).locator("textarea") for label in ("Command line", "Code"))
+    expect(line).to_have_value(f"himpc-lab run iiwa14-hold --set horizon={before + 2}")
+    given = code.input_value()
+    assert decode(given).set == (f"horizon={before + 2}",)
+
+    with page.expect_download() as download:
+        press(page, "Script as .py")
+    text = Path(download.value.path()).read_text()
+    assert download.value.suggested_filename == "iiwa14-hold.py"
+    compile(text, "iiwa14-hold.py", "exec")
+    assert f"Set('horizon', {before + 2})" in text
+
+    tab(page, "Start")
+    press(page, "Reset all")
+    assert eventually(page, lambda: horizon(learner) == before)
+    tab(page, "Export")
+    write(page, "Somebody's code", given[:-3])
+    press(page, "Open it")
+    # Tests make notifications transparent, because they cover the scene.
+    expect(page.get_by_text("copy all of it again")).to_be_attached()
+    assert horizon(learner) == before
+    write(page, "Somebody's code", given)
+    press(page, "Open it")
+    assert eventually(page, lambda: horizon(learner) == before + 2)
+    assert learner.choice.set == (f"horizon={before + 2}",)
