@@ -114,7 +114,8 @@ class PlaybackPanel:
         factor = f"{status.real_time_factor:.2f} × real time" if status.running else f"tick {status.ticks}"
         share = 100 * status.over_budget / max(status.ticks, 1)
         budget = 1e3 * now.settings.T_s
+        ticks = "1 tick" if status.over_budget == 1 else f"{status.over_budget} ticks"
         self._status.content = block(
             f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
-            f"<br>{status.over_budget} ticks over the {budget:g} ms budget ({share:.1f} %)"
+            f"<br>{ticks} over the {budget:g} ms budget ({share:.1f} %)"
         )
