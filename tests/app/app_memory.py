@@ -1,0 +1,83 @@
+"""Does memory stay where it is over many changes of lesson, in a real browser and in the server?
+
+    python tests/app/app_memory.py [--switches 50]
+
+Opens lesson after lesson by its card and runs a moment of its first step. After every lesson was open once,
+measures the page's heap (after a garbage collection) and the server's memory; and again after so many more
+changes. Prints JSON; exit 0 if both grew by less than 10 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import sys
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import psutil
+from app_browser import CHROMIUM_ARGS, find_chromium, open_page
+from app_lessons import open_lesson
+from playwright.sync_api import Page, sync_playwright
+
+from app.choice import SceneChoice
+from app.server import PageServer
+from lessons.course import COURSE, load_lesson
+
+GROWTH = 1.1
+
+
+def main() -> int:
+    """Measures as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--switches", type=int, default=50)
+    switches = parser.parse_args().switches
+    server = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=1)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
+        page = open_page(browser, server.url, 1200, 700, seldom=True)
+        try:
+            for count in range(len(COURSE)):
+                switch(page, count)
+            before = memory(page)
+            for count in range(switches):
+                switch(page, count)
+            after = memory(page)
+        finally:
+            browser.close()
+            server.close()
+    print(json.dumps({"switches": switches, "after warm-up": before, "at the end": after}, indent=1))
+    return 0 if all(after[name] < GROWTH * before[name] for name in before) else 1
+
+
+def switch(page: Page, count: int) -> None:
+    """To another lesson, and a moment of whatever it shows."""
+    open_lesson(page, load_lesson(COURSE[count % len(COURSE)]))
+    run = page.get_by_role("button", name="Run this step", exact=True)
+    if run.count() and run.is_enabled():
+        run.click()
+    page.wait_for_timeout(500)
+
+
+def memory(page: Page) -> dict[str, float]:
+    """MB of the page's heap and of the server, once both had a moment to let go."""
+    # The lesson on show has its share in the heap: always measured on the same one.
+    open_lesson(page, load_lesson(COURSE[0]))
+    page.wait_for_timeout(4000)
+    gc.collect()
+    session: Any = page.context.new_cdp_session(page)
+    for _ in range(3):
+        session.send("HeapProfiler.collectGarbage")
+    heap = session.send("Runtime.getHeapUsage")["usedSize"]
+    session.detach()
+    return {
+        "page heap MB": round(1e-6 * heap, 1),
+        "server MB": round(1e-6 * psutil.Process().memory_info().rss, 1),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
