@@ -62,7 +62,8 @@ def load(page: Page, url: str) -> None:
     wait_for_scene(page)
     page.wait_for_function(
         """() => { let o = 1; for (let p = window.__viserMutable.canvas; p && p.nodeType === 1;
-             p = p.parentElement) o *= parseFloat(getComputedStyle(p).opacity); return o > 0.99; }"""
+             p = p.parentElement) o *= parseFloat(getComputedStyle(p).opacity); return o > 0.99; }""",
+        timeout=SLOW,
     )
     # "Software WebGL" covers the canvas and swallows the mouse.
     page.add_style_tag(content=".mantine-Notifications-root{pointer-events:none !important;opacity:0}")

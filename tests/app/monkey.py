@@ -23,7 +23,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from app_browser import CHROMIUM_ARGS, find_chromium, load, open_page, tab
+from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, load, open_page, tab
 from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
 from app.block import Block
@@ -54,6 +54,7 @@ class Findings:
     actions: Counter[str] = field(default_factory=Counter)
     rows: int = 0
     scenes: set[str] = field(default_factory=set)
+    lessons: set[str] = field(default_factory=set)
     worst_leak: float = 0.0
     faults: list[str] = field(default_factory=list)
 
@@ -67,6 +68,7 @@ class Findings:
             "actions": dict(sorted(self.actions.items())),
             "rows": self.rows,
             "scenes": sorted(self.scenes),
+            "lessons": sorted(self.lessons),
             "worst_leak": self.worst_leak,
             "faults": self.faults,
         }
@@ -102,6 +104,7 @@ class Monkey:
             (self._key, 3.0),
             (self._drag, 4.0),
             (self._wait, 3.0),
+            (self._lesson, 1.0),
             (self._reload, 0.1),
         ]
         chosen = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])[0]
@@ -125,13 +128,13 @@ class Monkey:
     def _click(self) -> None:
         button = self._one("button:visible:enabled:not([role=tab])")
         if button is not None:
-            button.click(timeout=_PATIENCE)
+            button.click()
 
     def _tab(self) -> None:
         if self._random.random() < 0.5:
             tab(self.page, self._random.choice(_PANELS))
         elif (found := self._one("button[role=tab]:visible")) is not None:
-            found.click(timeout=_PATIENCE)
+            found.click()
 
     def _type(self) -> None:
         box = self._one("input[type=text]:visible:enabled, input[inputmode]:visible:enabled")
@@ -139,23 +142,23 @@ class Monkey:
             return
         exponent = self._random.uniform(-4, 4)
         texts = (f"{10**exponent:.4g}", f"{-(10**exponent):.4g}", "0", "1e9", "nan", "-", "word", "[1, 2]")
-        box.fill(self._random.choices(texts, (20, 4, 2, 1, 1, 1, 1, 1))[0], timeout=_PATIENCE)
-        box.press("Enter", timeout=_PATIENCE)
+        box.fill(self._random.choices(texts, (20, 4, 2, 1, 1, 1, 1, 1))[0])
+        box.press("Enter")
 
     def _toggle(self) -> None:
         box = self._one("input[type=checkbox]:visible:enabled")
         if box is not None:
-            box.click(timeout=_PATIENCE)
+            box.click()
 
     def _choose(self) -> None:
         menu = self._one("input[aria-haspopup=listbox]:visible:enabled")
         if menu is None:
             return
-        menu.click(timeout=_PATIENCE)
+        menu.click()
         self.page.wait_for_timeout(200)
         option = self._one("[role=option]:visible")
         if option is not None:
-            option.click(timeout=_PATIENCE)
+            option.click()
 
     def _key(self) -> None:
         self.page.keyboard.press(self._random.choice(_HOTKEYS))
@@ -175,6 +178,12 @@ class Monkey:
     def _wait(self) -> None:
         self.page.wait_for_timeout(self._random.uniform(50, 1500))
 
+    def _lesson(self) -> None:
+        self.page.keyboard.press("l")
+        card = self.page.locator(".mantine-Modal-content button").filter(has_text="·")
+        card.first.wait_for(timeout=4 * _PATIENCE)
+        card.nth(self._random.randrange(card.count())).click()
+
     def _reload(self) -> None:
         load(self.page, self.server.url)
 
@@ -188,7 +197,9 @@ class Monkey:
         if learner.failure is not None:
             self.found.blame(f"the simulation: {learner.failure}")
         if learner.ready is not None:
-            self.found.scenes.add(learner.ready.choice.name)
+            self.found.scenes.add(learner.choice.name)
+        if learner.lecture is not None:
+            self.found.lessons.add(learner.lecture.exercise.lesson)
         learner.read(self._judge)
         self._is_alive(learner)
 
@@ -244,7 +255,9 @@ def walk(
     browser: Browser, server: PageServer, minutes: float, seed: int, complaints: Callable[[], str]
 ) -> Findings:
     """A random walk of so many minutes; it ends early when something broke."""
-    page = open_page(browser, server.url)
+    page = open_page(browser, server.url, seldom=True)
+    page.set_default_timeout(_PATIENCE)
+    page.set_default_navigation_timeout(SLOW)
     monkey = Monkey(page, server, seed, complaints)
     end = time.monotonic() + 60 * minutes
     try:
