@@ -32,6 +32,9 @@ UNITS: dict[str, float] = {
 }
 """How many of a unit are one of the unit that telemetry records (s, m, rad, N·m, share)."""
 
+_NAMES = {"place": "tasks completed", "q": "angle", "v": "speed", "tau": "torque"}
+_PER_JOINT = ("q", "v", "tau")
+
 
 class Rows(Protocol):
     """A run, finished or still going on: a field of telemetry over time by its name, (ticks, width)."""
@@ -62,8 +65,11 @@ class Signal:
     def words(self) -> str:
         """What it is, for legends."""
         base, _, of = self.name.partition("/")
-        plain = f"{base} of {of}" if of else base.replace("_", " ")
-        return plain if self.column is None else f"{plain}, component {self.column + 1}"
+        plain = f"{base} of {of}" if of else _NAMES.get(base, base.replace("_", " "))
+        if self.column is None:
+            return plain
+        part = "of joint" if self.name in _PER_JOINT else "component"
+        return f"{plain} {part} {self.column + 1}"
 
     def over(self, rows: Rows) -> Array:
         """The signal at every tick, (ticks,); NaN where it is not defined."""

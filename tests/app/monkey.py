@@ -180,9 +180,11 @@ class Monkey:
 
     def _lesson(self) -> None:
         self.page.keyboard.press("l")
-        card = self.page.locator(".mantine-Modal-content button").filter(has_text="·")
-        card.first.wait_for(timeout=4 * _PATIENCE)
-        card.nth(self._random.randrange(card.count())).click()
+        cards = ".mantine-Modal-content button:has-text('·')"
+        self.page.locator(cards).first.wait_for(timeout=4 * _PATIENCE)
+        card = self._one(cards)
+        if card is not None:
+            card.click()
 
     def _reload(self) -> None:
         load(self.page, self.server.url)
