@@ -191,8 +191,8 @@ class Stage:
     def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self._settings()
         found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
-        if found is None or learner.status is None:
-            return
+        if found is None or learner.status is None or learner.ready is not self._ready:
+            return  # the settings may already be another scene's
         shown = Snapshot(self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s)
         now = replace(shown, status=learner.status)
         with self._client.atomic():

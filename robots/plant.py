@@ -26,7 +26,8 @@ _ZERO = (0.0, 0.0, 0.0)
 _STICTION_SOLREF = (0.002, 1.0)
 _STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
-# Divergence shows as q that is not finite; MuJoCo would print and leave a log file in the user's folder.
+_BROKEN = 1e6  # rad/s or m/s; faster, and soon not a number, it stays where it was, at rest
+# Divergence shows in q and v; MuJoCo would print and leave a log file in the user's folder.
 mujoco.set_mju_user_warning(lambda _: None)
 
 
@@ -101,8 +102,7 @@ class Plant:
         velocity = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
         torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
-        self._data.qpos[:] = position
-        self._data.qvel[:] = velocity
+        self._data.qpos[:], self._data.qvel[:] = position, velocity
         self._push = (None, np.zeros(6))
         self._fresh = False
         torque = self.holding_torque() if torque is None else torque
@@ -166,9 +166,8 @@ class Plant:
         self._build(settings)
         self._motors.limit(self._tau_lower, self._tau_upper)
         self._data.time = old.time
-        self._data.qpos[:] = old.qpos
-        self._data.qvel[:] = old.qvel
-        self._data.qacc_warmstart[:] = old.qacc_warmstart
+        for name in ("qpos", "qvel", "qacc_warmstart"):
+            getattr(self._data, name)[:] = getattr(old, name)
         if body is not None:
             self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
 
@@ -187,8 +186,7 @@ class Plant:
     def holding_torque(self) -> np.ndarray:
         """(n,) N·m that keeps the plant at q: inverse dynamics with v = 0, q̈ = 0 (no push, no friction)."""
         probe = self._probe
-        probe.qpos[:] = self._data.qpos
-        probe.qvel[:] = 0.0
+        probe.qpos[:], probe.qvel[:] = self._data.qpos, 0.0
         mujoco.mj_fwdPosition(self._model, probe)
         mujoco.mj_fwdVelocity(self._model, probe)
         self._fresh = False
@@ -202,8 +200,7 @@ class Plant:
 
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """(R (3, 3), p (3,) m) of a frame in the world."""
-        site = self._site(frame)
-        probe = self._look()
+        site, probe = self._site(frame), self._look()
         return probe.site_xmat[site].reshape(3, 3).copy(), probe.site_xpos[site].copy()
 
     def acceleration(self, tau: np.ndarray) -> np.ndarray:
@@ -217,13 +214,15 @@ class Plant:
     # ---------------------------------------------------------------- inside
 
     def _advance(self, h: float) -> None:
-        data = self._data
-        if not self._altered:
+        data, before = self._data, self._data.qpos.copy()
+        if self._altered:
+            q, v, tau = data.qpos, data.qvel, data.ctrl.copy()
+            q[:], v[:] = rk4(q, v, h, lambda q, v: self._accelerate(q, v, tau))
+            data.time += h
+        else:
             mujoco.mj_step(self._model, data)
-            return
-        tau = data.ctrl.copy()
-        data.qpos[:], data.qvel[:] = rk4(data.qpos, data.qvel, h, lambda q, v: self._accelerate(q, v, tau))
-        data.time += h
+        if not np.abs(data.qvel).max() < _BROKEN:  # true of what is not a number, too
+            data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = before, 0.0, 0.0
 
     def _accelerate(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """q̈ at q and v under tau and the push, from the probe."""

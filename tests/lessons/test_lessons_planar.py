@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from himpc.configuration import Configuration
+from lessons.kinds import prepared
 from lessons.run import run, with_assignments
 from lessons.scenes import load_scene
 from lessons.scenes.planar import OMEGA, SingularOptions
+from lessons.session import Session
 from lessons.settings import changed, paths
 from lessons.summary import Recording, summary
 from robots import InputError
@@ -262,3 +264,15 @@ def test_the_amplitude_reaches_the_reference() -> None:
     x_d = recording["x_d/q1"]
     t = recording["t"]
     np.testing.assert_allclose(x_d, np.radians(-10) * (1 - np.cos(OMEGA * t)) / 2, atol=1e-12)
+
+
+@pytest.mark.parametrize("controller", ["osf", "tdeosf"])
+def test_who_loses_control_goes_on_with_numbers(controller: str) -> None:
+    """Far beyond any robot's speed the plant gives up, where it is, and nothing becomes NaN."""
+    session = Session(prepared(load_scene("planar3-conflict"), controller, ()))
+    fields = session.layout.fields
+    for _ in range(2500):
+        row = session.tick()
+        assert all(np.isfinite(row[fields[name]]).all() for name in ("q", "v", "tau"))
+    assert session.diverged_at is not None
+    assert float(np.abs(session.plant.v).max()) < 1e6
