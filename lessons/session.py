@@ -225,7 +225,7 @@ class Session:
         share = v / self.robot.v_limit
         # A comparison with NaN is false, so "not within" also catches what is not finite.
         slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
-        return not slow or not math.isfinite(q.dot(q))
+        return self.plant.broken or not slow or not math.isfinite(q.dot(q))
 
     def _is_far(self, plan: Plan) -> bool:
         """Level 1 is lost. A hand that drags a target out of reach does that too, so it is no notice."""

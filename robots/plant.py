@@ -26,8 +26,8 @@ _ZERO = (0.0, 0.0, 0.0)
 _STICTION_SOLREF = (0.002, 1.0)
 _STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
-_BROKEN = 1e6  # rad/s or m/s; faster, and soon not a number, it stays where it was, at rest
-# Divergence shows in q and v; MuJoCo would print and leave a log file in the user's folder.
+_BROKEN = 1e6  # rad/s or m/s
+# MuJoCo would print and leave a log file in the user's folder.
 mujoco.set_mju_user_warning(lambda _: None)
 
 
@@ -35,6 +35,7 @@ class Plant:
     """A robot in MuJoCo under torque control, integrated with RK4. SI units, world axes, joints in
     Pinocchio's order. Same calls, same numbers, to the bit.
 
+    `broken` since the last reset: it got faster than numbers can follow, and was stopped where it was.
     Queries (`mass_matrix`, `bias`, `jacobian`, `frame_pose`, `acceleration`, `holding_torque`) are about
     the plant as its settings make it, and never disturb the simulation.
     """
@@ -103,8 +104,7 @@ class Plant:
         torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
         self._data.qpos[:], self._data.qvel[:] = position, velocity
-        self._push = (None, np.zeros(6))
-        self._fresh = False
+        self._push, self._fresh, self.broken = (None, np.zeros(6)), False, False
         torque = self.holding_torque() if torque is None else torque
         self._motors = Motors(np.clip(torque, self._tau_lower, self._tau_upper), 0.0)
         self._encoders = Encoders(position, velocity, 0.0)
@@ -223,6 +223,7 @@ class Plant:
             mujoco.mj_step(self._model, data)
         if not np.abs(data.qvel).max() < _BROKEN:  # true of what is not a number, too
             data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = before, 0.0, 0.0
+            self.broken = True
 
     def _accelerate(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """q̈ at q and v under tau and the push, from the probe."""

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from himpc.configuration import Configuration
-from lessons.kinds import prepared
 from lessons.run import run, with_assignments
 from lessons.scenes import load_scene
 from lessons.scenes.planar import OMEGA, SingularOptions
@@ -269,7 +268,8 @@ def test_the_amplitude_reaches_the_reference() -> None:
 @pytest.mark.parametrize("controller", ["osf", "tdeosf"])
 def test_who_loses_control_goes_on_with_numbers(controller: str) -> None:
     """Far beyond any robot's speed the plant gives up, where it is, and nothing becomes NaN."""
-    session = Session(prepared(load_scene("planar3-conflict"), controller, ()))
+    scene = load_scene("planar3-conflict")
+    session = Session(replace(scene, settings=changed(scene.settings, "controller", controller)))
     fields = session.layout.fields
     for _ in range(2500):
         row = session.tick()

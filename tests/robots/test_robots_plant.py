@@ -128,3 +128,21 @@ def test_a_robot_from_a_urdf_with_prismatic_and_branched_joints() -> None:
     np.testing.assert_allclose(plant.mass_matrix(), full_mass_matrix(robot.model, q), atol=1e-9)
     with pytest.raises(ValueError, match="fixed to the world"):
         plant.push("base", (1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("altered", [False, True])
+def test_what_is_faster_than_numbers_can_follow_stays_where_it_was(altered: bool) -> None:
+    """Until the next reset it says so; with an altered M(q) it is our own integrator that runs away."""
+    robot = load_robot("planar3")
+    plant = Plant(robot, PlantSettings(saturate=False, diagonal_scale=0.9 if altered else 1.0))
+    plant.step(np.zeros(3), 1e-3)
+    before = plant.q
+    assert not plant.broken
+    plant.step(np.full(3, 1e9), 1e-3)
+    assert plant.broken
+    np.testing.assert_array_equal(plant.q, before)
+    np.testing.assert_array_equal(plant.v, 0.0)
+    plant.step(np.zeros(3), 1e-3)
+    assert np.isfinite(plant.q).all() and np.isfinite(plant.v).all()
+    plant.reset(robot.home)
+    assert not plant.broken
