@@ -55,6 +55,11 @@ class Learner(Simulation):
         super()._enter(ready)
         self.choice, self.lecture = ready.choice, None
 
+    def choice_of(self, ready: Ready) -> SceneChoice:
+        """What was chosen, as `settings_of`: perhaps a later step of the lesson than the one it came with."""
+        with self._lock:
+            return self.choice if self.ready is ready else ready.choice
+
     def _hear(self, process: Process, report: Report) -> None:
         super()._hear(process, report)
         if isinstance(report, Status) and report.lecture is not None and process is self._process:

@@ -94,6 +94,11 @@ class Simulation:
             notices, self._notices = self._notices, []
             return refusals, notices
 
+    def settings_of(self, ready: Ready) -> AnySettings:
+        """The settings of a scene that came in: the newest ones, unless another scene came in since."""
+        with self._lock:
+            return ready.settings if self.settings is None or self.ready is not ready else self.settings
+
     # ---------------------------------------------------------------- telemetry
 
     def read(self, look: Callable[[Block, History], T]) -> T | None:

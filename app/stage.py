@@ -82,7 +82,8 @@ class Stage:
         gui.add_html(PHONE)
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
         self._time_line = TimeLine(gui, self._learner, loop)
-        self._course = Course(gui, self._learner, notebook, choose, self._settings, loop)
+        exercise = self._learner.choice_of(self._ready).exercise
+        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
         tabs, plots = gui.add_tab_group(), gui.add_panel()
         self._course.add_first_tabs(tabs, plots)
         self._face.add_tabs(gui, tabs)
@@ -134,7 +135,7 @@ class Stage:
     # ---------------------------------------------------------------- events out
 
     def _settings(self) -> AnySettings:
-        return self._learner.settings or self._ready.settings
+        return self._learner.settings_of(self._ready)
 
     def _post(self, event: AnyEvent) -> None:
         self._learner.send(Post(event))
@@ -191,8 +192,8 @@ class Stage:
     def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self._settings()
         found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
-        if found is None or learner.status is None or learner.ready is not self._ready:
-            return  # the settings may already be another scene's
+        if found is None or learner.status is None:
+            return
         shown = Snapshot(self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s)
         now = replace(shown, status=learner.status)
         with self._client.atomic():

@@ -40,7 +40,7 @@ class Context:
     @property
     def settings(self) -> Any:
         """The settings in force, of the scene's kind."""
-        return self.learner.settings or self.ready.settings
+        return self.learner.settings_of(self.ready)
 
     def poses(self) -> np.ndarray | None:
         """Poses of joints 1 … n and the tip, (n + 1, 7)."""

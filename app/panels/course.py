@@ -9,6 +9,7 @@ import viser
 
 from app.choice import SceneChoice
 from app.learner import Learner
+from app.lesson.exercise import Exercise
 from app.lesson.progress import Notebook
 from app.panels.cards import add_cards, add_invitation
 from app.panels.lesson import LessonPanel
@@ -23,21 +24,24 @@ class Course:
         self,
         gui: viser.GuiApi,
         learner: Learner,
+        exercise: Exercise | None,
         notebook: Notebook,
         choose: Callable[[SceneChoice], None],
         settings: Callable[[], AnySettings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
+        """exercise: the one that is on, if any."""
         self._gui, self._learner, self._notebook = gui, learner, notebook
+        self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop
         self._list = Window(gui, "All lessons", "L", self._fill)
         self._panel: LessonPanel | None = None
-        if learner.choice.exercise is None:
+        if exercise is None:
             add_invitation(gui, notebook, choose)
 
     def add_first_tabs(self, tabs: viser.GuiTabGroupHandle, plots: viser.PanelHandle) -> None:
         """The step that is on, and its curves among the plots."""
-        gui, exercise = self._gui, self._learner.choice.exercise
+        gui, exercise = self._gui, self._exercise
         if exercise is None:
             return
         with plots.add_tab("This step"):

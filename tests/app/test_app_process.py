@@ -12,7 +12,8 @@ import pytest
 
 from app.choice import SceneChoice
 from app.learner import Learner
-from app.messages import Play, Post, Speed, Step
+from app.lesson.exercise import Exercise
+from app.messages import Load, Play, Post, Speed, Step
 from app.process import Process, Spares, wait_until
 from app.sessions import Sessions
 from lessons.events import MoveTarget, Set
@@ -72,6 +73,26 @@ def test_play_pause_step_speed_reset(start: Callable[[str], Learner]) -> None:
 
 def _factor(learner: Learner) -> float:
     return 0.0 if learner.status is None else learner.status.real_time_factor
+
+
+def test_a_page_that_shows_the_scene_before_keeps_its_settings(start: Callable[[str], Learner]) -> None:
+    """Until it has built the next scene, whose settings may be of another kind altogether."""
+    learner = start("planar3-hold")
+    learner.send(Post(Set("horizon", 8)))
+    before = learner.ready
+    assert before is not None
+    assert wait_until(lambda: learner.settings_of(before).horizon == 8, LONG)  # pyright: ignore
+    learner.send(Load(SceneChoice.of_lesson(Exercise("first-hold-then-reach"))))
+    assert wait_until(lambda: learner.ready is not before, LONG)
+    now = learner.ready
+    assert now is not None
+    assert learner.settings_of(before) is before.settings
+    assert learner.settings_of(now) is learner.settings is not before.settings
+    assert learner.choice_of(before).exercise is None
+    later = Exercise("first-hold-then-reach", 1)
+    learner.send(Load(SceneChoice.of_lesson(later)))
+    assert wait_until(lambda: learner.choice_of(now).exercise == later, LONG)
+    assert learner.ready is now
 
 
 def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], Learner]) -> None:
