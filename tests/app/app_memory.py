@@ -19,9 +19,9 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import psutil
-from app_browser import CHROMIUM_ARGS, find_chromium, open_page
+from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, open_page
 from app_lessons import open_lesson
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, expect, sync_playwright
 
 from app.choice import SceneChoice
 from app.server import PageServer
@@ -36,6 +36,7 @@ def main() -> int:
     parser.add_argument("--switches", type=int, default=50)
     switches = parser.parse_args().switches
     server = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=1)
+    expect.set_options(timeout=SLOW)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
         page = open_page(browser, server.url, 1200, 700, seldom=True)
