@@ -9,11 +9,11 @@ import argparse
 import io
 from pathlib import Path
 
-from app_browser import CHROMIUM_ARGS, find_chromium, open_page
+from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, open_page
 from app_lessons import hurry, open_lesson, predict, run, title_of
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, expect, sync_playwright
 
 from app.choice import SceneChoice
 from app.lesson.exercise import parts_of
@@ -72,11 +72,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "lessons")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
+    expect.set_options(timeout=SLOW)
     server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
-            page = open_page(browser, server.url, WIDTH, HEIGHT, scale=1.0)
+            page = open_page(browser, server.url, WIDTH, HEIGHT, scale=1.0, seldom=True)
             for name in options.names:
                 lesson = load_lesson(name)
                 sheet(walk(page, lesson)).save(options.out / f"{name}.webp", quality=QUALITY, method=6)
