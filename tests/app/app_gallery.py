@@ -10,7 +10,7 @@ import io
 from pathlib import Path
 
 from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, open_page
-from app_lessons import hurry, open_lesson, predict, run, title_of
+from app_lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Page, expect, sync_playwright
@@ -33,6 +33,7 @@ def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image
     open_lesson(page, lesson)
     parts, found = parts_of(lesson), []
     for part in parts:
+        expect_part(page, lesson, part)
         if isinstance(part, Step) and part.prediction is not None:
             predict(page, part.prediction)
         before = look(page).crop((PLOTS, 0, WIDTH, HEIGHT))
@@ -41,7 +42,6 @@ def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image
         found.append((title_of(part), before, look(page)))
         if part is not parts[-1]:
             page.get_by_role("button", name="Next: ").click()
-            page.get_by_text("DONE", exact=True).wait_for(state="detached")
     return found
 
 
