@@ -4,8 +4,8 @@
 
 Opens lesson after lesson by its card and runs a moment of its first step. After every lesson was open twice
 (until then the browser compiles what it runs often, and keeps that in its heap), measures the page's heap
-(after a garbage collection) and the server's memory; and again after so many more changes. Prints JSON; exit 0
-if both grew by less than 10 %.
+(after a garbage collection) and the server's memory; and again after so many more changes. Prints JSON; exit
+0 if both grew by less than 10 %.
 """
 
 from __future__ import annotations
