@@ -32,7 +32,14 @@ UNITS: dict[str, float] = {
 }
 """How many of a unit are one of the unit that telemetry records (s, m, rad, N·m, share)."""
 
-_NAMES = {"place": "tasks completed", "q": "angle", "v": "speed", "tau": "torque"}
+_NAMES = {
+    "place": "tasks completed",
+    "q": "angle",
+    "v": "speed",
+    "tau": "torque",
+    "delta_tau": "change of torque",
+    "step_us": "computing time",
+}
 _PER_JOINT = ("q", "v", "tau")
 
 

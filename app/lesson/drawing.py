@@ -80,7 +80,7 @@ def chart(
     words: str, unit: str, curve: Curve, ghost: Curve | None, bounds: Sequence[Bound], until: float
 ) -> str:
     """A signal over the run, with the ghost's (dashed) and what it is compared with (dotted)."""
-    height, top, left = 92, 18, 44
+    height, top, left = 92, 18, 54
     shown = [curve.values, *([ghost.values] if ghost is not None else [])]
     values = np.concatenate([each[np.isfinite(each)] for each in shown])
     if not values.size:
