@@ -33,10 +33,14 @@ class Window:
     def open(self) -> None:
         if self._modal is not None:
             return
-        self._modal = self._gui.add_modal(self._title)
-        with self._modal:
-            self._button()
-            self._fill()
+        self._modal = modal = self._gui.add_modal(self._title)
+        try:
+            with modal:
+                self._button()
+                self._fill()
+        except KeyError:
+            # Another scene came in: the page is built anew, and viser knows this window no more.
+            self._modal = None
 
     def _button(self) -> None:
         shut = self._gui.add_button("Close", color="gray")
