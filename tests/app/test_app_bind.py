@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 import viser
@@ -16,6 +17,7 @@ from viser import _messages
 
 from app.panels import bind
 from app.panels.bind import Bindings, Wish
+from app.panels.window import Window
 from lessons.events import Set
 from lessons.kinds import AnyEvent
 from lessons.scenes import load_scene
@@ -121,3 +123,24 @@ def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) 
     later = time.monotonic() + bind.HOLD + 1.0
     monkeypatch.setattr(bind.time, "monotonic", lambda: later)
     assert wish.now(False) is False
+
+
+def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
+    """Viser then knows the window's containers no more; the next press opens it."""
+    filled: list[bool] = []
+
+    def fill() -> None:
+        filled.append(True)
+        if len(filled) == 1:
+            raise KeyError("a container that is gone")
+
+    gui: Any = MagicMock()
+    gui.add_modal.return_value.__exit__.return_value = False
+    window = Window(gui, "All lessons", "L", fill)
+    window.open()
+    window.open()
+    assert len(filled) == gui.add_modal.call_count == 2
+    window.open()  # it is open
+    assert len(filled) == 2
+    window.close()
+    gui.add_modal.return_value.close.assert_called_once()
