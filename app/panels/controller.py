@@ -55,7 +55,7 @@ class ControllerPanel:
             with gui.add_folder(None):
                 period = gui.add_slider(
                     "T_s [ms]",
-                    min=0.5,
+                    min=min(0.5, 1e3 * settings.T_s),
                     max=max(5.0, 1e3 * settings.T_s),
                     step=0.5,
                     initial_value=1e3 * settings.T_s,
@@ -74,7 +74,7 @@ class ControllerPanel:
             with gui.add_folder(None):
                 scale = gui.add_slider(
                     "M̄ scale",
-                    min=0.1,
+                    min=min(0.1, settings.M_bar_scale),
                     max=max(5.0, settings.M_bar_scale),
                     step=0.05,
                     initial_value=settings.M_bar_scale,
@@ -85,7 +85,7 @@ class ControllerPanel:
                     with gui.add_folder(None):
                         value = float(settings.M_bar[joint])
                         number = gui.add_number(
-                            robot.joint_names[joint], value, min=1e-6, step=_nice_step(value)
+                            robot.joint_names[joint], value, min=min(1e-6, value), step=_nice_step(value)
                         )
                     bindings.bind(
                         number,
@@ -111,7 +111,11 @@ class ControllerPanel:
                 with gui.add_folder(None):
                     scales.append(
                         gui.add_slider(
-                            f"{name} scale", min=0.05, max=max(2.0, value), step=0.05, initial_value=value
+                            f"{name} scale",
+                            min=min(0.05, value),
+                            max=max(2.0, value),
+                            step=0.01,
+                            initial_value=value,
                         )
                     )
         bindings.bind(torque, lambda s: s.limits.torque, lambda on: Set("limits.torque", bool(on)))

@@ -52,7 +52,7 @@ class PlantPanel:
             unit = _UNIT.get(field, 1.0)
             value = _shown(settings, field, unit)
             slider = gui.add_slider(
-                label, min=low, max=max(high, value), step=step, initial_value=value, hint=hint
+                label, min=min(low, value), max=max(high, value), step=step, initial_value=value, hint=hint
             )
             bindings.bind(
                 slider,

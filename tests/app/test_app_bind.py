@@ -17,6 +17,7 @@ from viser import _messages
 
 from app.panels import bind
 from app.panels.bind import Bindings, Wish
+from app.panels.controller import ControllerPanel
 from app.panels.window import Window
 from lessons.events import Set
 from lessons.kinds import AnyEvent
@@ -144,3 +145,23 @@ def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
     assert len(filled) == 2
     window.close()
     gui.add_modal.return_value.close.assert_called_once()
+
+
+def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> None:
+    """A script, a lesson or a code may set what is beyond a slider's usual ends."""
+    scene = load_scene("planar3-hold")
+    far = scene.settings
+    for path, value in (
+        ("limits.torque_scale", 0.04),
+        ("limits.velocity_scale", 9.0),
+        ("M_bar_scale", 0.01),
+        ("T_s", 2e-4),
+        ("horizon", 60),
+        ("M_bar.1", 1e-8),
+    ):
+        far = changed(far, path, value)
+    loop = viser_server.get_event_loop()
+    bindings: Bindings[SceneSettings] = Bindings(lambda _: None, loop)
+    ControllerPanel(viser_server.gui, bindings, far, scene.robot)
+    values = {handle.value for handle in viser_server.gui._gui_input_handle_from_uuid.values()}
+    assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
