@@ -6,6 +6,7 @@ import viser
 
 from app.palette import BAD, GOOD
 from app.panels.bind import Bindings
+from app.panels.controls import add_slider
 from app.panels.deadline import DeadlineFolder
 from app.panels.snapshot import Snapshot
 from app.text import bar, block, esc, formula
@@ -52,34 +53,34 @@ class ControllerPanel:
                 initial_value=settings.horizon,
                 hint="Knots the controller looks ahead; 1 is the inverse dynamics hierarchy",
             )
-            with gui.add_folder(None):
-                period = gui.add_slider(
-                    "T_s [ms]",
-                    min=min(0.5, 1e3 * settings.T_s),
-                    max=max(5.0, 1e3 * settings.T_s),
-                    step=0.5,
-                    initial_value=1e3 * settings.T_s,
-                    hint="Control period, and the budget of every control step",
-                )
+            add_slider(
+                gui,
+                bindings,
+                settings,
+                "T_s [ms]",
+                "T_s",
+                (0.5, 5.0, 0.5),
+                lambda s: s.T_s,
+                "Control period, and the budget of every control step",
+                unit=1e3,
+            )
         bindings.bind(knots, lambda s: s.horizon, lambda value: Set("horizon", int(value)))
-        bindings.bind(
-            period, lambda s: round(1e3 * s.T_s, 6), lambda value: Set("T_s", round(1e-3 * float(value), 9))
-        )
 
     def _inertia(
         self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
     ) -> None:
         with gui.add_folder("Inertia guess M̄"):
             self._gauge = gui.add_html("")
-            with gui.add_folder(None):
-                scale = gui.add_slider(
-                    "M̄ scale",
-                    min=min(0.1, settings.M_bar_scale),
-                    max=max(5.0, settings.M_bar_scale),
-                    step=0.05,
-                    initial_value=settings.M_bar_scale,
-                    hint="One factor on the whole diagonal of M̄",
-                )
+            add_slider(
+                gui,
+                bindings,
+                settings,
+                "M̄ scale",
+                "M_bar_scale",
+                (0.1, 5.0, 0.05),
+                lambda s: s.M_bar_scale,
+                "One factor on the whole diagonal of M̄",
+            )
             with gui.add_folder("Per joint, kg·m²", expand_by_default=False):
                 for joint in range(robot.n):
                     with gui.add_folder(None):
@@ -92,7 +93,6 @@ class ControllerPanel:
                         lambda s, joint=joint: float(s.M_bar[joint]),
                         lambda value, joint=joint: Set(f"M_bar.{joint + 1}", float(value)),
                     )
-        bindings.bind(scale, lambda s: float(s.M_bar_scale), lambda value: Set("M_bar_scale", float(value)))
 
     def _limits(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         limits = settings.limits
@@ -106,31 +106,20 @@ class ControllerPanel:
                 hint="viability: a speed from which the joint can still stop. paper: the rows as printed, "
                 "which a few milliseconds of horizon cannot keep: the list of rungs shows it.",
             )
-            scales = []
-            for name, value in (("Torque", limits.torque_scale), ("Velocity", limits.velocity_scale)):
-                with gui.add_folder(None):
-                    scales.append(
-                        gui.add_slider(
-                            f"{name} scale",
-                            min=min(0.05, value),
-                            max=max(2.0, value),
-                            step=0.01,
-                            initial_value=value,
-                        )
-                    )
+            for name, field in (("Torque", "torque_scale"), ("Velocity", "velocity_scale")):
+                add_slider(
+                    gui,
+                    bindings,
+                    settings,
+                    f"{name} scale",
+                    f"limits.{field}",
+                    (0.05, 2.0, 0.01),
+                    lambda s, field=field: float(getattr(s.limits, field)),
+                    f"One factor on the robot's {name.lower()} limits",
+                )
         bindings.bind(torque, lambda s: s.limits.torque, lambda on: Set("limits.torque", bool(on)))
         bindings.bind(velocity, lambda s: s.limits.velocity, lambda on: Set("limits.velocity", bool(on)))
         bindings.bind(position, lambda s: s.limits.position, lambda mode: Set("limits.position", str(mode)))
-        bindings.bind(
-            scales[0],
-            lambda s: float(s.limits.torque_scale),
-            lambda value: Set("limits.torque_scale", float(value)),
-        )
-        bindings.bind(
-            scales[1],
-            lambda s: float(s.limits.velocity_scale),
-            lambda value: Set("limits.velocity_scale", float(value)),
-        )
 
     def _solver(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         with gui.add_folder("Solver", expand_by_default=False):

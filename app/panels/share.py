@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import viser
 
@@ -60,9 +59,16 @@ class SharePanel:
 
     def _write(self, told: Told) -> None:
         choice = _from_a_name(told.choice)
-        state = state_of(choice.name, told.settings, urdf=choice.urdf, tip=choice.tip, seed=choice.seed)
-        if choice.exercise is not None:
-            state = replace(state, lesson=choice.exercise.lesson, step=choice.exercise.place + 1)
+        exercise = choice.exercise
+        state = state_of(
+            choice.name,
+            told.settings,
+            urdf=choice.urdf,
+            tip=choice.tip,
+            seed=choice.seed,
+            lesson=None if exercise is None else exercise.lesson,
+            step=None if exercise is None else exercise.place + 1,
+        )
         self._line.value = command_line(state)
         self._line.visible = True
         self._code.visible = False

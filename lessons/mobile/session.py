@@ -21,7 +21,7 @@ from lessons.mobile.commands import Commands, command_step
 from lessons.mobile.control import VelocityController, make_velocity_controller
 from lessons.mobile.events import Appear, InsertTask, MobileEvent, Release, RemoveTask
 from lessons.mobile.scene import MobileScene
-from lessons.mobile.settings import MobileSettings, changed
+from lessons.mobile.settings import MobileSettings, changed, with_obstacle
 from lessons.mobile.telemetry import layout_of, write_bounds, write_plan, write_truth
 from robots import InputError, VelocityPlant
 from robots.collision import CollisionModel
@@ -125,9 +125,7 @@ class MobileSession:
                     raise unknown_name("role", event.role, self.roles)
                 self.progress = insert(self.progress, event.task(), event.before)
             case Appear():
-                htmpc = self.settings.htmpc
-                obstacles = tuple(each for each in htmpc.obstacles if each.name != event.name)
-                self.adopt(replace(self.settings, htmpc=replace(htmpc, obstacles=(*obstacles, event.ball()))))
+                self.adopt(with_obstacle(self.settings, event.ball()))
             case Push():
                 raise InputError("this scene is driven by velocity servos: a push would not move it")
             case Reset():
