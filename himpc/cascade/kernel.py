@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from logging import getLogger
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import float64, intp, njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -294,3 +295,24 @@ def room_left(Q: Array, y: Array, L: Array, lower: Array, upper: Array) -> tuple
                 # What is not a number must not pass for room.
                 least[level] = min(least[level], nearest if nearest == nearest else -np.inf)
     return U, room, least
+
+
+# Our own arrays are contiguous; what others hand over may be a slice.
+_MATRIX, _MATRICES = float64[:, ::1], float64[:, :, ::1]
+_GIVEN, _GIVEN_MATRIX, _GIVEN_MATRICES = float64[:], float64[:, :], float64[:, :, :]
+_INDICES = intp[:]
+_ARGUMENTS = {
+    orthogonal_bases: (_GIVEN_MATRICES,),
+    level_optimum: (
+        *(_GIVEN_MATRICES, _GIVEN_MATRICES, _GIVEN_MATRIX, float64, _MATRICES, _MATRIX, intp, intp),
+        *(_MATRIX, _GIVEN_MATRIX, _GIVEN_MATRIX, _INDICES, _INDICES, _GIVEN, float64),
+    ),
+    room_left: (_MATRICES, _MATRICES, _MATRIX, _GIVEN_MATRIX, _GIVEN_MATRIX),
+}
+# Compiled here, for every layout at once: left to the first call, each layout that turns up would stop a
+# running robot for the seconds that its compilation takes.
+for _function, _types in _ARGUMENTS.items():
+    _function.compile(_types)
+    _function.disable_compile()
+    if _function is orthogonal_bases and _function.stats.cache_misses:
+        getLogger(__name__).warning("compiling the controller's inner loops: some ten seconds, this once")

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from problems import Hierarchy, random_hierarchy, shifted, singular_hierarchy
 
-from himpc.cascade import cascade
+from himpc.cascade import cascade, kernel
 from himpc.cascade.level import NO_ROWS, ActiveRows
 from himpc.cascade.triangular import solve_triangular
 
@@ -83,3 +83,33 @@ def test_the_optimum_does_not_depend_on_the_fast_route(monkeypatch: pytest.Monke
         with monkeypatch.context() as patched:
             patched.setattr(cascade, "solve_triangular", lambda *_: [])
             assert_agree(fast, hierarchy.solve(), 1e-7)
+
+
+def test_slices_are_taken_and_nothing_is_compiled_while_a_robot_moves() -> None:
+    """However the arrays lie in memory the points are the same, from what was compiled at import."""
+    hierarchy = random_hierarchy(4, 7, 5, 3, room=1.0, even=True)
+    warm = [solution.active for solution in hierarchy.solve()]
+    assert any(len(active) for active in warm)
+    problems = [
+        p._replace(
+            B=_sliced(p.B), weighted_C=_sliced(p.weighted_C), weighted_free=np.asfortranarray(p.weighted_free)
+        )
+        for p in hierarchy.problems
+    ]
+    rows = hierarchy.rows._replace(lower=_sliced(hierarchy.rows.lower), upper=_sliced(hierarchy.rows.upper))
+    slices = [
+        ActiveRows(*map(_sliced, (active.row, active.joint, active.multiplier, active.slack)))
+        for active in warm
+    ]
+    B = np.concatenate([problem.B for problem in problems[:-1]], axis=1)
+    points = solve_triangular(hierarchy.problems, B, hierarchy.rows, warm)
+    assert points
+    for point, other in zip(points, solve_triangular(problems, _sliced(B), rows, slices), strict=True):
+        np.testing.assert_array_equal(point.U, other.U)
+    for compiled in (kernel.orthogonal_bases, kernel.level_optimum, kernel.room_left):
+        assert len(compiled.signatures) == 1
+
+
+def _sliced(array: np.ndarray) -> np.ndarray:
+    """The same numbers, not contiguous."""
+    return np.repeat(array, 2, axis=-1)[..., ::2]
