@@ -85,19 +85,26 @@ def _value(settings: AnySettings, path: str) -> Any:
 def _with_obstacles(now: MobileSettings, wanted: MobileSettings) -> tuple[MobileSettings, list[str]]:
     """Obstacles that appeared or were moved stand at the end, in the order in which that happened."""
     obstacles = wanted.htmpc.obstacles
-    told: list[str] = []
+    left = {each.name for each in obstacles}
+    gone = [
+        assignment(f"obstacles.{each.name}", None) for each in now.htmpc.obstacles if each.name not in left
+    ]
+    told = gone
     result = now
     for count in range(len(obstacles) + 1):
         last = obstacles[len(obstacles) - count :]
         if any(isinstance(each, Floor) for each in last):
             break
         told = [
-            assignment(
-                f"obstacles.{each.name}",
-                (*each.centre, each.radius) if isinstance(each, Ball) else each.centre,
-            )
-            for each in last
-            if not isinstance(each, Floor)
+            *gone,
+            *(
+                assignment(
+                    f"obstacles.{each.name}",
+                    (*each.centre, each.radius) if isinstance(each, Ball) else each.centre,
+                )
+                for each in last
+                if not isinstance(each, Floor)
+            ),
         ]
         result = now
         for each in told:

@@ -11,7 +11,7 @@ from app.faces.face import Context
 from app.goals import Goals, free_name
 from app.messages import Status, TaskView
 from app.moment import Moment
-from app.panels.begin import BeginPanel
+from app.panels.begin import BeginPanel, last_ball
 from app.panels.htmpc import HtmpcPanel
 from app.panels.joints import ACCELERATION, JointPlots
 from app.panels.mission import MissionPanel, swap
@@ -71,6 +71,7 @@ class VelocityFace:
         self._begin.on_swap = self._swap
         self._begin.on_look = self._look
         self._begin.on_obstacle = self._add_obstacle
+        self._begin.on_clear = self._clear_ball
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
         with plots.add_tab("Errors"):
@@ -129,6 +130,11 @@ class VelocityFace:
         taken = [each.name for each in self._settings().htmpc.obstacles]
         name = free_name("ball", taken)
         self._context.post(Appear(name, (float(x), float(y), float(poses[-1, 2])), _RADIUS))
+
+    def _clear_ball(self) -> None:
+        ball = last_ball(self._settings())
+        if ball is not None:
+            self._context.post(Set(f"obstacles.{ball.name}", None))
 
     def _look(self) -> None:
         poses = self._context.poses()

@@ -10,6 +10,7 @@ from app.palette import RGB
 from app.panels.snapshot import Snapshot
 from app.text import badge, block, esc, quantity, swatch
 from lessons.mobile.settings import MobileSettings
+from robots.collision import Ball
 
 _STILL = 0.02
 """m/s and rad/s: joints slower than this are at rest."""
@@ -28,6 +29,7 @@ class BeginPanel:
         self.on_swap: Callable[[], None] = lambda: None
         self.on_look: Callable[[], None] = lambda: None
         self.on_obstacle: Callable[[], None] = lambda: None
+        self.on_clear: Callable[[], None] = lambda: None
         self._colours = colours
         self._dragged = False
         self._next = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
@@ -37,6 +39,9 @@ class BeginPanel:
         look = gui.add_button("Look at the robot", hint="Turns the camera to where it is now")
         obstacle = gui.add_button(
             "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
+        )
+        self._clear = gui.add_button(
+            "Take the last ball away", hint="Of those that the robot keeps clear of", visible=False
         )
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand and the base", True)
@@ -58,6 +63,10 @@ class BeginPanel:
         async def _(_: object) -> None:
             self.on_obstacle()
 
+        @self._clear.on_click
+        async def _(_: object) -> None:
+            self.on_clear()
+
         @self.dark.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
             if event.client is not None:
@@ -74,6 +83,9 @@ class BeginPanel:
         mission = now.status.mission
         if mission is not None and mission.done:
             lines.append(badge("MISSION DONE", self._colours[now.settings.levels[0].name]))
+        there = last_ball(now.settings) is not None
+        if self._clear.visible != there:
+            self._clear.visible = there
         self._live.content = block("<br>".join(lines))
 
     def _line(self, now: Snapshot[MobileSettings], role: str, unit: str) -> str:
@@ -85,6 +97,11 @@ class BeginPanel:
         if unit == "m" and error > _FAR and place > 1 and bool((abs(now.field("v")) < _STILL).all()):
             text += ". It rests: going on would disturb level 1"
         return text
+
+
+def last_ball(settings: MobileSettings) -> Ball | None:
+    """The ball that came last among what the robot keeps clear of."""
+    return next((each for each in reversed(settings.htmpc.obstacles) if isinstance(each, Ball)), None)
 
 
 def _guide(text: tuple[str, str]) -> str:

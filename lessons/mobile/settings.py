@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, get_type_hints
 
@@ -12,7 +12,7 @@ from lessons.levels import ordered
 from lessons.mobile.options import MobileOptions, Stay
 from lessons.values import fitting, typed, weight
 from robots import InputError, VelocityPlantSettings
-from robots.collision import Ball, Floor, Obstacle
+from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
 
 VELOCITY_CONTROLLERS: dict[str, str] = {
@@ -99,7 +99,8 @@ def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
     "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order" takes
     effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation brings its
     own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r, and "obstacles.NAME" for a ball
-    [x, y, z, radius], new or instead of the obstacle of that name, or for where one is now, [x, y, z].
+    [x, y, z, radius], new or instead of the obstacle of that name, for where one is now, [x, y, z], or None
+    to take it away.
 
     Raises:
         InputError: unknown path (naming the nearest), or a value of the wrong type or range.
@@ -107,7 +108,12 @@ def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
     head, _, rest = path.partition(".")
     htmpc = settings.htmpc
     if head == "obstacles" and rest:
-        return with_obstacle(settings, _obstacle(htmpc.obstacles, path, rest, value))
+        known = {each.name: each for each in htmpc.obstacles if not isinstance(each, Floor)}
+        if value is not None:
+            return with_obstacle(settings, _obstacle(known, path, rest, value))
+        if rest not in known:
+            raise unknown_name("obstacle", rest, known)
+        return replace(settings, htmpc=replace(htmpc, obstacles=_without(htmpc.obstacles, rest)))
     if path not in paths(settings):
         raise unknown_name("setting", path, paths(settings))
     if path == "order":
@@ -174,20 +180,24 @@ def value_at(settings: MobileSettings, path: str) -> Any:
 
 def with_obstacle(settings: MobileSettings, obstacle: Obstacle) -> MobileSettings:
     """The settings with an obstacle more, or instead of the one of its name."""
-    others = (each for each in settings.htmpc.obstacles if each.name != obstacle.name)
-    return replace(settings, htmpc=replace(settings.htmpc, obstacles=(*others, obstacle)))
+    htmpc = settings.htmpc
+    obstacles = (*_without(htmpc.obstacles, obstacle.name), obstacle)
+    return replace(settings, htmpc=replace(htmpc, obstacles=obstacles))
 
 
-def _obstacle(obstacles: tuple[Obstacle, ...], path: str, name: str, value: Any) -> Obstacle:
+def _without(obstacles: tuple[Obstacle, ...], name: str) -> tuple[Obstacle, ...]:
+    return tuple(each for each in obstacles if each.name != name)
+
+
+def _obstacle(known: Mapping[str, Ball | Box], path: str, name: str, value: Any) -> Obstacle:
     numbers = weight(path, value)
-    known = {each.name: each for each in obstacles if not isinstance(each, Floor)}
     if isinstance(numbers, tuple) and len(numbers) == 4:
         x, y, z, radius = numbers
         return Ball(name, (x, y, z), radius)
     if isinstance(numbers, tuple) and len(numbers) == 3 and name in known:
         x, y, z = numbers
         return replace(known[name], centre=(x, y, z))
-    movable = f", or move {', '.join(known)} to [x, y, z]" if known else ""
+    movable = f", or move {', '.join(known)} to [x, y, z], or take one away by null" if known else ""
     raise InputError(
         f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]{movable}"
     )

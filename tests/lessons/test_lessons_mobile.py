@@ -192,6 +192,22 @@ def test_obstacles_are_kept_clear_of() -> None:
     assert summary["clearance_min_m"] >= 0.05 - 0.01
 
 
+def test_an_obstacle_is_taken_away() -> None:
+    """By its name, live as headless; what is not there cannot be."""
+    session = MobileSession(scene("ridgeback-ur10-cluttered"))
+    session.post(Appear("surprise", (9.0, 9.0, 1.0), 0.2))
+    session.tick()
+    before = [each.name for each in session.settings.htmpc.obstacles]
+    session.post(Set("obstacles.surprise", None))
+    session.tick()
+    assert [each.name for each in session.settings.htmpc.obstacles] == before[:-1]
+    alone = prepared(scene("ridgeback-ur10-cluttered"), None, ["obstacles.table=null"])
+    assert isinstance(alone, MobileScene)
+    assert "table" not in [each.name for each in alone.settings.htmpc.obstacles]
+    with pytest.raises(InputError, match=r"no obstacle 'tabel': did you mean 'table'\?"):
+        changed(session.settings, "obstacles.tabel", None)
+
+
 def test_a_ball_that_appears_ahead_is_not_run_into() -> None:
     """At full speed, 1 m from the nearest point of the robot, right on its way."""
     session = MobileSession(scene("ridgeback-ur10-cluttered"))

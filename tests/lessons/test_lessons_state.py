@@ -57,7 +57,7 @@ def events(draw: st.DrawFn, scene: AnyScene) -> MobileEvent:
         centre = draw(st.tuples(NUMBERS, NUMBERS, NUMBERS))
         return Appear(draw(st.sampled_from(["visitor", "bin", "lamp"])), centre, draw(st.floats(0.1, 1.0)))
     if kind == "moved":
-        place = list(draw(st.tuples(NUMBERS, NUMBERS, NUMBERS)))
+        place = draw(st.none() | st.tuples(NUMBERS, NUMBERS, NUMBERS).map(list))
         return Set(f"obstacles.{draw(st.sampled_from(['table', 'bin', 'visitor', 'floor']))}", place)
     return Set(draw(st.sampled_from(paths_of(scene))), draw(values(scene.robot.n)))
 
@@ -210,7 +210,14 @@ def test_settings_of_a_stranger_are_refused_when_prepared(assignment: str) -> No
 
 
 @pytest.mark.parametrize(
-    "assignment", ["rounds=1000000000", f"seats={[0] * 900}", "obstacles.x=[1,2]", "obstacles.x=[1,2,3,-1]"]
+    "assignment",
+    [
+        "rounds=1000000000",
+        f"seats={[0] * 900}",
+        "obstacles.x=[1,2]",
+        "obstacles.x=[1,2,3,-1]",
+        "obstacles.x=null",
+    ],
 )
 def test_a_mission_of_a_stranger_cannot_fill_the_memory(assignment: str) -> None:
     with pytest.raises(InputError):
