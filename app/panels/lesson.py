@@ -216,6 +216,8 @@ class LessonPanel:
         seen = lecture.attempt > 0
         over = lecture.phase == "done"
         challenge = isinstance(self._part, Challenge)
+        # What is missed invites another try; who has had enough presses Skip.
+        passed = lecture.result is not None and lecture.result.passed
         if self._asking is not None:
             self._asking.show(lecture)
         ready = self._asking is None or lecture.answer is not None or self._asking.suggested is not None
@@ -227,7 +229,7 @@ class LessonPanel:
         for handle, shown in (
             (self._run, challenge or lecture.phase == "waiting"),
             (self._hurry, challenge or lecture.phase == "waiting"),
-            (self._next, over),
+            (self._next, over and (passed or not challenge)),
             (self._free, over and not challenge),
         ):
             if handle.visible != shown:

@@ -84,6 +84,7 @@ def take_challenge(page: Page, school: PageServer, challenge: Challenge) -> None
     hurry(page)
     run(page, "Start the run")
     expect(page.get_by_text("NOT YET", exact=True)).to_be_visible()
+    expect(page.get_by_role("button", name="Next: ")).to_have_count(0)
     learner = school.sessions.learners[0]
     for assignment in challenge.solutions[0]:
         learner.send(Post(Set(*parse_assignment(assignment))))
@@ -91,6 +92,7 @@ def take_challenge(page: Page, school: PageServer, challenge: Challenge) -> None
     expect(page.get_by_text("PASSED", exact=True)).to_be_visible(timeout=120_000)
     expect(marks(page, "✓")).to_have_count(len(challenge.goals))
     expect(page.get_by_text("Your best score:")).to_be_visible()
+    expect(page.get_by_role("button", name="Next: ")).to_be_visible()
 
 
 def test_the_cards_show_what_was_done(learner_page: Page) -> None:
