@@ -19,7 +19,7 @@ DOORS = {
     "coal": ("robots/collision.py",),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
-    "numba": ("himpc/cascade/kernel.py",),
+    "numba": ("himpc/cascade/compiled.py",),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
     "tyro": ("app/",),

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from logging import getLogger
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, intp, njit
 from numpy.typing import NDArray
+
+from himpc.cascade.compiled import (
+    GIVEN,
+    GIVEN_INDICES,
+    GIVEN_MATRICES,
+    GIVEN_MATRIX,
+    MATRICES,
+    MATRIX,
+    NUMBER,
+    WHOLE,
+    compiled,
+    inner,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -36,56 +47,134 @@ class Optimum(NamedTuple):
     multiplier: Array
 
 
-@njit(cache=True)
-def orthogonal_bases(B: Array) -> tuple[Array, float]:
-    """Q (N, n, n) of the Householder QR factorisation of each B_jᵀ = Q_j T_j, B (N, s, n) with s ≤ n.
+@inner
+def _forward(F: Array, x: Array) -> None:
+    """x ← F⁻¹ x, F lower triangular."""
+    for a in range(x.size):
+        total = x[a]
+        for b in range(a):
+            total -= F[a, b] * x[b]
+        x[a] = total / F[a, a]
 
-    Also the least diagonal entry of any T_j over the greatest, in magnitude.
-    """
-    N, s, n = B.shape
-    Q = np.zeros((N, n, n))
-    T = np.empty((n, s))
-    reflectors = np.empty((s, n))
-    least, greatest = np.inf, 0.0
+
+@inner
+def _backward(F: Array, x: Array) -> None:
+    """x ← F⁻ᵀ x, F lower triangular."""
+    for a in range(x.size - 1, -1, -1):
+        x[a] /= F[a, a]
+        for b in range(a):
+            x[b] -= F[a, b] * x[a]
+
+
+@inner
+def _assemble(B: Array, C: Array, Q: Array, y: Array, start: int, end: int, error: Array, G: Array) -> None:
+    """Adds to `error` what the levels above do, and fills G, ∂(Q^½ e)/∂y over the own columns."""
+    N, m, n = B.shape
+    own = end - start
+    seen = np.empty(end)
     for j in range(N):
-        for c in range(s):
-            for a in range(n):
-                T[a, c] = B[j, c, a]
-        for c in range(s):
-            norm = 0.0
-            for a in range(c, n):
-                norm += T[a, c] * T[a, c]
-            norm = np.sqrt(norm)
-            least, greatest = min(least, norm), max(greatest, norm)
-            v = reflectors[c]
-            v[c:] = T[c:, c]
-            v[c] += norm if v[c] >= 0.0 else -norm
-            length = 0.0
-            for a in range(c, n):
-                length += v[a] * v[a]
-            scale = np.sqrt(2.0 / length) if length > 0.0 else 0.0
-            v[c:] *= scale
-            for other in range(c + 1, s):
-                _reflect(v, T[:, other], c)
-        for c in range(n):
-            Q[j, c, c] = 1.0
-        for c in range(s - 1, -1, -1):
-            for column in range(c, n):
-                _reflect(reflectors[c], Q[j, :, column], c)
-    return Q, least / greatest if greatest > 0.0 else 0.0
+        for i in range(m):
+            above = 0.0
+            for c in range(end):
+                total = 0.0
+                for a in range(n):
+                    total += B[j, i, a] * Q[j, a, c]
+                seen[c] = total
+                if c < start:
+                    above += total * y[j, c]
+            for knot in range(N):
+                weight = C[knot, i, j]
+                if weight != 0.0:
+                    error[knot * m + i] += weight * above
+                    for c in range(own):
+                        G[knot * m + i, j * own + c] = weight * seen[start + c]
 
 
-@njit(cache=True)
-def _reflect(v: Array, x: Array, first: int) -> None:
-    """x ← (1 − v vᵀ) x from index `first` on, ‖v‖² = 2."""
-    along = 0.0
-    for a in range(first, v.size):
-        along += v[a] * x[a]
-    for a in range(first, v.size):
-        x[a] -= along * v[a]
+@inner
+def _equalities(
+    taken: Indices,
+    row: Indices,
+    joint: Indices,
+    side: Array,
+    Q: Array,
+    y: Array,
+    start: int,
+    end: int,
+    L: Array,
+    lower: Array,
+    upper: Array,
+) -> tuple[Array, Array, Array]:
+    """A y_own + A' y_beyond = target for some rows: A (k, N·own), A' (k, N·(n−end)), target (k,)."""
+    N, n = y.shape
+    own, over = end - start, n - end
+    A = np.empty((taken.size, N * own))
+    beyond = np.empty((taken.size, N * over))
+    target = np.empty(taken.size)
+    for place in range(taken.size):
+        r, joined = row[taken[place]], joint[taken[place]]
+        limit = upper[r, joined] if side[taken[place]] > 0.0 else lower[r, joined]
+        for j in range(N):
+            weight = L[r, j]
+            for c in range(start):
+                limit -= weight * Q[j, joined, c] * y[j, c]
+            for c in range(own):
+                A[place, j * own + c] = weight * Q[j, joined, start + c]
+            for c in range(over):
+                beyond[place, j * over + c] = weight * Q[j, joined, end + c]
+        target[place] = limit
+    return A, beyond, target
 
 
-@njit(cache=True)
+@inner
+def _bordered(
+    G: Array, error: Array, F: Array, A: Array, beyond: Array, target: Array, R: float, accuracy: float
+) -> tuple[Array, Array, Array, float]:
+    """min ½R‖x‖² + ½R‖x'‖² + ½‖error + G x‖² with A x + beyond x' = target, F the factor of GᵀG + R.
+
+    Returns:
+        x, the multipliers λ (x' = −beyondᵀλ/R), error + G x, and the KKT residual; −1 for that if the
+        gradient is too large.
+    """
+    d, k = F.shape[0], target.size
+    W = A.copy()
+    E = np.empty((k, k))
+    corner = np.empty((k, k))
+    if k:
+        corner = np.dot(beyond, beyond.T) / R
+        for a in range(k):
+            _forward(F, W[a])
+        E = np.linalg.cholesky(np.dot(W, W.T) + corner)
+    x, pull = np.zeros(d), np.zeros(k)
+    slope, lost, after = np.dot(error, G), -target, error
+    for _ in range(_ROUNDS):
+        z = -slope
+        _forward(F, z)
+        if k:
+            change = np.dot(W, z) + lost
+            _forward(E, change)
+            _backward(E, change)
+            z -= np.dot(change, W)
+            pull += change
+        _backward(F, z)
+        x += z
+        after = error + np.dot(G, x)
+        slope = R * x + np.dot(after, G)
+        if k:
+            slope += np.dot(pull, A)
+            lost = np.dot(A, x) - np.dot(corner, pull) - target
+        gradient = np.sqrt(np.dot(slope, slope))
+        if gradient <= accuracy:
+            return x, pull, after, gradient
+        size = np.sqrt((G * G).sum())
+        if gradient <= _ROUNDING * size * np.sqrt(np.dot(error, error)):
+            return x, pull, after, gradient / max(1.0, (R + size * size) * np.sqrt(np.dot(x, x)))
+    return x, pull, after, -1.0
+
+
+@compiled(
+    *(GIVEN_MATRICES, GIVEN_MATRICES, GIVEN_MATRIX, NUMBER, MATRICES, MATRIX, WHOLE, WHOLE),
+    *(MATRIX, GIVEN_MATRIX, GIVEN_MATRIX, GIVEN_INDICES, GIVEN_INDICES, GIVEN, NUMBER),
+)
 def level_optimum(
     B: Array,
     C: Array,
@@ -150,131 +239,7 @@ def level_optimum(
         held[wrong] = False
 
 
-@njit(cache=True)
-def _bordered(
-    G: Array, error: Array, F: Array, A: Array, beyond: Array, target: Array, R: float, accuracy: float
-) -> tuple[Array, Array, Array, float]:
-    """min ½R‖x‖² + ½R‖x'‖² + ½‖error + G x‖² with A x + beyond x' = target, F the factor of GᵀG + R.
-
-    Returns:
-        x, the multipliers λ (x' = −beyondᵀλ/R), error + G x, and the KKT residual; −1 for that if the
-        gradient is too large.
-    """
-    d, k = F.shape[0], target.size
-    W = A.copy()
-    E = np.empty((k, k))
-    corner = np.empty((k, k))
-    if k:
-        corner = np.dot(beyond, beyond.T) / R
-        for a in range(k):
-            _forward(F, W[a])
-        E = np.linalg.cholesky(np.dot(W, W.T) + corner)
-    x, pull = np.zeros(d), np.zeros(k)
-    slope, lost, after = np.dot(error, G), -target, error
-    for _ in range(_ROUNDS):
-        z = -slope
-        _forward(F, z)
-        if k:
-            change = np.dot(W, z) + lost
-            _forward(E, change)
-            _backward(E, change)
-            z -= np.dot(change, W)
-            pull += change
-        _backward(F, z)
-        x += z
-        after = error + np.dot(G, x)
-        slope = R * x + np.dot(after, G)
-        if k:
-            slope += np.dot(pull, A)
-            lost = np.dot(A, x) - np.dot(corner, pull) - target
-        gradient = np.sqrt(np.dot(slope, slope))
-        if gradient <= accuracy:
-            return x, pull, after, gradient
-        size = np.sqrt((G * G).sum())
-        if gradient <= _ROUNDING * size * np.sqrt(np.dot(error, error)):
-            return x, pull, after, gradient / max(1.0, (R + size * size) * np.sqrt(np.dot(x, x)))
-    return x, pull, after, -1.0
-
-
-@njit(cache=True)
-def _assemble(B: Array, C: Array, Q: Array, y: Array, start: int, end: int, error: Array, G: Array) -> None:
-    """Adds to `error` what the levels above do, and fills G, ∂(Q^½ e)/∂y over the own columns."""
-    N, m, n = B.shape
-    own = end - start
-    seen = np.empty(end)
-    for j in range(N):
-        for i in range(m):
-            above = 0.0
-            for c in range(end):
-                total = 0.0
-                for a in range(n):
-                    total += B[j, i, a] * Q[j, a, c]
-                seen[c] = total
-                if c < start:
-                    above += total * y[j, c]
-            for knot in range(N):
-                weight = C[knot, i, j]
-                if weight != 0.0:
-                    error[knot * m + i] += weight * above
-                    for c in range(own):
-                        G[knot * m + i, j * own + c] = weight * seen[start + c]
-
-
-@njit(cache=True)
-def _equalities(
-    taken: Indices,
-    row: Indices,
-    joint: Indices,
-    side: Array,
-    Q: Array,
-    y: Array,
-    start: int,
-    end: int,
-    L: Array,
-    lower: Array,
-    upper: Array,
-) -> tuple[Array, Array, Array]:
-    """A y_own + A' y_beyond = target for some rows: A (k, N·own), A' (k, N·(n−end)), target (k,)."""
-    N, n = y.shape
-    own, over = end - start, n - end
-    A = np.empty((taken.size, N * own))
-    beyond = np.empty((taken.size, N * over))
-    target = np.empty(taken.size)
-    for place in range(taken.size):
-        r, joined = row[taken[place]], joint[taken[place]]
-        limit = upper[r, joined] if side[taken[place]] > 0.0 else lower[r, joined]
-        for j in range(N):
-            weight = L[r, j]
-            for c in range(start):
-                limit -= weight * Q[j, joined, c] * y[j, c]
-            for c in range(own):
-                A[place, j * own + c] = weight * Q[j, joined, start + c]
-            for c in range(over):
-                beyond[place, j * over + c] = weight * Q[j, joined, end + c]
-        target[place] = limit
-    return A, beyond, target
-
-
-@njit(cache=True)
-def _forward(F: Array, x: Array) -> None:
-    """x ← F⁻¹ x, F lower triangular."""
-    for a in range(x.size):
-        total = x[a]
-        for b in range(a):
-            total -= F[a, b] * x[b]
-        x[a] = total / F[a, a]
-
-
-@njit(cache=True)
-def _backward(F: Array, x: Array) -> None:
-    """x ← F⁻ᵀ x, F lower triangular."""
-    for a in range(x.size - 1, -1, -1):
-        x[a] /= F[a, a]
-        for b in range(a):
-            x[b] -= F[a, b] * x[a]
-
-
-@njit(cache=True)
+@compiled(MATRICES, MATRICES, MATRIX, GIVEN_MATRIX, GIVEN_MATRIX)
 def room_left(Q: Array, y: Array, L: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
     """U_j = Q_j y_j of every level, y (levels, N, n), the room at each row, (levels, r, n), negative where
     it is violated, and the least room of each level."""
@@ -295,24 +260,3 @@ def room_left(Q: Array, y: Array, L: Array, lower: Array, upper: Array) -> tuple
                 # What is not a number must not pass for room.
                 least[level] = min(least[level], nearest if nearest == nearest else -np.inf)
     return U, room, least
-
-
-# Our own arrays are contiguous; what others hand over may be a slice.
-_MATRIX, _MATRICES = float64[:, ::1], float64[:, :, ::1]
-_GIVEN, _GIVEN_MATRIX, _GIVEN_MATRICES = float64[:], float64[:, :], float64[:, :, :]
-_INDICES = intp[:]
-_ARGUMENTS = {
-    orthogonal_bases: (_GIVEN_MATRICES,),
-    level_optimum: (
-        *(_GIVEN_MATRICES, _GIVEN_MATRICES, _GIVEN_MATRIX, float64, _MATRICES, _MATRIX, intp, intp),
-        *(_MATRIX, _GIVEN_MATRIX, _GIVEN_MATRIX, _INDICES, _INDICES, _GIVEN, float64),
-    ),
-    room_left: (_MATRICES, _MATRICES, _MATRIX, _GIVEN_MATRIX, _GIVEN_MATRIX),
-}
-# Compiled here, for every layout at once: left to the first call, each layout that turns up would stop a
-# running robot for the seconds that its compilation takes.
-for _function, _types in _ARGUMENTS.items():
-    _function.compile(_types)
-    _function.disable_compile()
-    if _function is orthogonal_bases and _function.stats.cache_misses:
-        getLogger(__name__).warning("compiling the controller's inner loops: some ten seconds, this once")

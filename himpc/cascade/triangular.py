@@ -10,7 +10,8 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.kernel import level_optimum, orthogonal_bases, room_left
+from himpc.cascade.bases import orthogonal_bases
+from himpc.cascade.kernel import level_optimum, room_left
 from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, Point
 from himpc.cascade.null_space import CLEARLY_REGULAR
 from himpc.limits.rows import Rows

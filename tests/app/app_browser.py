@@ -13,9 +13,12 @@ CHROMIUM_ARGS = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swi
 SLOW = 60_000  # ms: WebGL in software on two shared cores
 BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
 
-_SELDOM = """(() => {
+OFTEN, SELDOM = 80, 300
+"""ms between two pictures, where something is dragged in 3D and where nothing is."""
+
+_RESTING = """(() => {
   const frame = window.requestAnimationFrame.bind(window);
-  window.requestAnimationFrame = (draw) => window.setTimeout(() => frame(draw), 300);
+  window.requestAnimationFrame = (draw) => window.setTimeout(() => frame(draw), REST);
   window.cancelAnimationFrame = (id) => window.clearTimeout(id);
 })()"""
 
@@ -39,20 +42,18 @@ def open_page(
     width: int = 1300,
     height: int = 480,
     scale: float = 0.5,
-    seldom: bool = False,
+    rest: int = OFTEN,
 ) -> Page:
     """A fresh browser profile with the page loaded and the robot drawn.
 
-    seldom: three pictures a second, for tests that drag nothing in 3D. Without a graphics card every picture
-    takes both cores a tenth of a second.
+    rest: ms between two pictures. Without a graphics card every picture takes both cores a tenth of a second.
     """
     page = browser.new_context(
         viewport={"width": width, "height": height},
         device_scale_factor=scale,  # 0.5: a quarter of the pixels: they are drawn without a graphics card
     ).new_page()
     page.set_default_timeout(SLOW)
-    if seldom:
-        page.add_init_script(_SELDOM)
+    page.add_init_script(_RESTING.replace("REST", str(rest)))
     load(page, url)
     return page
 
@@ -172,6 +173,7 @@ def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm:
     """Pulls the gizmo's arrow of a world axis by so many metres. arm: m, where the arrow is taken hold of."""
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
+    page.wait_for_timeout(4 * OFTEN)  # a camera that was turned is so from the next picture on
     start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
     end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
     _drag(page, start, end)

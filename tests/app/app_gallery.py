@@ -9,7 +9,7 @@ import argparse
 import io
 from pathlib import Path
 
-from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, open_page
+from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from app_lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
@@ -77,7 +77,7 @@ def main() -> None:
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
-            page = open_page(browser, server.url, WIDTH, HEIGHT, scale=1.0, seldom=True)
+            page = open_page(browser, server.url, WIDTH, HEIGHT, scale=1.0, rest=SELDOM)
             for name in options.names:
                 lesson = load_lesson(name)
                 sheet(walk(page, lesson)).save(options.out / f"{name}.webp", quality=QUALITY, method=6)

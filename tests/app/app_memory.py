@@ -20,7 +20,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import psutil
-from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, open_page
+from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from app_lessons import open_lesson
 from playwright.sync_api import Page, expect, sync_playwright
 
@@ -40,7 +40,7 @@ def main() -> int:
     expect.set_options(timeout=SLOW)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
-        page = open_page(browser, server.url, 1200, 700, seldom=True)
+        page = open_page(browser, server.url, 1200, 700, rest=SELDOM)
         try:
             for count in range(2 * len(COURSE)):
                 switch(page, count)

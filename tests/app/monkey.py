@@ -23,7 +23,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from app_browser import CHROMIUM_ARGS, SLOW, find_chromium, load, open_page, tab
+from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
 from app.block import Block
@@ -266,7 +266,7 @@ def walk(
     browser: Browser, server: PageServer, minutes: float, seed: int, complaints: Callable[[], str]
 ) -> Findings:
     """A random walk of so many minutes; it ends early when something broke."""
-    page = open_page(browser, server.url, seldom=True)
+    page = open_page(browser, server.url, rest=SELDOM)
     page.set_default_timeout(_PATIENCE)
     page.set_default_navigation_timeout(SLOW)
     monkey = Monkey(page, server, seed, complaints)

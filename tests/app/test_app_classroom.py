@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, cast
 
 import pytest
-from app_browser import open_page, press, write
+from app_browser import SELDOM, open_page, press, write
 from playwright.sync_api import Browser, expect
 
 from app.choice import SceneChoice
@@ -50,7 +50,7 @@ def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
     """A page without it sees the same robot and cannot stop it; with it the page can."""
     assert isinstance(classroom.sessions, Classroom)
     (learner,) = classroom.sessions.learners
-    page = open_page(browser, classroom.url, 1300, 700, seldom=True)
+    page = open_page(browser, classroom.url, 1300, 700, rest=SELDOM)
     watching = page.get_by_text("you are watching")
     expect(watching).to_be_visible()
     press(page, "Pause")

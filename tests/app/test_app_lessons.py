@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from app_browser import eventually, key, open_page, press
+from app_browser import SELDOM, eventually, key, open_page, press
 from app_lessons import expect_part, hurry, marks, open_lesson, predict, run
 from playwright.sync_api import Browser, Page, expect
 
@@ -30,7 +30,7 @@ def school() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, school.url, 1000, 700, seldom=True)
+    opened = open_page(browser, school.url, 1000, 700, rest=SELDOM)
     yield opened
     opened.context.close()
 

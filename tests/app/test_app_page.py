@@ -272,7 +272,7 @@ def test_wrong_robots_are_one_sentence_and_uploads_work(page: Page, learner: Lea
     mine.write_text(re.sub(r'<robot name="[^"]*"', f'<robot name="{hostile}"', text, count=1))
     _upload(page, mine)
     assert eventually(page, lambda: learner.ready is not None and learner.ready.robot.n == 3)
-    wait_for_scene(page)
+    expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()  # the panel is built anew
     tab(page, "Robot")
     expect(page.get_by_text("3 joints").first).to_be_visible()
     assert page.evaluate("() => window.hacked") is None

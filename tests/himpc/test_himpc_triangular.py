@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from problems import Hierarchy, random_hierarchy, shifted, singular_hierarchy
 
-from himpc.cascade import cascade, kernel
+from himpc.cascade import bases, cascade, kernel
 from himpc.cascade.level import NO_ROWS, ActiveRows
 from himpc.cascade.triangular import solve_triangular
 
@@ -106,7 +106,7 @@ def test_slices_are_taken_and_nothing_is_compiled_while_a_robot_moves() -> None:
     assert points
     for point, other in zip(points, solve_triangular(problems, _sliced(B), rows, slices), strict=True):
         np.testing.assert_array_equal(point.U, other.U)
-    for compiled in (kernel.orthogonal_bases, kernel.level_optimum, kernel.room_left):
+    for compiled in (bases.orthogonal_bases, kernel.level_optimum, kernel.room_left):
         assert len(compiled.signatures) == 1
 
 
