@@ -14,6 +14,7 @@ from playwright.sync_api import expect, sync_playwright
 from app.choice import SceneChoice
 from app.lesson.exercise import Exercise
 from app.server import PageServer
+from lessons.lesson import Step
 
 OUT = Path(__file__).parents[2] / "docs" / "page.png"
 EXERCISE = Exercise("a-redundant-arm", 2)
@@ -28,7 +29,7 @@ def main() -> None:
             page = open_page(browser, server.url, 1440, 900, scale=1.0, rest=SELDOM)
             part = EXERCISE.part
             expect_part(page, EXERCISE.whole, part)
-            if part.prediction is not None:
+            if isinstance(part, Step) and part.prediction is not None:
                 predict(page, part.prediction)
             run(page)
             page.mouse.move(700, 850)  # or a hint would cover something
