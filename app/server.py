@@ -25,6 +25,7 @@ from app.panels.watching import add_watching
 from app.runs import start
 from app.sessions import GRACE, Sessions
 from app.text import block
+from app.wake import WakeUp
 from robots import InputError
 from robots.shapes import link_shapes
 
@@ -124,7 +125,11 @@ class PageServer:
         # Any client could ask for a public tunnel to this machine, button or not.
         websockets.unregister_handler(_messages.ShareUrlRequest)
 
+        loop = self._viser.get_event_loop()
+        websockets._broadcast_buffer.message_event = WakeUp(loop)
+
         async def check(connection: infra.WebsockClientConnection) -> None:
+            connection.get_message_buffer().message_event = WakeUp(loop)
             # A page of any other site may open a WebSocket to localhost; browsers say where it came from.
             live = websockets._live_connections.get(connection.client_id)
             if live is not None and live.request is not None:

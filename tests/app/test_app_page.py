@@ -35,6 +35,7 @@ from app.learner import Learner
 from app.messages import Load
 from app.process import wait_until
 from app.server import PageServer
+from app.wake import WakeUp
 from lessons.settings import SceneSettings
 from robots import CATALOG
 
@@ -205,6 +206,14 @@ def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: Learner) ->
         key(page, name)
     assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[2].enabled)
     assert learner.settings.levels[1].enabled and learner.status.running
+
+
+def test_no_thread_can_hold_up_what_is_sent(page: Page, server: PageServer) -> None:
+    websockets = server._viser._websock_server
+    senders = [each.message_buffer for each in websockets._client_state_from_id.values()]
+    assert senders
+    for sender in (*senders, websockets._broadcast_buffer):
+        assert isinstance(sender.message_event, WakeUp)
 
 
 def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> None:

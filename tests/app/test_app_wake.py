@@ -1,0 +1,55 @@
+"""A page never stands still because two threads met."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import deque
+from typing import Any
+
+from app.wake import WakeUp
+
+
+class Meeting(deque[Any]):
+    """An event's waiters; another thread sets the event just before the first of them goes to sleep."""
+
+    def __init__(self, event: asyncio.Event) -> None:
+        super().__init__()
+        self._event = event
+        self._met = False
+
+    def append(self, waiter: Any) -> None:
+        if not self._met:
+            self._met = True
+            thread = threading.Thread(target=self._event.set)
+            thread.start()
+            thread.join()
+        super().append(waiter)
+
+
+async def wakes(event: asyncio.Event) -> bool:
+    """Whether a waiter that met another thread's call wakes up, from that call or from a later one."""
+    event._waiters = Meeting(event)  # pyright: ignore[reportAttributeAccessIssue]
+    waiter = asyncio.ensure_future(event.wait())
+    await asyncio.sleep(0.1)
+    asyncio.get_running_loop().call_soon_threadsafe(event.set)
+    done, _ = await asyncio.wait([waiter], timeout=0.5)
+    waiter.cancel()
+    return bool(done)
+
+
+def test_a_sender_wakes_though_it_is_called_while_it_goes_to_sleep() -> None:
+    async def both() -> tuple[bool, bool]:
+        return await wakes(WakeUp(asyncio.get_running_loop())), await wakes(asyncio.Event())
+
+    ours, plain = asyncio.run(both())
+    assert ours
+    assert not plain  # or `WakeUp` is needed no longer
+
+
+def test_a_call_after_the_end_is_no_error() -> None:
+    loop = asyncio.new_event_loop()
+    event = WakeUp(loop)
+    loop.close()
+    event.set()
+    assert not event.is_set()
