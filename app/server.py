@@ -112,6 +112,7 @@ class PageServer:
             self.close()
             raise _in_use(host, port)
         self._harden()
+        self._keep_awake()
         shown = "127.0.0.1" if host == "0.0.0.0" else f"[{host}]" if ":" in host else host
         self.url = f"http://{shown}:{self._viser.get_port()}"
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
@@ -125,11 +126,7 @@ class PageServer:
         # Any client could ask for a public tunnel to this machine, button or not.
         websockets.unregister_handler(_messages.ShareUrlRequest)
 
-        loop = self._viser.get_event_loop()
-        websockets._broadcast_buffer.message_event = WakeUp(loop)
-
         async def check(connection: infra.WebsockClientConnection) -> None:
-            connection.get_message_buffer().message_event = WakeUp(loop)
             # A page of any other site may open a WebSocket to localhost; browsers say where it came from.
             live = websockets._live_connections.get(connection.client_id)
             if live is not None and live.request is not None:
@@ -138,6 +135,16 @@ class PageServer:
                     await live.close(1008, "This page belongs to another site.")
 
         websockets.on_client_connect(check)
+
+    def _keep_awake(self) -> None:
+        """Before a sender first sleeps; viser makes one for all clients and one for each."""
+        websockets, loop = self._viser._websock_server, self._viser.get_event_loop()
+        websockets._broadcast_buffer.message_event = WakeUp(loop)
+
+        async def keep(connection: infra.WebsockClientConnection) -> None:
+            connection.get_message_buffer().message_event = WakeUp(loop)
+
+        websockets.on_client_connect(keep)
 
     # ---------------------------------------------------------------- clients
 
