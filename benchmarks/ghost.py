@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from app.choice import SceneChoice
-from app.learner import Learner
-from app.process import wait_until
-from app.server import PageServer
-from app.simulation import Simulation
+from app.client.learner import Learner
+from app.client.simulation import Simulation
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.server import PageServer
 from lessons.lesson import Ghost
 
 SETTLE = 5.0  # s

@@ -20,12 +20,12 @@ from pathlib import Path
 
 import psutil
 
-from app.choice import SceneChoice
-from app.learner import Learner
-from app.messages import Load
-from app.process import wait_until
-from app.server import PageServer
-from app.simulation import Simulation
+from app.client.learner import Learner
+from app.client.simulation import Simulation
+from app.link.choice import SceneChoice
+from app.link.messages import Load
+from app.link.process import wait_until
+from app.server.server import PageServer
 from lessons.lesson import Ghost
 
 SCENES = ("planar3-hold", "iiwa14-hold", "planar3-circle", "panda-hold")

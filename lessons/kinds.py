@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from himpc.controllers import CONTROLLERS
+from lessons.control import Control
 from lessons.events import Event, MoveLevel, Set
 from lessons.levels import moved
 from lessons.mobile.events import Appear, MobileEvent
@@ -16,13 +17,14 @@ from lessons.mobile.session import MobileSession
 from lessons.mobile.settings import VELOCITY_CONTROLLERS, MobileSettings, with_obstacle
 from lessons.mobile.settings import changed as changed_mobile
 from lessons.mobile.settings import paths as mobile_paths
+from lessons.mobile.settings import value_at as value_at_mobile
 from lessons.mobile.summary import MobileRecording, mobile_arrays, mobile_summary
 from lessons.run import parse_assignment, run, with_assignments
 from lessons.scene import Scene
 from lessons.scenes import SCENES, load_scene
 from lessons.scenes.mobile import MOBILE_SCENES, mobile_scene
 from lessons.session import Session
-from lessons.settings import SceneSettings, changed, paths
+from lessons.settings import SceneSettings, changed, paths, value_at
 from lessons.summary import Recording, arrays, summary
 from robots import InputError
 
@@ -132,3 +134,35 @@ def arrays_of(recording: AnyRecording, how: dict[str, Any]) -> dict[str, Any]:
     if isinstance(recording, Recording):
         return arrays(recording, how)
     return mobile_arrays(recording, how)
+
+
+def session_of(scene: AnyScene, seed: int) -> AnySession:
+    """A scene from its beginning. Raises InputError if its settings do not fit its robot."""
+    return Session(scene, seed) if isinstance(scene, Scene) else MobileSession(scene, seed)
+
+
+def mission_over(session: AnySession) -> bool:
+    """Whether there is nothing left to do, which ends a headless run."""
+    return isinstance(session, MobileSession) and session.progress.done
+
+
+def setting_at(settings: AnySettings, path: str) -> Any:
+    """The value at a path of a lesson's control; of a weight of all levels the first one's."""
+    if path in ("Q", "R"):
+        return getattr(settings.levels[0], path)
+    if isinstance(settings, SceneSettings):
+        return value_at(settings, path)
+    return value_at_mobile(settings, path)
+
+
+def chosen(settings: AnySettings, control: Control) -> Any:
+    """Which of a control's choices the settings have: the one that would change nothing; None if none is."""
+    fitting = (each for each in control.choices if changed_any(settings, control.path, each) == settings)
+    return next(fitting, None)
+
+
+def within(settings: AnySettings, control: Control) -> bool:
+    """Whether a setting stands where its control could have put it."""
+    if control.choices:
+        return chosen(settings, control) is not None
+    return control.takes(setting_at(settings, control.path))

@@ -31,10 +31,10 @@ def serve(
         port: port to listen on.
         no_browser: do not open a browser.
     """
-    from app.choice import SceneChoice
-    from app.lesson.exercise import Exercise
-    from app.server import FIRST
-    from app.server import serve as serve_page
+    from app.link.choice import SceneChoice
+    from app.link.exercise import Exercise
+    from app.server.server import FIRST
+    from app.server.server import serve as serve_page
 
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser.transforms as vtf
 
-from app.messages import Ready, TaskView
+from app.link.messages import Ready, TaskView
 
 
 def in_order(ready: Ready) -> list[TaskView]:

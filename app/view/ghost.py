@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.moment import Shade
-from app.palette import GHOST
+from app.client.moment import Shade
+from app.html.palette import GHOST
 from app.view.robot import RobotView
 from app.view.trails import NOTHING, segments
 from robots import Robot

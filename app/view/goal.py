@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.palette import RGB
-from app.panels.bind import HOLD
+from app.client.wish import HOLD
+from app.html.palette import RGB
 
 _BALL = 0.07  # m
 _DISC = 0.22  # m

@@ -11,8 +11,8 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.palette import RGB
-from app.panels.bind import HOLD
+from app.client.wish import HOLD
+from app.html.palette import RGB
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)

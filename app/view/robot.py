@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import viser
 
-from app.palette import RGB
+from app.html.palette import RGB
 from robots import Robot
 from robots.shapes import link_shapes
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.messages import Person
-from app.palette import BOUND, JOINTS, RGB
+from app.html.palette import BOUND, JOINTS, RGB
+from app.link.messages import Person
 
 _BALL: RGB = (245, 190, 30)
 _BALL_RADIUS = 0.06  # m

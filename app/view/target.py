@@ -8,8 +8,8 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.messages import TaskView
-from app.palette import BAD, RGB
+from app.html.palette import BAD, RGB
+from app.link.messages import TaskView
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.palette import RGB
+from app.html.palette import RGB
 
 EXAGGERATION = 100
 """At torque level the prediction reaches some milliseconds ahead: at true scale it would be a dot."""

@@ -15,9 +15,9 @@ from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Page, expect, sync_playwright
 
-from app.choice import SceneChoice
-from app.lesson.exercise import parts_of
-from app.server import PageServer
+from app.link.choice import SceneChoice
+from app.link.exercise import parts_of
+from app.server.server import PageServer
 from lessons.course import COURSE, load_lesson
 from lessons.lesson import Lesson, Step
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app_browser import BETWEEN, key, press, row
 from playwright.sync_api import Locator, Page, expect
 
-from app.lesson.exercise import parts_of
+from app.link.exercise import parts_of
 from lessons.challenge import Challenge
 from lessons.course import COURSE
 from lessons.lesson import Lesson, Step

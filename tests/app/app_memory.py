@@ -24,8 +24,8 @@ from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from app_lessons import open_lesson
 from playwright.sync_api import Page, expect, sync_playwright
 
-from app.choice import SceneChoice
-from app.server import PageServer
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
 from lessons.course import COURSE, load_lesson
 
 GROWTH = 1.1

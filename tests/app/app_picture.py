@@ -11,9 +11,9 @@ from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from app_lessons import expect_part, predict, run
 from playwright.sync_api import expect, sync_playwright
 
-from app.choice import SceneChoice
-from app.lesson.exercise import Exercise
-from app.server import PageServer
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
+from app.server.server import PageServer
 from lessons.lesson import Step
 
 OUT = Path(__file__).parents[2] / "docs" / "page.png"

@@ -9,8 +9,8 @@ import pytest
 from app_browser import CHROMIUM_ARGS, find_chromium, open_page, press, tab, wait_for_scene
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from app.choice import SceneChoice
-from app.server import PageServer
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
 
 
 @pytest.fixture(scope="session")

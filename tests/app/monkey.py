@@ -26,11 +26,11 @@ import numpy as np
 from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
-from app.block import Block
-from app.choice import SceneChoice
-from app.history import History
-from app.learner import Learner
-from app.server import PageServer
+from app.client.decimated import History
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.ring import Block
+from app.server.server import PageServer
 from lessons.settings import SceneSettings
 
 STRICT = ("himpc", "hiqp", "nhimpc")

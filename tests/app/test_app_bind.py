@@ -15,10 +15,11 @@ import pytest
 import viser
 from viser import _messages
 
-from app.panels import bind
-from app.panels.bind import Bindings, Wish
-from app.panels.controller import ControllerPanel
-from app.panels.window import Window
+from app.client.wish import Wish
+from app.panels.torque.controller import ControllerPanel
+from app.panels.widgets import mirror as bind
+from app.panels.widgets.mirror import Bindings
+from app.panels.widgets.window import Window
 from lessons.events import Set
 from lessons.kinds import AnyEvent
 from lessons.scenes import load_scene

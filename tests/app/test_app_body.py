@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.block import Block
-from app.body import Body
-from app.choice import SceneChoice
-from app.history import BUCKETS, History
-from app.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
-from app.pacing import BACKLOG, Pacer
+from app.client.decimated import BUCKETS, History
+from app.link.choice import SceneChoice
+from app.link.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
+from app.link.ring import Block
+from app.worker.pacing import BACKLOG, Pacer
+from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.session import TRUTH_TICKS
 from lessons.settings import SceneSettings

@@ -9,12 +9,12 @@ import pytest
 from app_browser import SELDOM, open_page, press, write
 from playwright.sync_api import Browser, expect
 
-from app.choice import SceneChoice
-from app.classroom import STEERING, Classroom, Watcher
-from app.learner import Learner
-from app.messages import Play
-from app.process import wait_until
-from app.server import PageServer
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import Play
+from app.link.process import wait_until
+from app.server.classroom import STEERING, Classroom, Watcher
+from app.server.server import PageServer
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import numpy as np
 from app_browser import eventually, row, tab
 from playwright.sync_api import Page, expect
 
-from app.learner import Learner
-from app.server import PageServer
+from app.client.learner import Learner
+from app.server.server import PageServer
 from himpc.controllers import CONTROLLERS
 
 

@@ -9,13 +9,15 @@ import numpy as np
 import psutil
 import pytest
 
-from app.block import Block
-from app.body import Body
-from app.choice import SceneChoice
-from app.follower import Shadow
-from app.learner import Learner
-from app.messages import Lead, Leash, Load, Play, Post, ResetAll, Script
-from app.process import Spares, wait_until
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import Lead, Leash, Load, Play, Post, ResetAll, Script
+from app.link.process import Spares
+from app.link.ring import Block
+from app.worker import main as worker
+from app.worker import wait_until
+from app.worker.follower import Shadow
+from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
 from lessons.lesson import Ghost
 
@@ -101,7 +103,7 @@ def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
 
 @pytest.fixture
 def start() -> Iterator[Callable[[str], Learner]]:
-    spares, started = Spares(), list[Learner]()
+    spares, started = Spares(worker.main), list[Learner]()
 
     def run(scene: str) -> Learner:
         learner = Learner("token", SceneChoice(scene), spares)

@@ -8,8 +8,8 @@ import numpy as np
 from app_browser import eventually, is_drawn, key, position, press, row, tab
 from playwright.sync_api import Page, expect
 
-from app.messages import Post
-from app.server import PageServer
+from app.link.messages import Post
+from app.server.server import PageServer
 from lessons.events import MoveTarget
 
 

@@ -9,18 +9,17 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from app.block import Block
-from app.body import Body
-from app.choice import SceneChoice
-from app.lesson.exercise import Curve, Exercise, Lecture
-from app.lesson.kinds import chosen, setting_at
-from app.lesson.record import BUCKETS, Record, thinned
-from app.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep
+from app.link.choice import SceneChoice
+from app.link.exercise import Curve, Exercise, Lecture
+from app.link.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep
+from app.link.ring import Block
+from app.worker.lesson.rows import BUCKETS, Record, thinned
+from app.worker.simulation import Body
 from himpc.telemetry import Layout
 from lessons.check import measured
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
-from lessons.kinds import changed_any, find_scene, prepared
+from lessons.kinds import changed_any, chosen, find_scene, prepared, setting_at
 from lessons.lesson import Step
 from lessons.run import parse_assignment
 from lessons.state import State, decode, encode, state_of

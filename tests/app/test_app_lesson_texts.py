@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from app.lesson.drawing import Bound, chart, figure, readable, scale, sketch
-from app.lesson.exercise import Curve
-from app.lesson.glossary import explained, words
-from app.lesson.markdown import rendered, rendered_line
-from app.lesson.progress import Notebook, Progress, progress_from
-from app.panels.knobs import STEPS, place_of, value_at
+from app.client.progress import Notebook, Progress, progress_from
+from app.html.glossary import explained, words
+from app.html.markdown import rendered, rendered_line
+from app.html.text import figure, readable
+from app.link.exercise import Curve
+from app.panels.lesson.drawing import Bound, chart, scale, sketch
+from app.panels.widgets.path_control import STEPS, place_of, value_at
 from lessons.course import COURSE, load_lesson
 
 

@@ -11,10 +11,10 @@ from app_browser import SELDOM, eventually, key, open_page, press
 from app_lessons import expect_part, hurry, marks, open_lesson, predict, run
 from playwright.sync_api import Browser, Page, expect
 
-from app.choice import SceneChoice
-from app.lesson.exercise import Exercise, parts_of
-from app.messages import Post
-from app.server import PageServer
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise, parts_of
+from app.link.messages import Post
+from app.server.server import PageServer
 from lessons.challenge import Challenge
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set

@@ -12,14 +12,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.block import Block
-from app.body import Body
-from app.choice import SceneChoice
-from app.history import KEPT, WINDOW, History
-from app.pull import Grip, pulled, push_at
-from app.record import MOST, Record
-from app.score import Score
-from app.tape import Frame, Tape
+from app.client.decimated import KEPT, WINDOW, History
+from app.client.poses import Frame, Tape
+from app.client.rows import MOST, Record
+from app.client.score import Score
+from app.link.choice import SceneChoice
+from app.link.ring import Block
+from app.view.pull import Grip, pulled, push_at
+from app.worker.simulation import Body
 from himpc.telemetry import Layout
 from lessons.events import Push
 from lessons.plots.draw import draw

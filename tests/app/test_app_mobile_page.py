@@ -21,10 +21,10 @@ from app_browser import (
 )
 from playwright.sync_api import Browser, Page, expect
 
-from app.choice import SceneChoice
-from app.learner import Learner
-from app.messages import MissionView
-from app.server import PageServer
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import MissionView
+from app.server.server import PageServer
 from lessons.mobile.settings import MobileSettings
 from robots.collision import Ball, Box, Floor
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from monkey import StandardError, walk
 from playwright.sync_api import Browser
 
-from app.choice import SceneChoice
-from app.server import PageServer
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
 
 
 def test_a_minute_of_anything_breaks_nothing(browser: Browser) -> None:

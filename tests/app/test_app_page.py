@@ -30,12 +30,12 @@ from app_browser import (
 )
 from playwright.sync_api import Browser, Page, expect
 
-from app.choice import SceneChoice
-from app.learner import Learner
-from app.messages import Load
-from app.process import wait_until
-from app.server import PageServer
-from app.wake import WakeUp
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import Load
+from app.link.process import wait_until
+from app.server.server import PageServer
+from app.server.wake import WakeUp
 from lessons.settings import SceneSettings
 from robots import CATALOG
 

@@ -10,12 +10,13 @@ import numpy as np
 import psutil
 import pytest
 
-from app.choice import SceneChoice
-from app.learner import Learner
-from app.lesson.exercise import Exercise
-from app.messages import Load, Play, Post, Speed, Step
-from app.process import Process, Spares, wait_until
-from app.sessions import Sessions
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
+from app.link.messages import Load, Play, Post, Speed, Step
+from app.link.process import Process, Spares, wait_until
+from app.server.sessions import Sessions
+from app.worker import main as worker
 from lessons.events import MoveTarget, Set
 
 LONG = 30.0  # s
@@ -23,7 +24,7 @@ LONG = 30.0  # s
 
 @pytest.fixture
 def spares() -> Iterator[Spares]:
-    made = Spares()
+    made = Spares(worker.main)
     yield made
     made.close()
 
@@ -142,7 +143,7 @@ def test_no_child_and_no_memory_is_left(start: Callable[[str], Learner]) -> None
 
 
 def test_a_child_ends_when_the_page_is_gone() -> None:
-    process = Process()
+    process = Process(worker.main)
     pid = process.pid
     assert pid is not None
     process._pipe.close()  # what the operating system does when the parent dies

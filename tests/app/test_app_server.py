@@ -17,9 +17,9 @@ import websockets.exceptions
 from viser import __version__, _messages
 from websockets.sync.client import connect
 
-from app.choice import SceneChoice
-from app.process import wait_until
-from app.server import PageServer, serve
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.server import PageServer, serve
 from robots import InputError
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ from pathlib import Path
 from app_browser import eventually, press, row, set_number, tab, write
 from playwright.sync_api import Page, expect
 
-from app.learner import Learner
-from app.server import PageServer
+from app.client.learner import Learner
+from app.server.server import PageServer
 from lessons.settings import SceneSettings
 from lessons.state import decode
 

@@ -8,12 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.body import Body
-from app.choice import SceneChoice
-from app.goals import free_name, open_row
-from app.history import History
-from app.messages import MissionView, Play, Post, Ready, ResetAll, Status, Step
-from app.pacing import BACKLOG, Pacer
+from app.client.decimated import History
+from app.html.text import free_name
+from app.link.choice import SceneChoice
+from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, Step
+from app.view.goals import open_row
+from app.worker.pacing import BACKLOG, Pacer
+from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.mobile.events import InsertTask, Release, RemoveTask
 

@@ -8,7 +8,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from app.wake import WakeUp
+from app.server.wake import WakeUp
 
 
 class Meeting(deque[Any]):

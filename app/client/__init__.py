@@ -1,0 +1,1 @@
+"""The page's side of a simulation: what it was told, a learner, a ghost."""

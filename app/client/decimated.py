@@ -1,0 +1,168 @@
+"""The last minute of telemetry, thinned for plots so that no spike is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from app.link.ring import Block
+from himpc.telemetry import AT_POSITION, AT_VELOCITY, Layout
+
+WINDOW = 8.0  # s of simulated time in the plots
+BUCKETS = 160  # in a window
+KEPT = 60.0  # s of simulated time that one can look back
+_SPAN = WINDOW / BUCKETS
+_SLOTS = round((KEPT + WINDOW) / _SPAN)
+_HELD = round(
+    1.0 / _SPAN
+)  # buckets without a row of their own that show the one before: a slow rate's period
+_SLOW = 0.85  # of the velocity limit: the controller keeps a few per cent free of its own
+
+Take = Callable[[np.ndarray], None]
+
+
+class History:
+    """Per bucket of simulated time and per column: the least and the greatest value, in the order they came,
+    and the bucket's last row.
+
+    A row counts until the next one comes: of a controller slower than the buckets there is none in between.
+    Buckets are aligned to simulated time, so that a curve slides instead of shimmering, and two robots on one
+    clock have the same buckets. Each row is looked at once, whatever the window. A reset, which turns the
+    time back, drops the curves: a jump in a curve would look like a motion.
+    """
+
+    def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
+        """takers: are given every portion of rows of one run, too."""
+        self.layout = layout
+        self.latest = np.full(layout.size, np.nan)
+        self.bound_ticks = np.zeros((layout.fields["at_bound"].stop - layout.fields["at_bound"].start, 3))
+        self.bucket = -1
+        self._takers = takers
+        self._block = block
+        self._t = layout.fields["t"].start
+        self._count = 0
+        self._numbers = np.full(_SLOTS, -1)
+        self._pairs = np.full((_SLOTS, 2, layout.size), np.nan)
+        self._lasts = np.full((_SLOTS, layout.size), np.nan)
+        self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
+        self._first = np.full(layout.size, np.nan)  # of the open bucket, for the order of the pair
+
+    @property
+    def count(self) -> int:
+        """Rows seen or lost so far."""
+        return self._count
+
+    def pull(self) -> int:
+        """Takes over what was written since the last pull; returns how many rows."""
+        start, rows = self._block.since(self._count)
+        if not len(rows):
+            return 0
+        self._count = start + len(rows)
+        before = np.concatenate([[self.latest[self._t]], rows[:-1, self._t]])
+        turns = np.flatnonzero(rows[:, self._t] < before)
+        if turns.size:
+            self.forget()
+        self._take(rows[turns[-1] :] if turns.size else rows)
+        return len(rows)
+
+    def _take(self, rows: np.ndarray) -> None:
+        self.latest = rows[-1]
+        bits = rows[:, self.layout.fields["at_bound"]]
+        bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
+        bits = self._viable(bits, rows)
+        for k in range(3):
+            self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
+        numbers = np.floor(rows[:, self._t] / _SPAN + 1e-6).astype(np.int64)
+        for bucket in np.unique(numbers):
+            self._hold(int(bucket))
+            of_bucket = numbers == bucket
+            slot = self._merge(int(bucket), rows[of_bucket])
+            self._bits[slot] |= np.bitwise_or.reduce(bits[of_bucket], axis=0)
+        for take in self._takers:
+            take(rows)
+
+    def _viable(self, bits: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """A joint held by its velocity row far below its velocity limit is really held by its position
+        limit: viability writes that one as a bound on the speed."""
+        fields = self.layout.fields
+        slow = np.abs(rows[:, fields["v"]]) < _SLOW * rows[:, fields["v_limit"]]
+        by_position = (bits & AT_VELOCITY != 0) & slow
+        return np.where(by_position, (bits & ~AT_VELOCITY) | AT_POSITION, bits)
+
+    def _hold(self, until: int) -> None:
+        """Fills the buckets since the newest one up to another one, which is left out."""
+        before = self.bucket % _SLOTS
+        if self.bucket < 0 or until - self.bucket > _HELD:
+            return
+        for bucket in range(self.bucket + 1, until):
+            slot = bucket % _SLOTS
+            self._numbers[slot], self._bits[slot] = bucket, self._bits[before]
+            self._pairs[slot] = self._lasts[slot] = self._lasts[before]
+
+    def _merge(self, bucket: int, rows: np.ndarray) -> int:
+        slot = bucket % _SLOTS
+        if self._numbers[slot] != bucket:
+            self._numbers[slot] = bucket
+            self._bits[slot] = 0
+            self._first = rows[0]
+            low, high = rows.min(axis=0), rows.max(axis=0)
+        else:
+            pair = self._pairs[slot]
+            low = np.fmin(pair.min(axis=0), rows.min(axis=0))
+            high = np.fmax(pair.max(axis=0), rows.max(axis=0))
+        rising = rows[-1] >= self._first
+        self._pairs[slot, 0] = np.where(rising, low, high)
+        self._pairs[slot, 1] = np.where(rising, high, low)
+        self._lasts[slot] = rows[-1]
+        self.bucket = bucket
+        return slot
+
+    def window(self, until: float | None = None) -> Window:
+        """What the plots show when the clock reads `until` (s); None: now."""
+        end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
+        wanted = np.arange(end - BUCKETS + 1, end + 1)
+        wanted[(wanted > self.bucket) & (wanted <= self.bucket + _HELD)] = self.bucket
+        slots = wanted % _SLOTS
+        known = self._numbers[slots] == wanted
+        known &= wanted >= 0
+        return Window(self.layout, known, slots, self._pairs, self._bits)
+
+    def at(self, t: float) -> np.ndarray:
+        """The row that was the newest one when the clock read t (s), as near as is known."""
+        bucket = int(np.floor(t / _SPAN - 1e-6))
+        slot = bucket % _SLOTS
+        return self._lasts[slot].copy() if bucket >= 0 and self._numbers[slot] == bucket else self.latest
+
+    def forget(self) -> None:
+        """Drops everything, for after a reset."""
+        self._numbers[:] = -1
+        self.bucket = -1
+        self.bound_ticks[:] = 0
+
+
+class Window:
+    """What the plots show at one moment: BUCKETS pairs, oldest first."""
+
+    def __init__(
+        self, layout: Layout, known: np.ndarray, slots: np.ndarray, pairs: np.ndarray, bits: np.ndarray
+    ) -> None:
+        self.layout = layout
+        self._known, self._slots = known, slots
+        self._pairs, self._bits = pairs, bits
+
+    def columns(self, which: slice) -> np.ndarray:
+        """(2 · BUCKETS, k) of some columns; NaN where nothing was recorded."""
+        found = self._pairs[:, :, which][self._slots]
+        found[~self._known] = np.nan
+        return found.reshape(2 * BUCKETS, -1)
+
+    def at_bound(self, kind: int) -> np.ndarray:
+        """(2 · BUCKETS, n) whether a joint was at its torque (0), velocity (1) or position (2) bound."""
+        hit = (self._bits[self._slots] & (1 << kind) != 0) & self._known[:, None]
+        return np.repeat(hit, 2, axis=0)
+
+    @staticmethod
+    def ages() -> np.ndarray:
+        """(2 · BUCKETS,) seconds before the window's end, ≤ 0."""
+        return np.linspace(-WINDOW, 0.0, 2 * BUCKETS)

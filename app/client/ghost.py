@@ -1,0 +1,47 @@
+"""The page's handle of a ghost: a second robot that does the same with other settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.client.simulation import Simulation
+from app.link.messages import Failed, Follow, Reached, Refused, Report, Script
+from app.link.process import Process, Spares
+
+LEAD = 0.2
+"""s of simulated time that the robot may be ahead of its ghost. A ghost that cannot keep up slows both down,
+and the page says so: one that lagged behind would look like one that follows its target badly."""
+
+
+class Ghost(Simulation):
+    """A process that follows. It begins where the first script says, and what it tells of the time it has
+    come to keeps its leader on the leash."""
+
+    def __init__(
+        self,
+        words: str,
+        own: tuple[str, ...],
+        spares: Spares,
+        reached: Callable[[float], None],
+        lost: Callable[[Ghost, str], None],
+    ) -> None:
+        """words: what it is, for the legend; own: assignments "PATH=VALUE" on top of the leader's settings;
+        reached: told the time it has come to, s; lost: told why there is no ghost (any more). Both are called
+        on a thread of the process."""
+        self.words, self.own = words, own
+        self._reached, self._lost = reached, lost
+        super().__init__(spares)
+
+    def hear(self, script: Script) -> None:
+        """Passes on what the leader told."""
+        self.send(Follow(script, self.own))
+
+    def _hear(self, process: Process, report: Report) -> None:
+        super()._hear(process, report)
+        match report:
+            case Reached(t):
+                self._reached(t + LEAD)
+            case Refused(sentence) | Failed(sentence):
+                self._lost(self, sentence)
+            case _:
+                pass

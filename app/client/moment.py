@@ -1,0 +1,105 @@
+"""What the page shows: one instant of a run, now or up to a minute ago, with the ghost as it was then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.client.decimated import Window
+from app.client.ghost import Ghost
+from app.client.learner import Learner
+from app.client.simulation import Simulation
+from app.link.messages import Status
+
+TRACE_SECONDS = 6.0
+_FAR = 0.5  # s: a ghost further behind is not waited for with the picture
+
+
+@dataclass(frozen=True, eq=False)
+class Shade:
+    """The ghost at that instant; see `Moment`."""
+
+    poses: np.ndarray
+    window: Window
+    way: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One instant.
+
+    Attributes:
+        t: s.
+        live: whether it is now.
+        poses: (n + 1, 7) of joints and tip, position (m) and quaternion wxyz.
+        status: the report that was the newest one.
+        latest: the row of telemetry that was the newest one.
+        window: what the plots show.
+        way: (k, n + 1, 7) poses of the last TRACE_SECONDS, oldest first.
+        ghost: None if there is none.
+    """
+
+    t: float
+    live: bool
+    poses: np.ndarray
+    status: Status
+    latest: np.ndarray
+    window: Window
+    way: np.ndarray
+    ghost: Shade | None
+
+
+def moment_of(learner: Learner, past: float | None) -> Moment | None:
+    """The instant to show, after taking over what is new; None while nothing was reported yet.
+
+    Args:
+        learner: whose.
+        past: s of simulated time to look back to; None: now.
+    """
+    t = learner.look()
+    ghost = learner.ghost
+    beside = None if ghost is None else ghost.look()
+    if ghost is not None and (ghost.ready is None or ghost.ready.choice != learner.choice):
+        beside = None  # still the ghost of another scene
+    status = learner.status
+    if t is None or status is None:
+        return None
+    if past is not None:
+        t = past
+    elif beside is not None and 0.0 < t - beside < _FAR:
+        t = beside  # a ghost shown later than the robot would look like one that follows badly
+    # Within `read` no other scene can come between what belongs together.
+    shown = t
+    found = learner.read(
+        lambda _, history: (
+            learner.tape.at(shown),
+            history.window(shown),
+            history.latest if past is None else history.at(shown),
+            _way(learner, shown),
+        )
+    )
+    if found is None:
+        return None
+    frame, window, latest, way = found
+    if frame is None:
+        return None
+    return Moment(
+        t=t,
+        live=past is None,
+        poses=frame.poses,
+        status=status if past is None else frame.status or status,
+        latest=latest,
+        window=window,
+        way=way,
+        ghost=None if ghost is None or beside is None else _shade(ghost, t),
+    )
+
+
+def _shade(ghost: Ghost, t: float) -> Shade | None:
+    found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t)))
+    return None if found is None or found[0] is None else Shade(found[0].poses, found[1], found[2])
+
+
+def _way(simulation: Simulation, t: float) -> np.ndarray:
+    return np.array([frame.poses for frame in simulation.tape.between(t - TRACE_SECONDS, t)])

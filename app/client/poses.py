@@ -1,0 +1,82 @@
+"""The last minute of a robot's motion, to look back at."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.client.decimated import KEPT
+from app.link.messages import Status
+
+RATE = 30.0
+"""Frames kept per simulated second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """t: s; poses (n + 1, 7): as of `Block`; status: the report that was the newest one."""
+
+    t: float
+    poses: np.ndarray
+    status: Status | None
+
+
+class Tape:
+    """Frames in order of time, no older than a minute of simulated time. A reset empties it."""
+
+    def __init__(self) -> None:
+        self._frames: list[Frame] = []
+
+    def add(self, frame: Frame) -> None:
+        """The newest moment. It takes the place of the one before if that is closer than 1/RATE to its own
+        predecessor, so that slow motion needs no more room."""
+        frames = self._frames
+        if frames and frame.t < frames[-1].t:
+            frames.clear()
+        if len(frames) > 1 and frames[-1].t - frames[-2].t < 1 / RATE - 1e-9:
+            frames.pop()
+        frames.append(frame)
+        if len(frames) > 2 * KEPT * RATE:
+            del frames[: self._index(frame.t - KEPT)]
+
+    def clear(self) -> None:
+        self._frames.clear()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Times of the first and the last frame that can be shown, s; (0, 0) if there is none."""
+        if not self._frames:
+            return 0.0, 0.0
+        last = self._frames[-1].t
+        return max(self._frames[0].t, last - KEPT), last
+
+    def at(self, t: float) -> Frame | None:
+        """The moment t: poses between those of the two frames around it, the earlier one's report."""
+        if not self._frames:
+            return None
+        k = self._index(t)
+        before = self._frames[max(k - 1, 0)]
+        if k == 0 or k == len(self._frames):
+            return before
+        after = self._frames[k]
+        share = (t - before.t) / (after.t - before.t)
+        return Frame(t, _between(before.poses, after.poses, share), before.status)
+
+    def between(self, start: float, end: float) -> Iterator[Frame]:
+        """Frames from `start` to `end`, s."""
+        return iter(self._frames[self._index(start) : self._index(end)])
+
+    def _index(self, t: float) -> int:
+        return bisect_right(self._frames, t, key=lambda frame: frame.t)
+
+
+def _between(before: np.ndarray, after: np.ndarray, share: float) -> np.ndarray:
+    # A quaternion and its negative are the same turn; frames are close, so a chord will do for the arc.
+    near = np.where((before[:, 3:] * after[:, 3:]).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    there = np.hstack([after[:, :3], near * after[:, 3:]])
+    found = (1 - share) * before + share * there
+    found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
+    return found

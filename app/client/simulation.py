@@ -1,0 +1,134 @@
+"""A simulation process and what is known about it."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from app.client.decimated import History
+from app.client.poses import Frame, Tape
+from app.client.rows import Record
+from app.client.score import Score
+from app.link.messages import Command, Failed, Ready, Refused, Report, Status
+from app.link.process import Process, Spares
+from app.link.ring import Block
+from lessons.kinds import AnySettings
+
+T = TypeVar("T")
+
+
+class Simulation:
+    """Owns a process and knows what it told. Reports arrive on the process' thread; the page reads the fields
+    from its own loop. `changed` counts scenes and restarts: the page rebuilds itself when it differs."""
+
+    def __init__(self, spares: Spares) -> None:
+        self.ready: Ready | None = None
+        self.status: Status | None = None
+        self.settings: AnySettings | None = None
+        self.failure: str | None = None
+        self.changed = 0
+        self.tape = Tape()
+        self.score: Score | None = None
+        self.record: Record | None = None
+        self._refusals: list[str] = []
+        self._notices: list[str] = []
+        self._spares = spares
+        self._lock = threading.RLock()
+        self._block: Block | None = None
+        self._history: History | None = None
+        self._closed = False
+        self._start()
+
+    def _start(self) -> None:
+        process = self._process = self._spares.take()
+        process.listen(lambda report: self._hear(process, report))
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    def send(self, command: Command) -> None:
+        self._process.send(command)
+
+    # ---------------------------------------------------------------- reports
+
+    def _hear(self, process: Process, report: Report) -> None:
+        with self._lock:
+            if self._closed or process is not self._process:
+                _discard(report)
+                return
+            match report:
+                case Ready():
+                    self._enter(report)
+                case Status():
+                    self.status = report
+                    self.settings = report.settings or self.settings
+                    self._notices += report.notices
+                case Refused(sentence):
+                    self._refusals.append(sentence)
+                case Failed(sentence):
+                    self.failure = sentence
+                case _:
+                    pass
+
+    def _enter(self, ready: Ready) -> None:
+        self._free()
+        self.ready, self.settings, self.status = ready, ready.settings, None
+        self._block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
+        self.tape.clear()
+        self.score, self.record = Score(ready.layout), Record(ready.layout)
+        self._history = History(self._block, ready.layout, self.score.take, self.record.take)
+        self.changed += 1
+
+    def _free(self) -> None:
+        block, self._block, self._history = self._block, None, None
+        if block is not None:
+            block.close(unlink=True)
+
+    def take_messages(self) -> tuple[list[str], list[str]]:
+        """(refusals, notices) since the last call."""
+        with self._lock:
+            refusals, self._refusals = self._refusals, []
+            notices, self._notices = self._notices, []
+            return refusals, notices
+
+    def settings_of(self, ready: Ready) -> AnySettings:
+        """The settings of a scene that came in: the newest ones, unless another scene came in since."""
+        with self._lock:
+            return ready.settings if self.settings is None or self.ready is not ready else self.settings
+
+    # ---------------------------------------------------------------- telemetry
+
+    def read(self, look: Callable[[Block, History], T]) -> T | None:
+        """What `look` finds, while the memory cannot be freed under it; None before the first scene."""
+        with self._lock:
+            if self._block is None or self._history is None:
+                return None
+            return look(self._block, self._history)
+
+    def look(self) -> float | None:
+        """Takes over what is new, keeps it for looking back, and returns the simulated time, s."""
+
+        def take(block: Block, history: History) -> float:
+            history.pull()
+            t, poses = block.moment()
+            self.tape.add(Frame(t, poses, self.status))
+            return t
+
+        return self.read(take)
+
+    def close(self) -> None:
+        with self._lock:
+            self._closed = True
+        self._process.close()
+        with self._lock:
+            self._free()
+
+
+def _discard(report: Report) -> None:
+    """Frees what came too late to be used."""
+    if isinstance(report, Ready):
+        with contextlib.suppress(FileNotFoundError):
+            Block.for_robot(report.robot, report.layout.size, report.block).close(unlink=True)

@@ -1,0 +1,1 @@
+"""Words, numbers and colours for people; whatever a user or a file named is escaped here."""

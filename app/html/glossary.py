@@ -1,0 +1,63 @@
+"""The words of the lab, and how a text explains them."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from functools import cache
+from html import escape
+from importlib.resources import files
+
+STYLE = (
+    "<style>abbr.word{text-decoration:underline dotted;text-underline-offset:0.2em;cursor:help}"
+    "abbr.word:focus::after{content:' (' attr(title) ') ';font-style:italic;opacity:0.8}</style>"
+)
+"""A hint appears under the mouse; where there is none, a tap or the Tab key writes it into the text."""
+
+_TAG = re.compile(r"(<[^>]*>)")
+_CLOSED = ("math", "code", "pre", "abbr", "svg", "style")
+
+
+@cache
+def words() -> dict[str, str]:
+    """Every word with its sentence."""
+    return {word: str(entry["means"]) for word, entry in _entries().items()}
+
+
+@cache
+def _entries() -> dict[str, dict[str, object]]:
+    return tomllib.loads((files("app.html") / "glossary.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def _forms() -> tuple[re.Pattern[str], dict[str, str]]:
+    """A pattern of all spellings, and the word each one means."""
+    of: dict[str, str] = {}
+    for word, entry in _entries().items():
+        forms = entry.get("forms", [word])
+        assert isinstance(forms, list)
+        of.update(dict.fromkeys(map(str, forms), word))
+    longest_first = sorted(of, key=len, reverse=True)
+    return re.compile(rf"(?<!\w)({'|'.join(map(re.escape, longest_first))})(?!\w)"), of
+
+
+def explained(html: str) -> str:
+    """HTML in which the first use of every known word carries its sentence."""
+    pattern, of = _forms()
+    seen: set[str] = set()
+
+    def explain(found: re.Match[str]) -> str:
+        word = of[found[1]]
+        if word in seen:
+            return found[1]
+        seen.add(word)
+        return f'<abbr class="word" tabindex="0" title="{escape(words()[word])}">{found[1]}</abbr>'
+
+    inside = 0
+    pieces = _TAG.split(html)
+    for place, piece in enumerate(pieces):
+        if place % 2 == 0:
+            pieces[place] = pattern.sub(explain, piece) if inside == 0 else piece
+        elif piece[1:].lstrip("/").split(" ")[0].rstrip(">") in _CLOSED:
+            inside += -1 if piece.startswith("</") else 0 if piece.endswith("/>") else 1
+    return "".join(pieces)

@@ -1,0 +1,44 @@
+"""Lesson texts as HTML: Markdown with equations in $…$ and $$…$$, and words explained."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import lru_cache
+
+from latex2mathml.converter import convert
+from markdown_it import MarkdownIt
+
+from app.html.glossary import explained
+from app.html.text import formula
+
+_MARKDOWN = MarkdownIt("commonmark", {"html": False})
+_EQUATION = re.compile(r"\$\$(.+?)\$\$([.,;]?)|\$(.+?)\$", re.S)
+_ALONE = re.compile(r"<p>(\ue000\d+\ue001)</p>")
+_PLACE = re.compile(r"\ue000(\d+)\ue001")
+
+
+@lru_cache(maxsize=256)
+def rendered(text: str) -> str:
+    """HTML of paragraphs. Markup in the text is shown, not obeyed."""
+    return _html(text, _MARKDOWN.render)
+
+
+@lru_cache(maxsize=256)
+def rendered_line(text: str) -> str:
+    """HTML of a text that stands within a line."""
+    return _html(text, _MARKDOWN.renderInline)
+
+
+def _html(text: str, render: Callable[[str], str]) -> str:
+    equations: list[str] = []
+
+    def keep(found: re.Match[str]) -> str:
+        # Markdown would take underscores and backslashes of an equation for its own.
+        display, inline = found[1], found[3]
+        equations.append(formula(display.strip()) if display else convert(" ".join(inline.split())))
+        return f"\ue000{len(equations) - 1}\ue001{found[2] or ''}"
+
+    html = render(_EQUATION.sub(keep, text))
+    html = _ALONE.sub(r"\1", explained(html))  # a block may not stand in a paragraph
+    return _PLACE.sub(lambda found: equations[int(found[1])], html)

@@ -1,0 +1,124 @@
+"""Numbers and snippets of HTML for people. Whatever a user or a file named passes through `esc`."""
+
+from __future__ import annotations
+
+import html
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+
+from latex2mathml.converter import convert
+
+from app.html.palette import BAD, RGB, css
+
+esc = html.escape
+
+
+def quantity(value: float, unit: str) -> str:
+    """A length in m or an angle in rad in the unit and with the digits a reader wants."""
+    if not math.isfinite(value):
+        return "–"
+    if unit == "m":
+        size = abs(value)
+        if size < 1e-6:
+            return "< 1 µm"
+        if size >= 1.0:
+            return f"{value:.2f} m"
+        return f"{value * 1e6:.0f} µm" if size < 1e-4 else f"{value * 1e3:.{_digits(size * 1e3)}f} mm"
+    degrees = math.degrees(value)
+    if abs(degrees) < 5e-3:
+        return "< 0.01°"
+    return f"{degrees:.{max(1, _digits(abs(degrees)))}f}°"
+
+
+def _digits(size: float) -> int:
+    return 0 if size >= 100 else 1 if size >= 10 else 2
+
+
+def swatch(colour: RGB) -> str:
+    """A small square in a level's colour."""
+    return (
+        '<span style="display:inline-block;width:0.75em;height:0.75em;border-radius:2px;'
+        f'background:{css(colour)};margin-right:0.4em"></span>'
+    )
+
+
+def badge(text: str, colour: RGB) -> str:
+    return (
+        f'<span style="background:{css(colour)};color:#fff;border-radius:4px;padding:0 0.4em;'
+        f'font-weight:600;white-space:nowrap">{esc(text)}</span>'
+    )
+
+
+def block(inner: str, style: str = "") -> str:
+    """A paragraph in the panel's own size."""
+    return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
+
+
+PHONE = '<style>@media (max-width: 36em) { div[style*="width: 20em"] { width: 100vw !important } }</style>'
+"""A style that makes viser's sheet on a phone as wide as the screen, not 20em with an empty strip beside it.
+It counts while an HTML element with it is shown."""
+
+
+def stopped(sentence: str) -> str:
+    """What a page shows instead of a simulation that died."""
+    return block(
+        f"{badge('STOPPED', BAD)} {esc(sentence)}<br><b>Press Reset to start again.</b>",
+        f"border-left:3px solid {css(BAD)};margin:0.4em 0",
+    )
+
+
+def bar(share: float, colour: RGB, mark: float | None = None) -> str:
+    """A horizontal gauge; `mark` draws a line across it. Both as shares of its width."""
+    width = 100 * min(max(share, 0.0), 1.0)
+    line = (
+        ""
+        if mark is None
+        else f'<div style="position:absolute;left:{100 * mark:.1f}%;top:-2px;bottom:-2px;width:2px;'
+        'background:currentColor"></div>'
+    )
+    return (
+        '<div style="position:relative;height:8px;border-radius:4px;background:rgba(139,149,161,0.25);'
+        f'margin:0.25em 0"><div style="width:{width:.1f}%;height:100%;border-radius:4px;'
+        f'background:{css(colour)}"></div>{line}</div>'
+    )
+
+
+@lru_cache(maxsize=64)
+def formula(latex: str) -> str:
+    """A LaTeX formula as MathML that scrolls instead of being cut off."""
+    return f'<div style="overflow-x:auto;padding:0.3em 0.75em">{convert(latex, display="block")}</div>'
+
+
+def figure(value: float, unit: str = "") -> str:
+    """A number with three digits and its unit."""
+    if not math.isfinite(value):
+        return "–"
+    size = abs(value)
+    if size == 0 or 1e-3 <= size < 1e5:
+        number = f"{value:.0f}" if size >= 999.5 else f"{value:.3g}"
+    else:
+        number = _power(value)
+    return f"{number} {unit}".rstrip().replace(" deg", "°").replace("-", "−")
+
+
+def readable(words: str) -> str:
+    """A sentence whose numbers and units are written as `figure` does."""
+    return _EXPONENT.sub(lambda found: figure(float(found[0])), words).replace(" deg", "°")
+
+
+_EXPONENT = re.compile(r"-?\d+(?:\.\d+)?e[+-]\d+")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _power(value: float) -> str:
+    power = math.floor(math.log10(abs(value)))
+    return f"{value / 10.0**power:.2g}·10{str(power).translate(_RAISED)}"
+
+
+def free_name(wanted: str, taken: Sequence[str]) -> str:
+    """The name wanted, with a number if it is taken."""
+    numbered = (wanted if k == 1 else f"{wanted} {k}" for k in itertools.count(1))
+    return next(name for name in numbered if name not in taken)

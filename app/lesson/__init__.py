@@ -1,1 +1,0 @@
-"""Lessons in the page: which step is on, how its run is judged, how its texts and pictures are made."""

@@ -1,0 +1,269 @@
+"""What the page and its simulation process say to each other. Everything here is frozen and picklable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from app.link.choice import SceneChoice
+from app.link.exercise import Lecture, Predict, RunStep
+from himpc.telemetry import Layout
+from lessons.kinds import AnyEvent, AnySettings
+from robots import Robot
+
+# ------------------------------------------------------------------ page → simulation
+
+
+@dataclass(frozen=True)
+class Post:
+    """An event for the session's mailbox."""
+
+    event: AnyEvent
+
+
+@dataclass(frozen=True)
+class Play:
+    """Run or pause."""
+
+    running: bool
+
+
+@dataclass(frozen=True)
+class Step:
+    """Pause, then run so many ticks."""
+
+    ticks: int = 1
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Simulated seconds per second that are asked for."""
+
+    factor: float
+
+
+@dataclass(frozen=True)
+class ResetAll:
+    """The scene as it was first loaded, settings included."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """Another scene or robot."""
+
+    choice: SceneChoice
+
+
+@dataclass(frozen=True)
+class Lead:
+    """Whether another process follows this one. On: the scene is reset, so that both begin together, and
+    `Script` reports tell what happens from there on."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
+class Leash:
+    """Simulated time, s, beyond which a leader waits for its follower."""
+
+    until: float
+
+
+@dataclass(frozen=True, eq=False)
+class Begin:
+    """Where a follower begins: the leader's scene, and its settings at its last reset."""
+
+    choice: SceneChoice
+    settings: AnySettings
+
+
+@dataclass(frozen=True, eq=False)
+class Follow:
+    """What a follower hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
+    they count where the script begins anew."""
+
+    script: Script
+    own: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Tell:
+    """Tell what the run was; the answer is `Told`."""
+
+
+@dataclass(frozen=True)
+class Quit:
+    """End the process."""
+
+
+Command = (
+    Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Tell | Predict | RunStep | Quit
+)
+
+
+# ------------------------------------------------------------------ simulation → page
+
+
+@dataclass(frozen=True, eq=False)
+class TaskView:
+    """What the page must know about a task to draw it.
+
+    kind: "position", "orientation" or "joints"; frame: a link's name (tasks on frames only); axes: the
+    world axes under control; raw: where the hand put a draggable target, None for other references; path:
+    (k, 3) closed curve of the reference, m; speed_cap: of the filtered target, m/s or rad/s.
+    """
+
+    name: str
+    level: str
+    kind: str
+    unit: str
+    frame: str
+    axes: str
+    raw: np.ndarray | None
+    path: np.ndarray | None
+    speed_cap: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
+    besides the robot."""
+
+    choice: SceneChoice
+    block: str  # name of the shared memory
+    robot: Robot
+    layout: Layout
+    settings: AnySettings
+    tasks: tuple[TaskView, ...]
+    room: np.ndarray
+
+
+@dataclass(frozen=True)
+class BindingRow:
+    """One active constraint of the last plan."""
+
+    level: str
+    joint: str
+    kind: str
+    side: str
+    knot: int
+    multiplier: float
+    slack: float
+
+
+@dataclass(frozen=True)
+class MissionRow:
+    """A task of a mission. goal: m, None for a given trajectory; hold: s at the goal, None: until released;
+    there_s: for how long it has been at its goal; done_at: s, when it was completed."""
+
+    name: str
+    role: str
+    goal: tuple[float, ...] | None
+    tolerance: float
+    hold: float | None
+    state: Literal["done", "active", "ahead"]
+    there_s: float | None
+    done_at: float | None
+
+
+@dataclass(frozen=True)
+class Person:
+    """hand: m, where a ball is handed over; place: m on the floor; balls: how many were received."""
+
+    hand: tuple[float, float, float]
+    place: tuple[float, float]
+    balls: int
+
+
+@dataclass(frozen=True, eq=False)
+class MissionView:
+    """How far a mission is. paths: per role the predicted path, (N + 1, 3) m."""
+
+    rows: tuple[MissionRow, ...]
+    done: bool
+    paths: dict[str, np.ndarray]
+    people: tuple[Person, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """What is not worth sending every tick; about ten times a second.
+
+    real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
+    over_budget: ticks whose control step took longer than T_s; late: ticks that missed their deadline;
+    resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
+    path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
+    I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one; lecture:
+    of a lesson, when there is news.
+    """
+
+    t: float
+    ticks: int
+    running: bool
+    speed: float
+    real_time_factor: float
+    capped: bool
+    over_budget: int
+    late: int
+    resets: int
+    targets: dict[str, np.ndarray]
+    path: np.ndarray
+    binding: tuple[BindingRow, ...]
+    notices: tuple[str, ...] = ()
+    settings: AnySettings | None = field(default=None)
+    gauge: tuple[float, float] | None = None
+    mission: MissionView | None = None
+    lecture: Lecture | None = None
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A scene or robot could not be loaded; the one before goes on."""
+
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The simulation stopped with an exception."""
+
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Script:
+    """What a leader's follower must hear.
+
+    events: what the leader's log gained; t: the time the leader has come to, s; begin: begin anew from there
+    before taking the events.
+    """
+
+    events: tuple[tuple[float, AnyEvent], ...]
+    t: float
+    begin: Begin | None
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The time a follower has come to, s."""
+
+    t: float
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a run was, so that it can be repeated.
+
+    choice: the scene, as it was loaded; settings: in force now; log: (time, event) of every event that took
+    effect since it was loaded; t: s since the last reset.
+    """
+
+    choice: SceneChoice
+    settings: AnySettings
+    log: tuple[tuple[float, AnyEvent], ...]
+    t: float
+
+
+Report = Ready | Status | Refused | Failed | Script | Reached | Told

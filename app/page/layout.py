@@ -1,0 +1,223 @@
+"""What one scene looks like in one page: the 3D view, the panels, and how they follow the session."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.client.ghost import Ghost
+from app.client.learner import Learner
+from app.client.moment import Moment, moment_of
+from app.client.progress import Notebook
+from app.html.palette import level_colours
+from app.html.text import PHONE
+from app.link.choice import SceneChoice
+from app.link.messages import Post, Ready, Status
+from app.page.ui import Context, face_for
+from app.panels.lesson.course import Course
+from app.panels.run.active_constraints import BindingPanel
+from app.panels.run.compare import ComparePanel
+from app.panels.run.export import ExportPanel
+from app.panels.run.help import HelpPanel
+from app.panels.run.playback import PlaybackPanel
+from app.panels.run.scene import RobotPanel
+from app.panels.run.share import SharePanel
+from app.panels.run.timeline import TimeLine
+from app.panels.widgets.mirror import Bindings
+from app.panels.widgets.snapshot import Snapshot
+from app.view.coordinates import in_order
+from app.view.ghost import GhostView
+from app.view.robot import RobotView
+from lessons.kinds import AnyEvent, AnySettings
+
+_HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
+
+
+class Stage:
+    """Built once per scene. `follow` is called by the page's loop; callbacks only post."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        learner: Learner,
+        ready: Ready,
+        scenes: Mapping[str, str],
+        dark: bool,
+        choose: Callable[[SceneChoice], None],
+        theme: Callable[[bool], None],
+        by_path: bool,
+        loop: asyncio.AbstractEventLoop,
+        notebook: Notebook,
+    ) -> None:
+        self._client, self._learner, self._ready = client, learner, ready
+        self._theme = theme
+        self._colours = level_colours([task.level for task in in_order(ready)])
+        self._bindings: Bindings[Any] = Bindings(self._post, loop)
+        self._face = face_for(
+            Context(client, learner, ready, self._colours, self._bindings, loop, dark, self._change_theme)
+        )
+        self._resets: int | None = None
+        self._ghost: GhostView | None = None
+        self._shown_ghost: Ghost | None = None
+        self._build_panels(client.gui, scenes, choose, by_path, loop, notebook)
+        self._build_scene(client.scene, dark)
+
+    # ---------------------------------------------------------------- building
+
+    def _build_panels(
+        self,
+        gui: viser.GuiApi,
+        scenes: Mapping[str, str],
+        choose: Callable[[SceneChoice], None],
+        by_path: bool,
+        loop: asyncio.AbstractEventLoop,
+        notebook: Notebook,
+    ) -> None:
+        gui.add_html(PHONE)
+        self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
+        self._time_line = TimeLine(gui, self._learner, loop)
+        exercise = self._learner.choice_of(self._ready).exercise
+        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
+        tabs, plots = gui.add_tab_group(), gui.add_panel()
+        self._course.add_first_tabs(tabs, plots)
+        self._face.add_tabs(gui, tabs)
+        self._course.add_last_tab(tabs)
+        with tabs.add_tab("Compare"):
+            self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
+        with tabs.add_tab("Export"):
+            ExportPanel(gui, self._learner, self._settings)
+            SharePanel(gui, self._learner, choose)
+        with tabs.add_tab("Robot"):
+            self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
+        with tabs.add_tab("Help"):
+            self._help = HelpPanel(gui)
+        for place, key in enumerate(_HOTKEYS[: len(self._settings().levels)]):
+            self._level_hotkey(gui, place, key)
+        self._face.add_plots(gui, plots)
+        with plots.add_tab("Who binds"):
+            self._binding = BindingPanel(gui, self._colours)
+        plots.dock_left()
+        plots.set_width(400)
+
+    def _level_hotkey(self, gui: viser.GuiApi, place: int, key: str) -> None:
+        command = gui.add_command(f"Level {place + 1} on or off", hotkey=key)  # pyright: ignore[reportArgumentType]
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            event = self._face.toggle(place)
+            if event is not None:
+                self._post(event)
+
+    def _build_scene(self, scene: viser.SceneApi, dark: bool) -> None:
+        # Shadows triple the cost of a frame, which decides on a laptop or a phone.
+        scene.configure_default_lights(cast_shadow=False)
+        self._floor = _floor(scene, self._ready.room)
+        self._paint_floor(dark)
+        self._robot = RobotView(scene, self._ready.robot)
+        self._face.add_scene(scene, self._robot)
+
+    def _change_theme(self, dark: bool) -> None:
+        self._theme(dark)
+        self._paint_floor(dark)
+
+    def _paint_floor(self, dark: bool) -> None:
+        """Lines that stay behind the robot, whatever the background."""
+        cell, section = (70, 105) if dark else (215, 175)
+        self._floor.cell_color = (cell, cell, cell)
+        self._floor.section_color = (section, section, section)
+
+    # ---------------------------------------------------------------- events out
+
+    def _settings(self) -> AnySettings:
+        return self._learner.settings_of(self._ready)
+
+    def _post(self, event: AnyEvent) -> None:
+        self._learner.send(Post(event))
+
+    # ---------------------------------------------------------------- following
+
+    def refuse(self, sentence: str) -> None:
+        self._robot_panel.refuse(sentence)
+
+    def show_failure(self, sentence: str | None) -> None:
+        self._playback.show_failure(sentence)
+
+    def follow(self, plots: bool, texts: bool) -> None:
+        """Shows the newest poses, and now and then plots and texts."""
+        learner = self._learner
+        if learner.status is not None:
+            self._time_line.update(learner.status.running)
+        moment = moment_of(learner, self._time_line.past)
+        if moment is None or learner.ready is not self._ready:
+            return  # nothing yet, or already another scene, which the page will build
+        with self._client.atomic():
+            self._robot.move(moment.poses[:-1])
+            self._show_ghost(moment)
+            if learner.failure is not None:
+                return
+            if moment.live and moment.status.resets != self._resets:
+                self._after_reset(moment.status, first=self._resets is None)
+                self._resets = moment.status.resets
+            self._face.follow(moment)
+        if plots:
+            with self._client.atomic():
+                self._face.draw(moment)
+                if self._ghost is not None and moment.ghost is not None:
+                    self._ghost.draw(moment.ghost)
+        if texts:
+            self._write(moment)
+
+    def _show_ghost(self, moment: Moment) -> None:
+        ghost = self._learner.ghost
+        if self._ghost is not None and (moment.ghost is None or ghost is not self._shown_ghost):
+            self._ghost.remove()
+            self._ghost = None
+        if moment.ghost is None or ghost is None:
+            return
+        if self._ghost is None:
+            self._ghost = GhostView(self._client.scene, self._ready.robot, ghost.words)
+            self._shown_ghost = ghost
+        self._ghost.move(moment.ghost)
+
+    def _after_reset(self, status: Status, first: bool) -> None:
+        if not first:
+            self._face.after_reset(status)
+
+    def _write(self, moment: Moment) -> None:
+        learner, settings = self._learner, self._settings()
+        found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
+        if found is None or learner.status is None:
+            return
+        shown = Snapshot(self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s)
+        now = replace(shown, status=learner.status)
+        with self._client.atomic():
+            self._playback.update(now)
+            if found[1] > 0:
+                self._compare.update(now)
+                self._face.write(shown)
+                self._binding.update(shown)
+            self._course.follow(settings)
+            self._bindings.refresh(settings)
+
+    def close(self) -> None:
+        self._course.close()
+        self._help.close()
+        self._bindings.close()
+        self._playback.close()
+        self._time_line.close()
+        self._face.close()
+
+
+def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
+    """A floor below the robot and the points (k, 3) it will go to, m."""
+    far = float(np.abs(room[:, :2]).max(initial=0.0))
+    if far == 0.0:
+        return scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
+    side = 2.0 * math.ceil(far + 1.0)
+    return scene.add_grid("/floor", width=side, height=side, cell_size=0.5, section_size=1.0)

@@ -1,0 +1,181 @@
+"""One browser tab: builds the view and the panels for a learner's session and keeps them up to date."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import viser
+
+from app.client.learner import Learner
+from app.client.progress import Notebook
+from app.html.text import block, stopped
+from app.link.choice import SceneChoice
+from app.link.messages import Load, Ready
+from app.page.layout import Stage
+from app.view.robot import aim
+from lessons.kinds import ALL_SCENES
+
+RATE = 30.0  # Hz, poses
+PLOTS_RATE = 12.0  # Hz
+_TEXTS = 8
+
+
+class Page:
+    """A thread that looks at the learner. It builds a `Stage` whenever the learner has another scene."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        learner: Learner,
+        dark: bool,
+        by_path: bool,
+        loop: asyncio.AbstractEventLoop,
+        notebook: Notebook,
+    ) -> None:
+        """by_path: whether this page may name files of the machine; loop: viser's event loop."""
+        self.learner = learner
+        self.on_dark: Callable[[bool], None] = lambda _: None
+        self.greet: Callable[[viser.GuiApi], None] = lambda _: None  # whenever the panel is built
+        self._client = client
+        self._dark = dark
+        self._by_path = by_path
+        self._event_loop = loop
+        self._notebook = notebook
+        self._phone = False
+        self._seen: tuple[SceneChoice, str] | None = None  # what the camera was last turned to
+        self._stage: Stage | None = None
+        self._built = -1
+        self._failure: str | None = None
+        self._next_plots = 0.0
+        self._waiting: viser.GuiHtmlHandle | None = None
+        self._again: viser.GuiButtonHandle | None = None
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._loop, daemon=True)
+
+    def start(self) -> None:
+        # Told now, because docked panels will leave a desktop's scene as narrow as a phone's.
+        camera = self._client.camera
+        self._phone = camera.image_width < camera.image_height
+        gui = self._client.gui
+        gui.set_panel_label("himpc-lab")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(400)
+        self._theme(self._dark)
+        self._waiting = gui.add_html(block("<b>Starting the simulation …</b>"))
+        self._thread.start()
+
+    def close(self) -> None:
+        self._closed.set()
+        if self._thread.ident is not None and self._thread is not threading.current_thread():
+            self._thread.join(2.0)
+        if self._stage is not None:
+            self._stage.close()
+
+    def _theme(self, dark: bool) -> None:
+        self._dark = dark
+        self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
+        self.on_dark(dark)
+
+    def _choose(self, choice: SceneChoice) -> None:
+        if self.learner.failure is not None:
+            self.learner.choice = choice
+            self.learner.restart()
+        else:
+            self.learner.send(Load(choice))
+
+    # ---------------------------------------------------------------- loop
+
+    def _loop(self) -> None:
+        frame = 0
+        while not self._closed.is_set():
+            began = time.perf_counter()
+            self._look(frame)
+            frame += 1
+            self._closed.wait(max(0.002, 1 / RATE - (time.perf_counter() - began)))
+
+    def _look(self, frame: int) -> None:
+        learner = self.learner
+        ready, changed = learner.ready, learner.changed
+        if ready is not None and changed != self._built:
+            self._build(ready)
+            self._built = changed
+        self._pass_on()
+        stage = self._stage
+        if stage is None:
+            self._show_early_failure()
+            return
+        if learner.failure != self._failure:
+            self._failure = learner.failure
+            stage.show_failure(self._failure)
+        try:
+            stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
+        except Exception:
+            # Another scene may come in at any moment: its rows and poses do not fit this stage.
+            if learner.changed == self._built:
+                raise
+
+    def _plots_due(self) -> bool:
+        now = time.perf_counter()
+        if now < self._next_plots:
+            return False
+        # Frames come a little too late or too early; on average the rate is kept.
+        self._next_plots = max(self._next_plots, now - 1 / RATE) + 1 / PLOTS_RATE
+        return True
+
+    def _show_early_failure(self) -> None:
+        """The simulation died before there was anything to show."""
+        failure = self.learner.failure
+        if failure == self._failure or self._waiting is None:
+            return
+        self._failure = failure
+        if failure is None:
+            self._waiting.content = block("<b>Starting the simulation …</b>")
+            return
+        self._waiting.content = stopped(failure)
+        if self._again is None:
+            self._again = self._client.gui.add_button("Reset")
+            self._again.on_click(self._restart)
+
+    def _restart(self, _: object) -> None:
+        self.learner.restart()
+
+    def _build(self, ready: Ready) -> None:
+        before, self._stage = self._stage, None
+        if before is not None:
+            before.close()
+        with self._client.atomic():
+            self._client.scene.reset()
+            self._client.gui.reset()
+            self.greet(self._client.gui)
+            self._stage = Stage(
+                self._client,
+                self.learner,
+                ready,
+                ALL_SCENES,
+                self._dark,
+                self._choose,
+                self._theme,
+                self._by_path,
+                self._event_loop,
+                self._notebook,
+            )
+            seen = (replace(ready.choice, exercise=None, set=()), ready.robot.name)
+            if seen != self._seen:  # a restart leaves the learner's view as it was
+                aim(self._client.camera, ready.robot, self._phone, ready.room)
+                self._seen = seen
+        self._failure = None
+
+    def _pass_on(self) -> None:
+        """Sentences of the session go where they belong."""
+        refusals, notices = self.learner.take_messages()
+        for sentence in refusals:
+            if self._stage is not None:
+                self._stage.refuse(sentence)
+            else:
+                self._client.add_notification("Not loaded", sentence, color="red")
+        for sentence in notices[-3:]:
+            self._client.add_notification("Not changed", sentence, color="orange", auto_close_seconds=8.0)

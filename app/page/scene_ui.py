@@ -1,0 +1,90 @@
+"""What a stage asks of the kind of scene it shows."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import viser
+
+from app.client.learner import Learner
+from app.client.moment import Moment
+from app.html.palette import RGB
+from app.link.messages import Post, Ready, Status
+from app.panels.widgets.mirror import Bindings
+from app.panels.widgets.snapshot import Snapshot
+from app.view.robot import RobotView
+from lessons.kinds import AnyEvent
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """Where a face lives. bindings: of the kind's settings; theme: called with a new theme, dark or not."""
+
+    client: viser.ClientHandle
+    learner: Learner
+    ready: Ready
+    colours: dict[str, RGB]
+    bindings: Bindings[Any]
+    loop: asyncio.AbstractEventLoop
+    dark: bool
+    theme: Callable[[bool], None]
+
+    def post(self, event: AnyEvent) -> None:
+        """An event for the session's mailbox."""
+        self.learner.send(Post(event))
+
+    @property
+    def settings(self) -> Any:
+        """The settings in force, of the scene's kind."""
+        return self.learner.settings_of(self.ready)
+
+    def poses(self) -> np.ndarray | None:
+        """Poses of joints 1 … n and the tip, (n + 1, 7)."""
+        return self.learner.read(lambda block, _: block.poses())
+
+
+class Face(Protocol):
+    """Built in this order: tabs, plots, scene. `follow` comes with every frame."""
+
+    fastest: ClassVar[float]
+    """The highest speed of the simulation that makes sense, simulated seconds per second."""
+
+    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+        """The kind's tabs, the first one first."""
+        ...
+
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+        """The kind's tabs of the panel on the left."""
+        ...
+
+    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
+        """What the 3D view shows besides robot and floor."""
+        ...
+
+    def toggle(self, place: int) -> AnyEvent | None:
+        """The event that switches the level at a place (0-based) on or off; None if there is none."""
+        ...
+
+    def follow(self, moment: Moment) -> None:
+        """A new frame."""
+        ...
+
+    def after_reset(self, status: Status) -> None:
+        """The robot was put back to its start."""
+        ...
+
+    def draw(self, moment: Moment) -> None:
+        """Curves and plots, about ten times a second."""
+        ...
+
+    def write(self, now: Snapshot[Any]) -> None:
+        """Texts, a few times a second."""
+        ...
+
+    def close(self) -> None:
+        """The scene is about to go."""
+        ...

@@ -1,0 +1,137 @@
+"""The face of a torque-level scene: one draggable target, a stack of levels, M̄, and a plant with dynamics."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import viser
+
+from app.client.moment import Moment
+from app.html.palette import LEVELS
+from app.link.messages import Status
+from app.page.scene_ui import Context
+from app.panels.run.joints import JointPlots
+from app.panels.torque.controller import ControllerPanel
+from app.panels.torque.plant import PlantPanel
+from app.panels.torque.plots import LevelPlots
+from app.panels.torque.start import StartPanel
+from app.panels.torque.tasks import TasksPanel
+from app.panels.widgets.snapshot import Snapshot
+from app.view.coordinates import draggable
+from app.view.drag import Hand
+from app.view.pull import Pull
+from app.view.robot import RobotView, camera_for
+from app.view.target import Frames
+from app.view.trails import Trails
+from lessons.events import Set
+from lessons.settings import SceneSettings
+
+
+class TorqueFace:
+    """See `app.page.scene_ui.Face`."""
+
+    fastest: ClassVar[float] = 1.0
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+
+    # ---------------------------------------------------------------- building
+
+    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+        context = self._context
+        ready, bindings, settings = context.ready, context.bindings, context.settings
+        by_hand = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
+        with tabs.add_tab("Start"):
+            self._start = StartPanel(gui, context.post, ready.robot.joint_names, by_hand, context.dark)
+        with tabs.add_tab("Tasks"):
+            self._tasks = TasksPanel(gui, bindings, settings, context.colours, lambda: context.settings)
+        with tabs.add_tab("Control"):
+            self._controller = ControllerPanel(gui, bindings, settings, ready.robot)
+        with tabs.add_tab("Plant"):
+            PlantPanel(gui, bindings, settings, ready.robot)
+        self._start.on_theme = context.theme
+        self._start.on_recall = self._recall
+
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+        with plots.add_tab("Errors"):
+            self._level_plots = LevelPlots(gui, self._context.ready, self._context.colours)
+        with plots.add_tab("Joints"):
+            self._joint_plots = JointPlots(gui, self._context.ready.robot)
+
+    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
+        context, ready = self._context, self._context.ready
+        poses = context.poses()
+        tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
+        status = context.learner.status
+        reach = camera_for(ready.robot)[2]
+        self._frames = Frames(scene)
+        self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until there is a tick to tell
+        self._hand = Hand(
+            scene,
+            ready,
+            context.colours,
+            {} if status is None else status.targets,
+            tip,
+            float(np.clip(0.2 * reach, 0.12, 0.4)),
+            context.post,
+            lambda: bool(self._start.clamp.value),
+            self._start.dragged,
+        )
+        self._pull = Pull(scene, robot, ready.robot, context.post)
+        curves = [
+            (task.path, context.colours[task.level])
+            for task in ready.tasks
+            if task.kind == "position" and task.path is not None
+        ]
+        position = draggable(ready.tasks)[0]
+        self._trails = Trails(
+            scene, curves, LEVELS[0] if position is None else context.colours[position.level]
+        )
+
+    # ---------------------------------------------------------------- events out
+
+    def toggle(self, place: int) -> Set | None:
+        return self._tasks.toggle(place)
+
+    def _recall(self) -> None:
+        poses = self._context.poses()
+        if poses is not None:
+            self._hand.recall(poses[-1])
+
+    # ---------------------------------------------------------------- following
+
+    def follow(self, moment: Moment) -> None:
+        self._frames.actual(moment.poses[-1])
+        if moment.live:
+            self._hand.follow(moment.status.targets)
+        running = moment.live and moment.status.running
+        self._pull.follow(moment.poses, self._context.settings.plant, running, bool(self._start.pull.value))
+
+    def after_reset(self, status: Status) -> None:
+        self._hand.after_reset(status.targets)
+
+    def draw(self, moment: Moment) -> None:
+        context, T_s = self._context, self._context.settings.T_s
+        self._frames.show(bool(self._start.frames.value))
+        self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
+        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields)
+        self._hand.look_back(None if moment.live else moment.status.targets)
+        tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
+        self._trails.draw(tips, moment.status.path, T_s)
+        beside = None if moment.ghost is None else moment.ghost.window
+        self._level_plots.draw(moment.window, beside, T_s)
+        self._joint_plots.draw(moment.window, beside)
+
+    def write(self, now: Snapshot[SceneSettings]) -> None:
+        if now.status.gauge is not None:
+            fields = now.ready.layout.fields
+            # The snapshot's row is its own copy.
+            now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
+        self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
+        self._start.update(now)
+        self._tasks.update(now)
+        self._controller.update(now)
+
+    def close(self) -> None:
+        self._hand.close()

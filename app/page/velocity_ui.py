@@ -1,0 +1,199 @@
+"""The face of a velocity-level scene: goals of hand and base, a mission, two predictions, surroundings."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import viser
+
+from app.client.moment import Moment
+from app.html.text import free_name
+from app.link.messages import Status, TaskView
+from app.page.scene_ui import Context
+from app.panels.run.joints import ACCELERATION, JointPlots
+from app.panels.velocity.controller import HtmpcPanel
+from app.panels.velocity.mission import MissionPanel, swap
+from app.panels.velocity.plant import ServoPanel
+from app.panels.velocity.plots import TrackingPlots
+from app.panels.velocity.start import BeginPanel, last_ball
+from app.panels.velocity.tasks import RolesPanel
+from app.panels.widgets.snapshot import Snapshot
+from app.view.coordinates import full
+from app.view.goals import Goals
+from app.view.obstacles import Obstacles
+from app.view.robot import RobotView, camera_for, look_at
+from app.view.surroundings import Carried, People, ReachCircle
+from app.view.target import Frames
+from app.view.trails import Trails
+from himpc.htmpc import base_joints
+from lessons.events import Set
+from lessons.mobile.events import Appear
+from lessons.mobile.settings import MobileSettings
+from robots.stretch import horizontal_reach
+
+_AHEAD, _RADIUS = 0.7, 0.2
+"""m: where a new obstacle appears in front of the hand, and its radius."""
+
+
+class VelocityFace:
+    """See `app.page.scene_ui.Face`."""
+
+    fastest: ClassVar[float] = 10.0
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._points = [task for task in context.ready.tasks if task.kind == "position"]
+        self._base = base_joints(context.ready.robot)
+
+    # ---------------------------------------------------------------- building
+
+    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+        context = self._context
+        ready, bindings, colours = context.ready, context.bindings, context.colours
+        with tabs.add_tab("Start"):
+            self._begin = BeginPanel(gui, ready.choice.name, colours, bool(self._base), context.dark)
+        with tabs.add_tab("Mission"):
+            self._mission = MissionPanel(
+                gui,
+                self._points,
+                colours,
+                context.post,
+                self._status,
+                lambda: self._goals.places,
+            )
+        with tabs.add_tab("Tasks"):
+            self._roles = RolesPanel(gui, bindings, context.settings, colours, self._settings)
+        with tabs.add_tab("Control"):
+            self._controller = HtmpcPanel(gui, bindings, context.settings, ready.robot, self._settings)
+        with tabs.add_tab("Plant"):
+            ServoPanel(gui, bindings, context.settings)
+        self._begin.on_theme = context.theme
+        self._begin.on_swap = self._swap
+        self._begin.on_look = self._look
+        self._begin.on_obstacle = self._add_obstacle
+        self._begin.on_clear = self._clear_ball
+
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+        with plots.add_tab("Errors"):
+            self._plots = TrackingPlots(gui, self._context.ready, self._context.colours)
+        with plots.add_tab("Joints"):
+            self._joint_plots = JointPlots(gui, self._context.ready.robot, ACCELERATION)
+
+    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
+        del robot  # velocity servos do not feel a pull
+        context, ready = self._context, self._context.ready
+        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
+        self._frames = Frames(scene)
+        self._obstacles = Obstacles(scene, self._put)
+        self._people = People(scene)
+        self._carried = Carried(scene)
+        self._goals = Goals(
+            scene, ready, context.colours, size, context.post, self._status, self._begin.dragged
+        )
+        self._trails = {
+            task.name: Trails(scene, [], context.colours[task.level], f"_{task.name}", scale=1)
+            for task in self._points
+        }
+        self._circle: ReachCircle | None = None
+        if self._base:
+            first = len(self._base)
+            self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
+
+    # ---------------------------------------------------------------- events out
+
+    def _settings(self) -> MobileSettings:
+        return self._context.settings
+
+    def _status(self) -> Status | None:
+        return self._context.learner.status
+
+    def toggle(self, place: int) -> Set | None:
+        return self._roles.toggle(place)
+
+    def _swap(self) -> None:
+        status = self._status()
+        if status is not None and status.mission is not None:
+            swap(status.mission.rows, self._context.post)
+
+    def _put(self, name: str, centre: tuple[float, float, float]) -> None:
+        self._context.post(Set(f"obstacles.{name}", centre))
+
+    def _add_obstacle(self) -> None:
+        """A ball, in front of the hand as seen from the base: near enough to be felt, not yet in the way."""
+        poses = self._context.poses()
+        if poses is None:
+            return
+        base = poses[len(self._base) - 1, :2] if self._base else np.zeros(2)
+        ahead = poses[-1, :2] - base
+        ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
+        x, y = poses[-1, :2] + _AHEAD * ahead
+        taken = [each.name for each in self._settings().htmpc.obstacles]
+        name = free_name("ball", taken)
+        self._context.post(Appear(name, (float(x), float(y), float(poses[-1, 2])), _RADIUS))
+
+    def _clear_ball(self) -> None:
+        ball = last_ball(self._settings())
+        if ball is not None:
+            self._context.post(Set(f"obstacles.{ball.name}", None))
+
+    def _look(self) -> None:
+        poses = self._context.poses()
+        if poses is not None:
+            base = poses[len(self._base) - 1, :3] if self._base else np.zeros(3)
+            look_at(self._context.client.camera, self._context.ready.robot, base)
+
+    # ---------------------------------------------------------------- following
+
+    def follow(self, moment: Moment) -> None:
+        tip = moment.poses[-1]
+        self._frames.actual(tip)
+        mission = moment.status.mission
+        carries = mission is not None and bool(mission.people) and not mission.done
+        self._carried.follow(tip[:3], carries)
+
+    def _at(self, task: TaskView, poses: np.ndarray) -> np.ndarray:
+        """Where a task's point is, (3,) m: the tip, or the base on the floor."""
+        if "z" in task.axes or not self._base:
+            return poses[-1, :3]
+        return np.array([*poses[len(self._base) - 1, :2], 0.01])
+
+    def after_reset(self, status: Status) -> None:
+        pass
+
+    def draw(self, moment: Moment) -> None:
+        status, latest, settings = moment.status, moment.latest, self._settings()
+        fields = self._context.ready.layout.fields
+        self._goals.follow(status, latest, fields)
+        self._obstacles.show(settings.htmpc.obstacles, bool(self._begin.arrows.value))
+        self._frames.show(bool(self._begin.frames.value))
+        if self._circle is not None:
+            self._circle.show(bool(self._begin.reach.value))
+        if status.mission is not None:
+            self._people.show(status.mission.people)
+        for task in self._points:
+            trail = self._trails[task.name]
+            trail.show(bool(self._begin.trace.value), bool(self._begin.prediction.value))
+            path = np.zeros((0, 3)) if status.mission is None else status.mission.paths.get(task.name)
+            way = np.array([self._at(task, poses) for poses in moment.way]).reshape(-1, 3)
+            trail.draw(way, np.zeros((0, 3)) if path is None else path, settings.T_s)
+        self._draw_desired(latest)
+        beside = None if moment.ghost is None else moment.ghost.window
+        self._plots.draw(moment.window, beside, settings.T_s)
+        self._joint_plots.draw(moment.window, beside)
+
+    def _draw_desired(self, latest: np.ndarray) -> None:
+        """What the hand is to do now: the point of its reference."""
+        hand = next((task for task in self._points if "z" in task.axes), None)
+        if hand is not None:
+            fields = self._context.ready.layout.fields
+            self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), None)
+
+    def write(self, now: Snapshot[MobileSettings]) -> None:
+        self._begin.update(now)
+        self._mission.update(now)
+        self._roles.update(now)
+        self._controller.update(now)
+
+    def close(self) -> None:
+        pass

@@ -1,0 +1,1 @@
+"""What a lesson shows: its cards, steps, predictions, claims."""

@@ -1,0 +1,124 @@
+"""The start page: a card per lesson, in order, with what was done of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib.resources import files
+
+import viser
+
+from app.client.progress import Notebook, Progress
+from app.html.palette import GOOD, LEVELS, css
+from app.html.text import badge, block, esc
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise, parts_of
+from lessons.course import COURSE, load_lesson
+from lessons.lesson import Lesson
+
+Choose = Callable[[SceneChoice], None]
+
+LABORATORY = SceneChoice("iiwa14-hold")
+"""Where the free laboratory begins."""
+
+
+def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
+    """Cards in the current container; every button can be reached by the keyboard."""
+    progress = notebook.progress
+    done = sum(name in progress.seen for name in COURSE)
+    gui.add_html(
+        block(
+            f"<b>{len(COURSE)} lessons</b>, each a question, a robot and a measurement: predict, run, see. "
+            f"{done} of them begun. What you did is kept in this browser."
+        )
+    )
+    for number, name in enumerate(COURSE, start=1):
+        lesson = load_lesson(name)
+        gui.add_html(_card(number, lesson, progress))
+        word, place = _offer(lesson, progress)
+        _button(
+            gui,
+            f"{word} {number} · {lesson.card.title}",
+            SceneChoice.of_lesson(Exercise(name, place)),
+            choose,
+        )
+    gui.add_html(
+        _framed(
+            glyph("laboratory"),
+            "<b>Free laboratory</b><br>Any robot, any scene, every setting: no questions asked.",
+        )
+    )
+    _button(gui, "Go to the laboratory", LABORATORY, choose)
+
+
+def add_invitation(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
+    """One button that leads on from wherever the learner is."""
+    progress = notebook.progress
+    unfinished = [name for name in COURSE if _offer(load_lesson(name), progress)[0] != "Again"]
+    name = unfinished[0] if unfinished else COURSE[0]
+    lesson, number = load_lesson(name), COURSE.index(name) + 1
+    word, place = _offer(lesson, progress)
+    label = f"{word} lesson {number}: {lesson.card.title}"
+    _button(gui, label, SceneChoice.of_lesson(Exercise(name, place)), choose, LEVELS[1])
+
+
+def _button(
+    gui: viser.GuiApi,
+    label: str,
+    choice: SceneChoice,
+    choose: Choose,
+    colour: tuple[int, int, int] | None = None,
+) -> None:
+    button = gui.add_button(label, color=colour)
+
+    @button.on_click
+    async def _(_: object) -> None:
+        choose(choice)
+
+
+def _offer(lesson: Lesson, progress: Progress) -> tuple[str, int]:
+    """("Start", "Continue" or "Again", at which place)."""
+    seen = progress.seen.get(lesson.name, frozenset())
+    parts = len(parts_of(lesson))
+    place = progress.next_place(lesson.name, parts)
+    return ("Start" if not seen else "Continue" if place else "Again"), place
+
+
+def _card(number: int, lesson: Lesson, progress: Progress) -> str:
+    card = lesson.card
+    parts = parts_of(lesson)
+    seen = progress.seen.get(lesson.name, frozenset())
+    steps = "".join("●" if place in seen else "○" for place in range(len(parts)))
+    state = f'<span title="{len(seen)} of {len(parts)} parts seen">{steps} {len(seen)}/{len(parts)}</span>'
+    if len(seen) >= len(parts):
+        state = badge("✓ DONE", GOOD)
+    if lesson.name in progress.best:
+        state += f" best score {progress.best[lesson.name]:.0f}"
+    return _framed(
+        glyph(lesson.name),
+        f"<b>{number} · {esc(card.title)}</b><br>{esc(card.question)}"
+        f'<div style="opacity:0.75">{card.minutes} min · needs {esc(_needs(card.needs))}</div>{state}',
+    )
+
+
+def _needs(needs: str) -> str:
+    """Lessons by their titles instead of their names."""
+    for name in COURSE:
+        needs = needs.replace(f'"{name}"', f"“{load_lesson(name).card.title}”")
+    return needs
+
+
+def _framed(picture: str, words: str) -> str:
+    return block(
+        f'<div style="display:flex;gap:0.8em;align-items:flex-start">'
+        f'<div style="flex:0 0 4.6em">{picture}</div><div style="min-width:0">{words}</div></div>',
+        f"border-top:1px solid {css((139, 149, 161), 0.35)};padding-top:0.6em;margin-top:0.3em",
+    )
+
+
+@cache
+def glyph(name: str) -> str:
+    """The little picture of a lesson: SVG that takes the text's colour."""
+    folder = files("app.panels.lesson") / "glyphs"
+    found = folder / f"{name}.svg"
+    return (found if found.is_file() else folder / "lesson.svg").read_text(encoding="utf-8")

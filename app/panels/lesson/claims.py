@@ -1,0 +1,187 @@
+"""What a lesson's tab says, as HTML: where one is, the idea, the claims as they become true or false, why."""
+
+from __future__ import annotations
+
+import math
+
+from app.html.glossary import STYLE
+from app.html.markdown import rendered, rendered_line
+from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB, css
+from app.html.text import badge, bar, block, esc, figure
+from app.link.exercise import Curve, Exercise, Lecture, parts_of, signals_of
+from app.panels.lesson.drawing import Bound, chart
+from lessons.challenge import Challenge
+from lessons.claim import Claim
+from lessons.course import COURSE
+from lessons.lesson import Step
+from lessons.measure import Signal
+
+Part = Step | Challenge
+
+
+def heading(exercise: Exercise) -> str:
+    """Which lesson, which step of how many."""
+    lesson = exercise.whole
+    parts = parts_of(lesson)
+    names = [part.title if isinstance(part, Step) else "Challenge" for part in parts]
+    dots = " ".join(
+        f'<span title="{esc(name)}" style="opacity:{1 if k == exercise.place else 0.45}">'
+        f"{'●' if k == exercise.place else '○'}</span>"
+        for k, name in enumerate(names)
+    )
+    title = f"Lesson {COURSE.index(lesson.name) + 1}: {esc(lesson.card.title)}"
+    return STYLE + block(
+        f'<div style="opacity:0.8">{title} &nbsp;{dots} &nbsp;{exercise.place + 1} of {len(parts)}</div>'
+        f'<div style="font-size:1.25em;font-weight:700;margin-top:0.15em">{esc(names[exercise.place])}</div>',
+        "padding-top:0.5em",
+    )
+
+
+def idea(part: Part, opened: bool) -> str:
+    """The text; folded up once the run was seen, so that what happened stands first."""
+    words = rendered(part.text)
+    if isinstance(part, Step) and part.ghost is not None:
+        words += f'<p style="opacity:0.8">Ghost, the dashed grey curve: <b>{esc(part.ghost.words)}</b>.</p>'
+    title = "The task" if isinstance(part, Challenge) else "The idea"
+    return block(f"<details{' open' if opened else ''}><summary><b>{title}</b></summary>{words}</details>")
+
+
+def state(part: Part, lecture: Lecture, best: float | None) -> str:
+    """How far the run is, the claims or goals, the curves, and a challenge's points."""
+    challenge = isinstance(part, Challenge)
+    claims = part.goals if isinstance(part, Challenge) else part.claims
+    html = "" if lecture.phase == "waiting" and not challenge else _progress(lecture)
+    if lecture.attempt or challenge:
+        title = "Goals" if challenge else "What it shows"
+        html += block(f"<b>{title}</b>{''.join(_claim(c, k, lecture) for k, c in enumerate(claims))}")
+    if isinstance(part, Challenge):
+        html += _points(part, lecture, best)
+    return html
+
+
+def after(part: Part, lecture: Lecture) -> str:
+    """Why it came out like this, and what to do now."""
+    if isinstance(part, Challenge):
+        return ""
+    return block(
+        f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0"
+    ) + block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
+
+
+def _free(lecture: Lecture) -> str:
+    judged = "your last run" if lecture.changed else "the scripted run"
+    if lecture.lost_at is not None:
+        return f"The robot stands where it was lost: run again. The marks above judge {judged}."
+    return f"The robot is free now; the marks above judge {judged}."
+
+
+def _progress(lecture: Lecture) -> str:
+    share = lecture.t / lecture.duration
+    match lecture.phase:
+        case "waiting":
+            words = "Set the knobs, then start the run."
+        case "preparing":
+            words = "One moment: the ghost is still being computed."
+        case "running":
+            words = f"{badge('RUNNING', GOOD)} {lecture.t:.2f} of {lecture.duration:g} s, judged as it goes"
+        case "done":
+            words = f"{badge('DONE', LEVELS[1])} judged on the first {lecture.t:.3g} s of the run"
+    if lecture.lost_at is not None:
+        words += (
+            f"<br>{badge('LOST', BAD)} The robot went out of control at t = {lecture.lost_at:.2f} s, "
+            "and the run ends there."
+        )
+    if lecture.changed:
+        words += f"<br><i>{esc(lecture.changed)}</i>"
+    return block(words + bar(share, LEVELS[1]))
+
+
+_RELATIONS = {"at most": "≤", "at least": "≥"}
+_SIGNS: dict[bool | None, tuple[str, str, RGB]] = {
+    True: ("✓", "true", GOOD),
+    False: ("✗", "false", BAD),
+    None: ("…", "nothing to measure yet", BOUND),
+}
+
+
+def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
+    holds = lecture.holds[place] if place < len(lecture.holds) else None
+    value = lecture.values[place] if place < len(lecture.values) else math.nan
+    sign, word, colour = _SIGNS[holds]
+    if lecture.phase == "running" and holds is not None:
+        word += " so far"
+    unit = claim.measure.unit
+    measured = (
+        ""
+        if holds is None
+        else f"{figure(value, unit)}, must be {_RELATIONS[claim.relation]} {figure(claim.bound, unit)}"
+    )
+    return (
+        f'<div style="display:flex;gap:0.5em;margin:0.25em 0"><div style="flex:0 0 1.3em;height:1.3em;'
+        f'border-radius:50%;text-align:center;font-weight:700;color:#fff;line-height:1.3;background:{css(colour)}">'
+        f'{sign}</div><div style="min-width:0">{esc(claim.text)}'
+        f'<div style="opacity:0.8" title="{esc(claim.measure.words)}">'
+        f'<b style="color:{css(colour)}">{word}</b> {measured}</div></div></div>'
+    )
+
+
+def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
+    html = ""
+    if lecture.result is not None:
+        if not lecture.result.passed:
+            html = f"{badge('NOT YET', BAD)} A goal is missed: change a knob and start again."
+        elif lecture.changed:
+            html = f"{badge('DOES NOT COUNT', BAD)} Reset this challenge and try again."
+        else:
+            html = (
+                f"{badge('PASSED', GOOD)} <b>{lecture.result.score:.0f} points</b> of 100. More with a "
+                f"better value: {esc(challenge.score.measure.words)}, now "
+                f"{figure(lecture.points_for, challenge.score.measure.unit)}, 100 points at "
+                f"{figure(challenge.score.best, challenge.score.measure.unit)}."
+            )
+    if best is not None:
+        html += f"<div>Your best score: <b>{best:.0f}</b></div>"
+    return block(html) if html else ""
+
+
+def pictures(part: Part, lecture: Lecture) -> str:
+    """The signals to look at, over the run."""
+    if not lecture.curves:
+        return block("The curves of the run appear here.")
+    claims = part.goals if isinstance(part, Challenge) else part.claims
+    drawn = ""
+    for k, signal in enumerate(signals_of(part)):
+        ghost = lecture.ghosts[k] if k < len(lecture.ghosts) else None
+        drawn += chart(
+            signal.words,
+            _unit(signal),
+            lecture.curves[k],
+            _whole(ghost),
+            _bounds(claims, signal),
+            part.duration,
+        )
+    legend = "measured"
+    if lecture.ghosts:
+        legend += ", dashed grey: the ghost"
+    return block(
+        f'{drawn}<div style="opacity:0.7">Blue: {legend}; green dots: a bound that is claimed.</div>'
+    )
+
+
+def _whole(curve: Curve | None) -> Curve | None:
+    return curve if curve is not None and len(curve.t) else None
+
+
+def _unit(signal: Signal) -> str:
+    return "°" if signal.unit == "deg" else signal.unit
+
+
+def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
+    """What claims say about the largest or the last value of a signal itself."""
+    return [
+        Bound(claim.bound, claim.text)
+        for claim in claims
+        if claim.measure.signal == signal
+        and not claim.measure.over_ghost
+        and claim.measure.statistic in ("largest", "last")
+    ]

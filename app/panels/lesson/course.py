@@ -1,0 +1,84 @@
+"""All of the lessons in one page: the tab of the step that is on, the invitation, the list of lessons."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import viser
+
+from app.client.learner import Learner
+from app.client.progress import Notebook
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
+from app.panels.lesson.cards import add_cards, add_invitation
+from app.panels.lesson.step import LessonPanel
+from app.panels.widgets.window import Window
+from lessons.kinds import AnySettings
+
+
+class Course:
+    """Built with every scene. The tab of a lesson comes first, since it is what the learner came for."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        learner: Learner,
+        exercise: Exercise | None,
+        notebook: Notebook,
+        choose: Callable[[SceneChoice], None],
+        settings: Callable[[], AnySettings],
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        """exercise: the one that is on, if any."""
+        self._gui, self._learner, self._notebook = gui, learner, notebook
+        self._exercise = exercise
+        self._choose, self._settings, self._loop = choose, settings, loop
+        self._list = Window(gui, "All lessons", "L", self._fill)
+        self._panel: LessonPanel | None = None
+        if exercise is None:
+            add_invitation(gui, notebook, choose)
+
+    def add_first_tabs(self, tabs: viser.GuiTabGroupHandle, plots: viser.PanelHandle) -> None:
+        """The step that is on, and its curves among the plots."""
+        gui, exercise = self._gui, self._exercise
+        if exercise is None:
+            return
+        with plots.add_tab("This step"):
+            pictures = gui.add_html("")
+        self._panel = LessonPanel(
+            gui,
+            tabs.add_tab("Lesson"),
+            pictures,
+            exercise,
+            self._learner,
+            self._choose,
+            self._list.open,
+            self._notebook,
+            self._settings,
+            self._loop,
+        )
+
+    def add_last_tab(self, tabs: viser.GuiTabGroupHandle) -> None:
+        """Every lesson, where none is on."""
+        if self._panel is None:
+            with tabs.add_tab("Lessons"):
+                self._fill()
+
+    def _fill(self) -> None:
+        add_cards(self._gui, self._notebook, self._leave_for)
+
+    def _leave_for(self, choice: SceneChoice) -> None:
+        self._list.close()
+        self._choose(choice)
+
+    def follow(self, settings: AnySettings) -> None:
+        """Shows how far the lesson is."""
+        if self._panel is not None:
+            self._panel.follow(self._learner.lecture, settings)
+
+    def close(self) -> None:
+        """The panels are about to be removed."""
+        self._list.close()
+        if self._panel is not None:
+            self._panel.close()

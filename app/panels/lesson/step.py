@@ -1,0 +1,253 @@
+"""The lesson's tab: one step at a time, from its idea to its prediction, its run and what came of it."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+
+import viser
+
+from app.client.learner import Learner
+from app.client.progress import Notebook
+from app.html.palette import LEVELS
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise, Lecture, parts_of
+from app.link.messages import Post, Predict, ResetAll, RunStep
+from app.panels.lesson.claims import after, heading, idea, pictures, state
+from app.panels.lesson.prediction import Asking
+from app.panels.widgets.mirror import Bindings
+from app.panels.widgets.path_control import add_control
+from lessons.challenge import Challenge
+from lessons.kinds import AnyEvent, AnySettings
+from lessons.lesson import Step
+
+_AGAIN, _MINE, _RESET = "Run again", "Run with my settings", "Reset this step"
+_BACK, _SKIP, _ALL = "◀ Back", "Skip ▶", "All lessons"
+
+
+class LessonPanel:
+    """Built anew for every step, inside a tab that stays. Callbacks only send."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tab: viser.GuiTabHandle,
+        pictures: viser.GuiHtmlHandle,
+        exercise: Exercise,
+        learner: Learner,
+        choose: Callable[[SceneChoice], None],
+        all_lessons: Callable[[], None],
+        notebook: Notebook,
+        settings: Callable[[], AnySettings],
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        """pictures: where the curves of the run are drawn."""
+        self._gui, self._tab, self._pictures, self._loop = gui, tab, pictures, loop
+        self._learner, self._send, self._choose = learner, learner.send, choose
+        self._all_lessons, self._notebook, self._settings = all_lessons, notebook, settings
+        self._fast = self._beside = False
+        self._turn_to(exercise)
+        for label, key, does in (
+            ("Lesson: run this step", "P", self.run),
+            ("Lesson: next step", "N", self.next),
+            ("Lesson: previous step", "B", self.back),
+        ):
+            self._hotkey(label, key, does)
+
+    def _hotkey(self, label: str, key: str, does: Callable[[], None]) -> None:
+        command = self._gui.add_command(label, hotkey=key)  # pyright: ignore[reportArgumentType]
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            does()
+
+    def _post(self, event: AnyEvent) -> None:
+        self._send(Post(event))
+
+    # ---------------------------------------------------------------- building
+
+    def _turn_to(self, exercise: Exercise) -> None:
+        self._exercise, self._part = exercise, exercise.part
+        self._lecture: Lecture | None = None
+        self._shown: dict[str, str] = {}
+        self._bindings: Bindings[AnySettings] = Bindings(self._post, self._loop)
+        with self._tab:
+            self._all = self._gui.add_folder(None)
+        with self._all:
+            self._build()
+
+    def _build(self) -> None:
+        gui, part = self._gui, self._part
+        self._idea = gui.add_html("")
+        prediction = part.prediction if isinstance(part, Step) else None
+        self._asking = None if prediction is None else Asking(gui, prediction, self._predict)
+        self._knobs_first = gui.add_folder("Your knobs") if isinstance(part, Challenge) else None
+        if isinstance(part, Challenge) and self._knobs_first is not None:
+            with self._knobs_first:
+                for knob in part.knobs:
+                    add_control(gui, self._bindings, knob, self._settings())
+        self._run = gui.add_button("Run this step", color=LEVELS[1], hint="Key P")
+        self._hurry = gui.add_checkbox(
+            "As fast as it goes", self._fast, hint="Instead of real time: for those who have seen it"
+        )
+        self._state = gui.add_html("")
+        self._after = gui.add_html("")
+        self._next = gui.add_button(self._next_label(), color=LEVELS[2], visible=False, hint="Key N")
+        self._free = gui.add_folder("Controls of this step", visible=False)
+        with self._free:
+            if isinstance(part, Step):
+                for control in part.controls:
+                    add_control(gui, self._bindings, control, self._settings())
+            self._rerun = gui.add_button_group("The script", (_AGAIN, _MINE, _RESET))
+        self._second = gui.add_checkbox(
+            "Ghost in the scene",
+            self._beside,
+            visible=isinstance(part, Step) and part.ghost is not None,
+            hint="The second robot, translucent, in the same scene. Both start again together.",
+        )
+        self._where = gui.add_button_group("Lesson", (_BACK, _SKIP, _ALL), hint="Keys B, N and L")
+        self._listen()
+
+    def _listen(self) -> None:
+        @self._run.on_click
+        async def _(_: object) -> None:
+            self.run()
+
+        @self._hurry.on_update
+        async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+            if event.client is not None:
+                self._fast = bool(self._hurry.value)
+
+        @self._second.on_update
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # in a thread: processes begin and end
+            if event.client is not None:
+                self._beside = bool(self._second.value)
+                self._show_ghost()
+
+        @self._next.on_click
+        async def _(_: object) -> None:
+            self.next()
+
+        @self._rerun.on_click
+        async def _(_: object) -> None:
+            choice = str(self._rerun.value)
+            self._send(ResetAll() if choice == _RESET else RunStep(own=choice == _AGAIN, fast=self._fast))
+
+        @self._where.on_click
+        async def _(_: object) -> None:
+            {_BACK: self.back, _SKIP: self.next, _ALL: self._all_lessons}[str(self._where.value)]()
+
+    def _show_ghost(self) -> None:
+        """Sees to it that the ghost in the scene is this step's, if one is wanted."""
+        ghost = self._part.ghost if isinstance(self._part, Step) else None
+        if ghost is not None and self._beside:
+            self._learner.start_ghost(ghost)
+        elif self._learner.ghost is not None:
+            self._learner.stop_ghost()
+
+    def _next_label(self) -> str:
+        lesson = self._exercise.whole
+        parts = parts_of(lesson)
+        if self._exercise.place + 1 >= len(parts):
+            return "Next: choose another lesson"
+        after = parts[self._exercise.place + 1]
+        return f"Next: {after.title if isinstance(after, Step) else 'the challenge'}"
+
+    # ---------------------------------------------------------------- doing
+
+    def _predict(self, answer: Predict | object) -> None:
+        self._send(Predict(answer))  # pyright: ignore[reportArgumentType]
+
+    def run(self) -> None:
+        """The step's script from its start."""
+        lecture, asking = self._lecture, self._asking
+        if asking is not None and lecture is not None and lecture.answer is None:
+            suggested = asking.suggested
+            if suggested is not None:
+                self._send(Predict(suggested))
+        self._send(RunStep(own=True, fast=self._fast))
+
+    def next(self) -> None:
+        """The next step; after the last one the list of lessons."""
+        if self._exercise.place + 1 >= len(parts_of(self._exercise.whole)):
+            self._all_lessons()
+        else:
+            self._go(self._exercise.place + 1)
+
+    def back(self) -> None:
+        """The step before, if there is one."""
+        if self._exercise.place > 0:
+            self._go(self._exercise.place - 1)
+
+    def _go(self, place: int) -> None:
+        self._choose(SceneChoice.of_lesson(Exercise(self._exercise.lesson, place)))
+
+    # ---------------------------------------------------------------- showing
+
+    def follow(self, lecture: Lecture | None, settings: AnySettings) -> None:
+        """Shows how far the exercise is."""
+        if lecture is None:
+            return
+        if lecture.exercise != self._exercise:
+            self._bindings.close()
+            self._all.remove()
+            self._turn_to(lecture.exercise)
+            if self._beside:
+                threading.Thread(target=self._show_ghost, daemon=True).start()
+        if lecture is not self._lecture:
+            self._lecture = lecture
+            self._note(lecture)
+            self._show(lecture)
+        self._bindings.refresh(settings)
+
+    def _note(self, lecture: Lecture) -> None:
+        if lecture.phase != "done":
+            return
+        name, notebook = self._exercise.lesson, self._notebook
+        progress = notebook.progress
+        if isinstance(self._part, Step):
+            progress = progress.with_step(name, self._exercise.place)
+        elif lecture.result is not None and lecture.result.passed and not lecture.changed:
+            progress = progress.with_step(name, self._exercise.place).with_points(name, lecture.result.score)
+        notebook.note(progress)
+
+    def _show(self, lecture: Lecture) -> None:
+        seen = lecture.attempt > 0
+        over = lecture.phase == "done"
+        challenge = isinstance(self._part, Challenge)
+        # What is missed invites another try; who has had enough presses Skip.
+        passed = lecture.result is not None and lecture.result.passed
+        if self._asking is not None:
+            self._asking.show(lecture)
+        ready = self._asking is None or lecture.answer is not None or self._asking.suggested is not None
+        label = (
+            "Start the run" if challenge else "Run this step" if ready else "Run (first say what you expect)"
+        )
+        if self._run.label != label:
+            self._run.label = label
+        for handle, shown in (
+            (self._run, challenge or lecture.phase == "waiting"),
+            (self._hurry, challenge or lecture.phase == "waiting"),
+            (self._next, over and (passed or not challenge)),
+            (self._free, over and not challenge),
+        ):
+            if handle.visible != shown:
+                handle.visible = shown
+        busy = lecture.phase in ("preparing", "running")
+        if self._run.disabled != (busy or not ready):
+            self._run.disabled = busy or not ready
+        best = self._notebook.progress.best.get(self._exercise.lesson)
+        self._put("idea", self._idea, heading(self._exercise) + idea(self._part, opened=not seen))
+        self._put("state", self._state, state(self._part, lecture, best))
+        self._put("pictures", self._pictures, pictures(self._part, lecture))
+        self._put("after", self._after, after(self._part, lecture) if over else "")
+
+    def _put(self, name: str, handle: viser.GuiHtmlHandle, html: str) -> None:
+        if self._shown.get(name) != html:
+            self._shown[name] = html
+            handle.content = html
+
+    def close(self) -> None:
+        """The controls are about to be removed."""
+        self._bindings.close()

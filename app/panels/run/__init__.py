@@ -1,0 +1,1 @@
+"""What every scene has: playback, looking back, sharing, comparing."""

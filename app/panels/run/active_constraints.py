@@ -1,0 +1,56 @@
+"""Who is binding: the active constraints of the last plan, and the time spent at bounds."""
+
+from __future__ import annotations
+
+import viser
+
+from app.html.palette import RGB
+from app.html.text import block, esc, swatch
+from app.panels.widgets.snapshot import Snapshot
+from lessons.kinds import AnySettings
+
+_HEAD = '<tr style="text-align:left">{}</tr>'
+
+
+class BindingPanel:
+    """A table per question."""
+
+    def __init__(self, gui: viser.GuiApi, colours: dict[str, RGB]) -> None:
+        self._colours = colours
+        gui.add_html(
+            block("A bound <b>binds</b> when the plan stops at it. The multiplier says how much the level "
+                  "would gain if the bound gave way a little; the slack how far it was softened.")
+        )  # fmt: skip
+        with gui.add_folder("Binding now"):
+            self._now = gui.add_html("")
+        with gui.add_folder("Time at bounds since the reset"):
+            self._times = gui.add_html("")
+
+    def update(self, now: Snapshot[AnySettings]) -> None:
+        rows = "".join(
+            f"<tr><td>{swatch(self._colours.get(row.level, (139, 149, 161)))}{esc(row.level)}</td>"
+            f"<td>{esc(row.joint)}</td><td>{esc(row.kind)} {esc(row.side)}</td>"
+            f"<td>{row.multiplier:.3g}</td><td>{row.slack:.2g}</td></tr>"
+            for row in now.status.binding
+        )
+        self._now.content = block(
+            _table(("level", "joint", "bound", "multiplier", "slack"), rows)
+            if rows
+            else "No bound is binding: every level is limited only by the levels above it."
+        )
+        robot = now.ready.robot
+        spent = "".join(
+            f"<tr><td>{esc(name)}</td>" + "".join(f"<td>{s:.2f} s</td>" for s in seconds) + "</tr>"
+            for name, seconds in zip(robot.joint_names, now.bound_seconds, strict=True)
+            if seconds.any()
+        )
+        self._times.content = block(
+            _table(("joint", "torque", "velocity", "position"), spent) if spent else "None so far."
+        )
+
+
+def _table(titles: tuple[str, ...], rows: str) -> str:
+    head = _HEAD.format("".join(f'<th style="padding-right:0.8em">{title}</th>' for title in titles))
+    return (
+        f'<div style="overflow-x:auto"><table style="border-spacing:0.3em 0.1em">{head}{rows}</table></div>'
+    )

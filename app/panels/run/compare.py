@@ -1,0 +1,201 @@
+"""Two robots at once: which ghost, and how both have done."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import viser
+
+from app.client.learner import Learner
+from app.client.score import Result
+from app.html.palette import BAD, BOUND, GHOST, RGB, css
+from app.html.text import badge, block, esc, quantity, swatch
+from app.link.messages import Post
+from app.panels.widgets.snapshot import Snapshot
+from lessons.follow import swapped
+from lessons.kinds import AnySettings
+from lessons.lesson import Ghost
+from lessons.menu import controllers_for, usual_settings
+from robots import InputError
+
+_SAME = "as the robot"
+_NOTHING = "–"
+_ROWS = 3
+
+
+class ComparePanel:
+    """Callbacks only start and end ghosts; what is shown comes from the learner, so that a ghost that a
+    lesson started shows here as well."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        learner: Learner,
+        settings: AnySettings,
+        colours: dict[str, RGB],
+    ) -> None:
+        self._learner, self._colours = learner, colours
+        self._choices = {choice.words: choice for choice in usual_settings(settings)}
+        self._intro = gui.add_html(_INTRO)
+        self._controller = gui.add_dropdown(
+            "Ghost's controller", (_SAME, *controllers_for(settings)), initial_value=_SAME
+        )
+        self._folders: list[viser.GuiFolderHandle] = []
+        self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
+        self._start = gui.add_button("Start the ghost", color="violet")
+        self._swap = gui.add_button(
+            "Swap robot and ghost", hint="What is different changes sides; both start again", visible=False
+        )
+        self._end = gui.add_button("Remove the ghost", visible=False)
+        self._table = gui.add_html("", visible=False)
+
+        @self._start.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._begin(event.client)
+
+        @self._swap.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._change_sides(event.client)
+
+        @self._end.on_click
+        def _(_: object) -> None:  # in a thread: it waits for a process to end
+            learner.stop_ghost()
+
+    def _row(self, gui: viser.GuiApi, place: int) -> tuple[viser.GuiDropdownHandle[str], viser.GuiTextHandle]:
+        with gui.add_folder(None, visible=place == 1) as folder:
+            path = gui.add_dropdown(f"Difference {place}", (_NOTHING, *self._choices), initial_value=_NOTHING)
+            value = gui.add_text("its value", "", visible=False)
+
+        @path.on_update
+        async def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+            choice = self._choices.get(str(path.value))
+            value.visible = choice is not None
+            if choice is not None and event.client is not None:
+                value.value = choice.values[0]
+                value.hint = f"for example {', '.join(choice.values)}"
+            if choice is not None and place < _ROWS:
+                self._folders[place].visible = True
+
+        self._folders.append(folder)
+        return path, value
+
+    def _begin(self, client: viser.ClientHandle | None) -> None:
+        own: list[str] = []
+        words: list[str] = []
+        if self._controller.value != _SAME:
+            own.append(f"controller={self._controller.value}")
+            words.append(str(self._controller.value))
+        for path, value in self._settings:
+            choice = self._choices.get(str(path.value))
+            if choice is not None:
+                own.append(f"{choice.path}={value.value}")
+                words.append(f"{choice.words} = {value.value}")
+        if not own:
+            if client is not None:
+                client.add_notification(
+                    "No difference", "Choose another controller or a setting for the ghost.", color="orange"
+                )
+            return
+        self._learner.start_ghost(Ghost(", ".join(words), tuple(own)))
+
+    def _change_sides(self, client: viser.ClientHandle | None) -> None:
+        learner = self._learner
+        ghost, settings = learner.ghost, learner.settings
+        if ghost is None or settings is None:
+            return
+        try:
+            own, events = swapped(settings, ghost.own)
+        except InputError as error:
+            if client is not None:
+                client.add_notification("Not swapped", str(error), color="orange")
+            return
+        for event in events:
+            learner.send(Post(event))
+        learner.start_ghost(Ghost(", ".join(own), own))
+
+    def update(self, now: Snapshot[AnySettings]) -> None:
+        """Shows what is."""
+        ghost = self._learner.ghost
+        on = ghost is not None
+        if self._end.visible != on:
+            self._end.visible = self._swap.visible = self._table.visible = on
+            self._start.label = "Start again with these" if on else "Start the ghost"
+        if ghost is None:
+            return
+        mine = None if self._learner.score is None else self._learner.score.result()
+        its = None if ghost.score is None else ghost.score.result()
+        if its is None or mine is None or ghost.status is None:
+            self._table.content = block(f"{badge('GHOST', GHOST)} is getting ready …")
+            return
+        self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
+
+    def _results(self, now: Snapshot[AnySettings], mine: Result, its: Result) -> str:
+        places = {level.name: place for place, level in enumerate(now.settings.levels, start=1)}
+        tasks = sorted(now.ready.layout.tasks, key=lambda task: places.get(task.level, 99))
+        rows = [
+            _line(
+                f"{swatch(self._colours.get(task.level, BOUND))}{places.get(task.level, '')} "
+                f"{esc(task.name)}, RMSE",
+                mine.rmse[task.name],
+                its.rmse[task.name],
+                lambda value, unit=task.unit: quantity(value, unit),
+            )
+            for task in tasks
+        ]
+        if math.isfinite(mine.torque_share):
+            rows.append(
+                _line("largest torque asked for, of its bound", mine.torque_share, its.torque_share, _percent)
+            )
+        rows += [
+            _line("unsolved QPs", mine.unsolved, its.unsolved, str),
+            _line("control step, median", mine.step_ms, its.step_ms, _milliseconds),
+            _line("control step, 99 % below", mine.slow_ms, its.slow_ms, _milliseconds),
+        ]
+        head = (
+            '<tr><td></td><td style="text-align:right"><b>robot</b></td>'
+            f'<td style="text-align:right;color:{css(GHOST)}"><b>ghost</b></td></tr>'
+        )
+        return block(
+            f'<table style="width:100%;border-spacing:0 0.25em">{head}{"".join(rows)}</table>'
+            f"over {mine.seconds:.1f} s since both began together; the better figure is bold"
+        )
+
+
+def _legend(words: str, now: Snapshot[AnySettings]) -> str:
+    slow = ""
+    if now.status.capped:
+        slow = (
+            f'<br><span style="color:{css(BAD)}">This computer cannot run both in real time: the clock of '
+            "both is slowed down.</span>"
+        )
+    return block(
+        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; same "
+        f"targets, pushes and clock{slow}",
+        "padding-top:0.6em",
+    )
+
+
+def _line(name: str, mine: float, its: float, shown: Callable[[float], str]) -> str:
+    cells = [
+        f'<td style="text-align:right;white-space:nowrap{";font-weight:700" if better else ""}">'
+        f"{shown(value)}</td>"
+        for value, better in ((mine, mine < its), (its, its < mine))
+    ]
+    return f"<tr><td>{name}</td>{''.join(cells)}</tr>"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f} %"
+
+
+def _milliseconds(value: float) -> str:
+    return f"{value:.2f} ms"
+
+
+_INTRO = block(
+    "<b>A second robot does the same with other settings.</b> Say what is different about it; both start "
+    "together, see the same targets and pushes, and share one clock. Whatever else you change while it runs "
+    "changes for both.",
+    "padding-top:0.5em",
+)

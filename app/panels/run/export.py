@@ -1,0 +1,98 @@
+"""What a learner can take away: rows, plots, and the setting."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import viser
+
+from app.client.learner import Learner
+from app.client.rows import RATE
+from app.client.simulation import Simulation
+from app.html.text import block
+from lessons.kinds import AnySettings
+from lessons.plots.draw import draw
+from lessons.plots.recorded import Recorded, run_picture
+from lessons.table import as_csv, as_npz, named
+
+_MINUTE, _WHOLE = "the last minute", "all since the last reset"
+
+
+class ExportPanel:
+    """Files are made on viser's threads, from what the learner has recorded; the simulation is not asked."""
+
+    def __init__(self, gui: viser.GuiApi, learner: Learner, settings: Callable[[], AnySettings]) -> None:
+        self._learner, self._settings = learner, settings
+        gui.add_html(_INTRO)
+        self._span = gui.add_dropdown("Of", (_MINUTE, _WHOLE), initial_value=_MINUTE)
+        for label, make, hint in (
+            ("Rows as .npz", self._npz, "NumPy arrays with the names of himpc-lab run --npz"),
+            ("Rows as .csv", self._csv, "One line per row, for a spreadsheet; SI units"),
+            ("Plots as .png", self._png, "Errors, joints inside their bounds, time; the ghost dashed"),
+        ):
+            self._button(gui, label, make, hint)
+
+    def _button(
+        self, gui: viser.GuiApi, label: str, make: Callable[[], tuple[str, bytes] | None], hint: str
+    ) -> None:
+        button = gui.add_button(label, hint=hint)
+
+        @button.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # in a thread: it takes a while
+            client = event.client
+            if client is None:
+                return
+            made = make()
+            if made is None:
+                client.add_notification("Nothing recorded yet", "Let the robot run first.", color="orange")
+                return
+            client.send_file_download(*made, save_immediately=True)
+
+    def _rows(self, simulation: Simulation) -> Recorded | None:
+        record = simulation.record
+        if record is None:
+            return None
+        # The page's loop adds to it meanwhile.
+        rows = simulation.read(lambda *_: record.recent() if self._span.value == _MINUTE else record.whole())
+        return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
+
+    def _name(self, ending: str) -> str:
+        return f"{self._learner.choice.name}-{self._settings().controller}.{ending}"
+
+    def _npz(self) -> tuple[str, bytes] | None:
+        run = self._rows(self._learner)
+        if run is None:
+            return None
+        choice, gap = self._learner.choice, np.diff(run["t"][:, 0])
+        how = {
+            "scene": choice.name,
+            "urdf": choice.urdf,
+            "tip": choice.tip,
+            "rows_per_second": float(1 / np.median(gap)),
+        }
+        return self._name("npz"), as_npz(named(run.layout, run.rows, self._settings(), how))
+
+    def _csv(self) -> tuple[str, bytes] | None:
+        run = self._rows(self._learner)
+        return None if run is None else (self._name("csv"), as_csv(run.layout, run.rows))
+
+    def _png(self) -> tuple[str, bytes] | None:
+        run = self._rows(self._learner)
+        if run is None:
+            return None
+        ghost = self._learner.ghost
+        beside = None if ghost is None else self._rows(ghost)
+        name = self._name("png")
+        with tempfile.TemporaryDirectory() as folder:
+            picture = run_picture(name.removesuffix(".png"), run, beside, self._settings().T_s)
+            return name, draw(picture, Path(folder)).read_bytes()
+
+
+_INTRO = block(
+    f"<b>Take the run with you.</b> The page keeps up to {RATE:g} rows per second, each exactly as the "
+    "simulation wrote it, and of a long run every second, fourth, … of them.",
+    "padding-top:0.5em",
+)

@@ -1,0 +1,70 @@
+"""The last tab: keys, what is drawn, words."""
+
+from __future__ import annotations
+
+import viser
+
+from app.html.glossary import words
+from app.html.text import block
+from app.panels.widgets.window import Window
+
+_KEYS = (
+    ("Space", "run or pause"),
+    ("S", "a single control tick (pauses first)"),
+    ("R", "robot back to its start, settings kept"),
+    ("J, L", "while paused: look back and forward, with Shift in larger steps"),
+    ("G", "pull by hand or not: drag any link, the red arrow is the force"),
+    ("L", "all lessons"),
+    ("P, N, B", "in a lesson: play the step's script, next step, step before"),
+    ("?", "this help"),
+    ("1 … 9", "switch the level at that place on or off"),
+    ("Ctrl K", "every command, searchable"),
+    ("", "a field or a checkbox you just used keeps the keys: click beside it first"),
+)
+_MARKS = (
+    ("Q, R", "weights of the residual and of the changes of torque"),
+    (
+        "dynamic leak",
+        "the leak with the plant's true inertia instead of M̄: what the wrong M̄ costs",
+    ),
+    ("rung", "what was applied when a QP had no sound solution; anything but 'solved' is shown in red"),
+    ("δ", "HTMPC: by how much lower levels may enlarge a higher level's error; |e*| + δ is its bound"),
+    ("window", "HTMPC: the tasks of the mission that the controller has now, the first one highest"),
+    ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
+)
+_DRAWN = (
+    (
+        "ball with arrows",
+        "the target your hand holds; arrows along the world's axes move it, rings turn it while the "
+        "orientation level is on",
+    ),
+    ("small frame with a ball", "the filtered target the controller follows (speed, acceleration capped)"),
+    ("large thin frame", "the actual hand"),
+    ("line behind the hand", "where it went in the last seconds"),
+    ("pink line", "the predicted path of the hand, motion enlarged as its label says"),
+    ("ball, disc with arrows", "mobile robots: the goals of the current tasks of the hand and of the base"),
+    ("circle", "mobile robots: how far the arm reaches about the base"),
+)  # fmt: skip
+
+
+class HelpPanel:
+    """Plain text; nothing here changes. It also opens as a window."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._gui = gui
+        self._fill()
+        self._window = Window(gui, "Help", "?", self._fill, shift=True)
+
+    def _fill(self) -> None:
+        known = (*words().items(), *_MARKS)
+        for title, rows in (("Keys", _KEYS), ("In the scene", _DRAWN), ("Words", known)):
+            with self._gui.add_folder(title):
+                cells = "".join(
+                    f'<tr><td style="vertical-align:top;padding-right:0.8em;max-width:9em"><b>{word}</b>'
+                    f"</td><td>{meaning}</td></tr>"
+                    for word, meaning in rows
+                )
+                self._gui.add_html(block(f'<table style="border-spacing:0 0.2em">{cells}</table>'))
+
+    def close(self) -> None:
+        self._window.close()

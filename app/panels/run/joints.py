@@ -1,0 +1,210 @@
+"""Inputs (torques or accelerations), velocities and positions inside their bounds: all joints in shares, or
+one in its units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from app.client.decimated import Window
+from app.html.palette import BAD, BOUND, GOOD, joint_colour
+from app.html.text import block
+from app.panels.widgets.chart import Chart, Line, of_ghost
+from robots import Robot
+from robots.truth import joint_axis
+
+_ALL = "All joints, % of bound"
+_SHARE = 120.0  # %: the axis ends a little beyond the bounds
+_RUG = 0.035  # height of the mark "at its bound", as a share of the axis
+
+
+@dataclass(frozen=True, eq=False)
+class _Quantity:
+    """values, lower, upper: (rows, n), NaN or infinite where unknown; fallback (2, n): the data sheet's."""
+
+    title: str
+    values: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def shares(self) -> np.ndarray:
+        """(rows, n) distance from the middle of the bounds, % of half their distance."""
+        middle, half = 0.5 * (self.upper + self.lower), 0.5 * (self.upper - self.lower)
+        return 100.0 * (self.values - middle) / np.where(half > 0, half, np.inf)
+
+
+@dataclass(frozen=True)
+class Input:
+    """What drives the joints: fields of the telemetry (value, lower, upper; no lower one: it is −upper), and
+    units of turning and of sliding joints."""
+
+    title: str
+    value: str
+    lower: str | None
+    upper: str
+    units: tuple[str, str]
+
+
+TORQUE = Input("Torque", "tau", "tau_lower", "tau_upper", ("N·m", "N"))
+ACCELERATION = Input("Acceleration, largest", "acceleration", None, "a_limit", ("rad/s²", "m/s²"))
+
+
+class JointPlots:
+    """Three charts. The choice is only noted by the callback; the page's loop builds and draws."""
+
+    def __init__(self, gui: viser.GuiApi, robot: Robot, driven: Input = TORQUE) -> None:
+        self._gui, self._robot, self._input = gui, robot, driven
+        self._sheet = _sheet(robot, driven)
+        self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
+        self._joint: int | None = None
+        self._built: tuple[int | None, bool] | None = None
+        self._charts: list[Chart] = []
+        options = (_ALL, *robot.joint_names)
+        choice = gui.add_dropdown("Joints", options, initial_value=_ALL)
+        self._place = gui.add_folder(None)
+        gui.add_html(
+            block(
+                "Shaded: inside the bounds in force (the data sheet's where a bound is off). "
+                'A <b style="color:rgb(225,45,45)">red mark</b> at the bottom: a shown joint is at its bound.'
+            )
+        )
+
+        @choice.on_update
+        async def _(_: object) -> None:
+            index = options.index(str(choice.value)) - 1
+            self._joint = None if index < 0 else index
+
+    def draw(self, window: Window, ghost: Window | None) -> None:
+        """ghost: the same stretch of time of the ghost, drawn dashed."""
+        joint = self._joint
+        if (joint, ghost is not None) != self._built:
+            self._build(joint, ghost is not None)
+        ages = window.ages()
+        beside = [None] * 3 if ghost is None else self._read(ghost)
+        for kind, (chart, quantity, other) in enumerate(
+            zip(self._charts, self._read(window), beside, strict=True)
+        ):
+            at_bound = window.at_bound(kind)
+            known = np.isfinite(quantity.values[:, 0])
+            if joint is None:
+                edge = np.where(known, 100.0, np.nan)
+                low, high = -_SHARE, _SHARE
+                lines = [*quantity.shares().T, edge, -edge]
+                dashed = [] if other is None else list(other.shares().T)
+                marked = at_bound.any(axis=1)
+            else:
+                low, high = self._span(kind, joint)
+                unit = self._unit(kind, joint)[1]
+                lines = [
+                    unit * quantity.values[:, joint],
+                    unit * quantity.upper[:, joint],
+                    unit * quantity.lower[:, joint],
+                ]
+                dashed = [] if other is None else [unit * other.values[:, joint]]
+                marked = at_bound[:, joint]
+            rug = np.where(marked, low + _RUG * (high - low), low)
+            chart.show(ages, [*lines, rug, *dashed])
+
+    def _read(self, window: Window) -> Sequence[_Quantity]:
+        columns, fields = window.columns, window.layout.fields
+        v, driven = columns(fields["v_limit"]), self._input
+        upper = columns(fields[driven.upper])
+        lower = -upper if driven.lower is None else columns(fields[driven.lower])
+        found = (
+            (driven.title, driven.value, lower, upper),
+            ("Velocity", "v", -v, v),
+            ("Position", "q", columns(fields["q_lower"]), columns(fields["q_upper"])),
+        )
+        quantities: list[_Quantity] = []
+        for kind, (title, field, lower, upper) in enumerate(found):
+            sheet_lower, sheet_upper = self._sheet[kind]
+            quantities.append(
+                _Quantity(
+                    title,
+                    columns(fields[field]),
+                    np.where(np.isfinite(lower), lower, sheet_lower),
+                    np.where(np.isfinite(upper), upper, sheet_upper),
+                )
+            )
+        return quantities
+
+    def _unit(self, kind: int, joint: int) -> tuple[str, float]:
+        """(unit on the axis, factor from SI)."""
+        turning, sliding = self._input.units
+        if self._prismatic[joint]:
+            return ((sliding, 1.0), ("m/s", 1.0), ("m", 1.0))[kind]
+        return ((turning, 1.0), ("°/s", np.degrees(1.0)), ("°", np.degrees(1.0)))[kind]
+
+    def _span(self, kind: int, joint: int) -> tuple[float, float]:
+        factor = self._unit(kind, joint)[1]
+        lower, upper = (factor * float(side[joint]) for side in self._sheet[kind])
+        margin = 0.1 * (upper - lower)
+        return lower - margin, upper + margin
+
+    def _build(self, joint: int | None, ghost: bool) -> None:
+        for chart in self._charts:
+            chart.remove()
+        names = self._robot.joint_names
+        with self._place:
+            self._charts = [
+                self._all(title, names, kind == 2, ghost)
+                if joint is None
+                else self._one(title, kind, joint, ghost)
+                for kind, title in enumerate((self._input.title, "Velocity", "Position"))
+            ]
+        self._built = joint, ghost
+
+    def _all(self, title: str, names: tuple[str, ...], last: bool, ghost: bool) -> Chart:
+        n = len(names)
+        lines = [Line(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
+        bounds = [Line("upper bound", BOUND, dashed=True), Line("lower bound", BOUND, dashed=True)]
+        return Chart(
+            self._gui,
+            f"{title}, % of bound",
+            [*lines, *bounds, Line("at bound", BAD, fill=0.5, width=0.5), *of_ghost(lines, ghost)],
+            (-_SHARE, _SHARE),
+            height=170,
+            bands=((n, n + 1, GOOD),),
+            # One legend serves the three; the ghost's curves would double it.
+            legend=last and not ghost,
+        )
+
+    def _one(self, title: str, kind: int, joint: int, ghost: bool) -> Chart:
+        line = Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0)
+        return Chart(
+            self._gui,
+            f"{title}, {self._unit(kind, joint)[0]}",
+            [
+                line,
+                Line("upper bound", BOUND, dashed=True),
+                Line("lower bound", BOUND, dashed=True),
+                Line("at bound", BAD, fill=0.5, width=0.5),
+                *of_ghost([line], ghost),
+            ],
+            self._span(kind, joint),
+            height=170,
+            bands=((1, 2, GOOD),),
+            legend=kind == 2,
+        )
+
+
+def _sheet(robot: Robot, driven: Input) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """The robot's own bounds; ± one turn where a joint has none."""
+    own = robot.tau_limit if driven is TORQUE else robot.a_max
+    u = np.where(np.isfinite(own), own, 1e3)
+    v = np.where(np.isfinite(robot.v_limit), robot.v_limit, 1e2)
+    return (
+        (-u, u),
+        (-v, v),
+        (
+            np.where(np.isfinite(robot.q_lower), robot.q_lower, -2 * np.pi),
+            np.where(np.isfinite(robot.q_upper), robot.q_upper, 2 * np.pi),
+        ),
+    )
+
+
+def _short(name: str, index: int) -> str:
+    return name if len(name) <= 8 else f"joint {index + 1}"

@@ -1,0 +1,122 @@
+"""Run, pause, step, speed, reset, and how honest the clock is. Always visible above the tabs."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+
+import viser
+
+from app.client.learner import Learner
+from app.client.wish import HOLD, Wish
+from app.html.palette import GOOD, LEVELS
+from app.html.text import badge, block, stopped
+from app.link.messages import Play, Post, Speed, Step
+from app.panels.widgets.mirror import on_scale
+from app.panels.widgets.snapshot import Snapshot
+from lessons.events import Reset
+from lessons.kinds import AnySettings
+
+_PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
+
+
+class PlaybackPanel:
+    """Buttons and a status line."""
+
+    def __init__(
+        self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop, fastest: float
+    ) -> None:
+        """fastest: the highest speed that can be asked for, simulated seconds per second."""
+        self._learner, self._loop = learner, loop
+        self._running: Wish[bool] = Wish()
+        self._closed = False
+        self._failure = gui.add_html("", visible=False)
+        self._status = gui.add_html(block("Starting the simulation …"))
+        self._buttons = gui.add_button_group(
+            "Playback",
+            (_PAUSE, _STEP, _RESET, _RESET_ALL),
+            hint="Space: run or pause · S: one control tick · R: robot back to its start. "
+            "Reset all also brings every setting back.",
+        )
+        self._speed = gui.add_slider(
+            "Speed",
+            min=0.1,
+            max=fastest,
+            step=0.1,
+            initial_value=1.0,
+            hint="Simulated seconds per second",
+        )
+        self._touched = -math.inf
+
+        @self._buttons.on_click
+        async def _(_: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            self._click(str(self._buttons.value))
+
+        @self._speed.on_update
+        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+            if event.client is not None:
+                self._touched = time.monotonic()
+                learner.send(Speed(float(on_scale(self._speed))))
+
+        for label, key, choice in (
+            ("Run or pause", "space", _RUN),
+            ("Reset the robot", "R", _RESET),
+            ("Single control tick", "S", _STEP),
+        ):
+            self._hotkey(gui, label, key, choice)
+
+    def _hotkey(self, gui: viser.GuiApi, label: str, key: str, choice: str) -> None:
+        command = gui.add_command(label, hotkey=key)  # pyright: ignore[reportArgumentType]
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            self._click(choice)
+
+    def _click(self, choice: str) -> None:
+        learner = self._learner
+        if choice in (_PAUSE, _RUN):
+            running = self._running.now(learner.status is not None and learner.status.running)
+            learner.send(Play(self._running.ask(not running)))
+        elif choice == _STEP:
+            self._running.ask(False)
+            learner.send(Step())
+        elif choice == _RESET and learner.failure is None:
+            learner.send(Post(Reset()))
+        else:
+            self._running.ask(True)
+            learner.reset_all()
+
+    def show_failure(self, sentence: str | None) -> None:
+        """A crash of the simulation, or None."""
+        self._failure.visible = sentence is not None
+        if sentence is not None:
+            self._failure.content = stopped(sentence)
+            self._status.content = block("No simulation is running.")
+
+    def close(self) -> None:
+        self._closed = True
+
+    def _show_speed(self, speed: float) -> None:
+        # On the event loop, for the reason `Bindings` gives.
+        if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
+            self._speed.value = speed
+
+    def update(self, now: Snapshot[AnySettings]) -> None:
+        status = now.status
+        first = _PAUSE if status.running else _RUN
+        if self._buttons.options[0] != first:
+            self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
+        self._loop.call_soon_threadsafe(self._show_speed, status.speed)
+        state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
+        if status.capped:
+            why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."
+            state += f' <span title="{why}">{badge("CAPPED", LEVELS[0])}</span>'
+        factor = f"{status.real_time_factor:.2f} × real time" if status.running else f"tick {status.ticks}"
+        share = 100 * status.over_budget / max(status.ticks, 1)
+        budget = 1e3 * now.settings.T_s
+        ticks = "1 tick" if status.over_budget == 1 else f"{status.over_budget} ticks"
+        self._status.content = block(
+            f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
+            f"<br>{ticks} over the {budget:g} ms budget ({share:.1f} %)"
+        )

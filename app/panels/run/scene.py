@@ -1,0 +1,123 @@
+"""Which robot and which scene: catalog, a URDF by path, an upload, and the report of the import."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import viser
+
+from app.html.palette import BAD, DAMPING, GOOD, LEVELS
+from app.html.text import badge, block, esc
+from app.link.choice import SceneChoice
+from app.link.messages import Ready
+from robots import CATALOG
+
+_KINDS = {"repaired": LEVELS[0], "filled": LEVELS[1], "fixed": LEVELS[3], "refused": BAD, "note": DAMPING}
+MAX_UPLOAD = 10_000_000  # bytes, what the importer reads
+
+
+class RobotPanel:
+    """Choices become a `SceneChoice`; the simulation answers with the new scene or with one sentence."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        ready: Ready,
+        scenes: Mapping[str, str],
+        choose: Callable[[SceneChoice], None],
+        by_path: bool,
+    ) -> None:
+        """by_path: whether this page may name files of the machine it runs on."""
+        robot = ready.robot
+        self._choose = choose
+        gui.add_html(
+            block(
+                f"<b>{esc(robot.name)}</b>: {robot.n} joints, hand at <b>{esc(robot.tip)}</b>, "
+                f"scene <b>{esc(ready.choice.name)}</b>"
+            )
+        )
+        self._answer = gui.add_html("", visible=False)
+        with gui.add_folder("Scene"):
+            names = tuple(name for name in scenes if name != "hold")
+            scene = gui.add_dropdown(
+                "Scene", names, initial_value=ready.choice.name if ready.choice.name in names else names[0]
+            )
+            described = gui.add_html(block(esc(scenes[str(scene.value)])))
+            load_scene = gui.add_button("Load scene")
+        with gui.add_folder("Robot of the catalog"):
+            catalog = gui.add_dropdown(
+                "Robot", tuple(CATALOG), initial_value=robot.name if robot.name in CATALOG else None
+            )
+            about = gui.add_html(block(esc(CATALOG[str(catalog.value)].title)))
+            load_robot = gui.add_button("Load robot")
+        with gui.add_folder("Your own URDF"):
+            tip = gui.add_text("Hand frame", "", hint="A link's name; empty: the end of the longest chain")
+            if by_path:
+                path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
+                load_path = gui.add_button("Load file")
+
+                @load_path.on_click
+                async def _(_: object) -> None:
+                    self._ask(SceneChoice("hold", urdf=path.value.strip(), tip=tip.value.strip() or None))
+
+            upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
+            gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
+        self._report(gui, ready)
+
+        @scene.on_update
+        async def _(_: object) -> None:
+            described.content = block(esc(scenes[str(scene.value)]))
+
+        @catalog.on_update
+        async def _(_: object) -> None:
+            about.content = block(esc(CATALOG[str(catalog.value)].title))
+
+        @load_scene.on_click
+        async def _(_: object) -> None:
+            self._ask(SceneChoice(str(scene.value)))
+
+        @load_robot.on_click
+        async def _(_: object) -> None:
+            name = str(catalog.value)
+            self._ask(SceneChoice(f"{name}-hold") if f"{name}-hold" in scenes else SceneChoice("hold", name))
+
+        @upload.on_upload
+        async def _(_: object) -> None:
+            self._uploaded(upload.value.content, tip.value.strip() or None)
+
+    def _ask(self, choice: SceneChoice) -> None:
+        if choice.name == "hold" and choice.urdf == "":
+            self.refuse("No file was named: write the path of a URDF file first.")
+            return
+        self._answer.visible = True
+        self._answer.content = block("Loading …")
+        self._choose(choice)
+
+    def _uploaded(self, content: bytes, tip: str | None) -> None:
+        if len(content) > MAX_UPLOAD:
+            self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; give a smaller URDF.")
+            return
+        try:
+            text = content.decode("utf-8")
+        except UnicodeDecodeError:
+            self.refuse("The file is not text: upload the URDF file itself, not a mesh or an archive.")
+            return
+        self._ask(SceneChoice("hold", tip=tip, urdf_text=text))
+
+    def refuse(self, sentence: str) -> None:
+        """A scene or robot was not loaded; the one before goes on."""
+        self._answer.visible = True
+        self._answer.content = block(
+            f"{badge('NOT LOADED', BAD)} {esc(sentence)}", "border-left:3px solid rgb(225,45,45)"
+        )
+
+    def _report(self, gui: viser.GuiApi, ready: Ready) -> None:
+        report = ready.robot.report
+        with gui.add_folder(f"Import report ({len(report.findings)})", expand_by_default=False):
+            if not report.findings:
+                gui.add_html(block(f"{badge('SOUND', GOOD)} Nothing had to be repaired."))
+            for finding in report.findings[:60]:
+                kind = badge(finding.kind, _KINDS[finding.kind])
+                gui.add_html(block(f"{kind} <b>{esc(finding.where)}</b>: {esc(finding.text)}"))
+            if len(report.findings) > 60:
+                gui.add_html(block(f"… and {len(report.findings) - 60} more."))

@@ -1,0 +1,101 @@
+"""The setting as a command line, as a code and as a script, and a code of somebody else opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import viser
+
+from app.client.learner import Learner
+from app.html.text import block
+from app.link.choice import SceneChoice
+from app.link.messages import Told
+from lessons.export import script
+from lessons.state import State, command_line, decode, encode, state_of
+from robots import InputError
+
+
+class SharePanel:
+    """Texts are made when they are asked for, on viser's threads."""
+
+    def __init__(self, gui: viser.GuiApi, learner: Learner, choose: Callable[[SceneChoice], None]) -> None:
+        self._learner = learner
+        with gui.add_folder("Share the setting"):
+            gui.add_html(_INTRO)
+            make = gui.add_button("Write it down")
+            self._line = gui.add_text("Command line", "", multiline=True, visible=False)
+            self._code = gui.add_text("Code", "", multiline=True, visible=False)
+            save = gui.add_button(
+                "Script as .py", hint="Repeats the run since the last reset, events included, to the last bit"
+            )
+            given = gui.add_text("Somebody's code", "", hint="Or himpc-lab --state CODE")
+            take = gui.add_button("Open it")
+
+        @make.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._try(event.client, self._write)
+
+        @save.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            client = event.client
+            if client is not None:
+                self._try(client, lambda told: self._save(client, told))
+
+        @take.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            try:
+                choose(SceneChoice.of_state(decode(str(given.value))))
+            except InputError as error:
+                _refuse(event.client, error)
+
+    def _try(self, client: viser.ClientHandle | None, make: Callable[[Told], None]) -> None:
+        told = self._learner.ask()
+        try:
+            if told is None:
+                raise InputError("the simulation does not answer: press Reset all first")
+            make(told)
+        except InputError as error:
+            _refuse(client, error)
+
+    def _write(self, told: Told) -> None:
+        choice = _from_a_name(told.choice)
+        exercise = choice.exercise
+        state = state_of(
+            choice.name,
+            told.settings,
+            urdf=choice.urdf,
+            tip=choice.tip,
+            seed=choice.seed,
+            lesson=None if exercise is None else exercise.lesson,
+            step=None if exercise is None else exercise.place + 1,
+        )
+        self._line.value = command_line(state)
+        self._line.visible = True
+        self._code.visible = False
+        self._code.value = encode(state)
+        self._code.visible = True
+
+    def _save(self, client: viser.ClientHandle, told: Told) -> None:
+        choice = _from_a_name(told.choice)
+        start = State(choice.name, choice.urdf, choice.tip, choice.set, choice.seed)
+        text = script(start, told.log, told.t)
+        client.send_file_download(f"{choice.name}.py", text.encode(), save_immediately=True)
+
+
+def _from_a_name(choice: SceneChoice) -> SceneChoice:
+    if choice.urdf_text is not None:
+        raise InputError(
+            "this robot was uploaded, and nobody else has its file: save it and start himpc-lab with --urdf"
+        )
+    return choice
+
+
+def _refuse(client: viser.ClientHandle | None, error: InputError) -> None:
+    if client is not None:
+        client.add_notification("That does not work", str(error), color="orange", auto_close_seconds=10.0)
+
+
+_INTRO = block(
+    "Scene, robot, controller and everything that was changed, as a line for a terminal and as a code for "
+    "somebody else's page. The script repeats what has happened since the last reset, too."
+)

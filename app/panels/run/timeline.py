@@ -1,0 +1,109 @@
+"""Looking back while paused: a slider over the last minute. Always visible above the tabs while it can be
+used."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+import viser
+
+from app.client.learner import Learner
+from app.html.text import block
+
+_STEP = 0.05  # s
+_SHORT, _LONG = 0.1, 1.0  # s per key press
+_LEAST = 0.2  # s: less is not worth a slider
+
+
+class TimeLine:
+    """`past` is the moment to show, None for now. Time that goes on again, by running, a step or a reset,
+    brings the view back to now."""
+
+    def __init__(self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop) -> None:
+        self.past: float | None = None
+        self._learner, self._loop = learner, loop
+        self._paused_at: float | None = None  # s, the simulated time that stands
+        self._closed = False
+        self._slider = gui.add_slider(
+            "Look back [s]",
+            min=-_LEAST,
+            max=0.0,
+            step=_STEP,
+            initial_value=0.0,
+            visible=False,
+            hint="Robot, targets, traces and plots as they were, up to a minute ago. "
+            f"J and L: {_SHORT:g} s, with Shift {_LONG:g} s; in the slider also ← and →.",
+        )
+        self._live = gui.add_button("Back to now", visible=False)
+        self._words = gui.add_html("", visible=False)
+
+        @self._slider.on_update
+        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+            if event.client is not None:
+                self._look(float(self._slider.value))
+
+        @self._live.on_click
+        async def _(_: object) -> None:
+            self._set(0.0)
+
+        # The arrow keys turn viser's camera; these two are what video players have.
+        for words, key, modifier, seconds in (
+            ("Look back a little", "J", None, -_SHORT),
+            ("Look forward a little", "L", None, _SHORT),
+            ("Look back a second", "J", "shift", -_LONG),
+            ("Look forward a second", "L", "shift", _LONG),
+        ):
+            self._hotkey(gui, words, key, modifier, seconds)
+
+    def _hotkey(self, gui: viser.GuiApi, words: str, key: str, modifier: str | None, seconds: float) -> None:
+        command = gui.add_command(words, hotkey=key, modifier=modifier)  # pyright: ignore[reportArgumentType]
+
+        @command.on_trigger
+        async def _(_: object) -> None:
+            if self._paused_at is not None:
+                self._set(float(self._slider.value) + seconds)
+
+    def _set(self, ago: float) -> None:
+        if not self._closed:
+            self._slider.value = round(min(0.0, max(float(self._slider.min), ago)), 3)
+            self._look(float(self._slider.value))
+
+    def _look(self, ago: float) -> None:
+        """ago: s, ≤ 0."""
+        at = self._paused_at
+        self.past = None if at is None or ago > -0.5 * _STEP else at + ago
+
+    def update(self, running: bool) -> None:
+        """Called with every frame, before the moment is chosen."""
+        first, last = self._learner.tape.span
+        if running or last - first < _LEAST:
+            if self._paused_at is not None:
+                self._leave()
+        elif self._paused_at != last:
+            self._enter(first, last)
+        self._say()
+
+    def _enter(self, first: float, last: float) -> None:
+        self.past, self._paused_at = None, last
+        self._slider.min = round(-math.floor((last - first) / _STEP) * _STEP, 3)
+        self._loop.call_soon_threadsafe(self._set, 0.0)
+        self._slider.visible = True
+
+    def _leave(self) -> None:
+        self.past = self._paused_at = None
+        self._slider.visible = False
+        self._loop.call_soon_threadsafe(self._set, 0.0)
+
+    def _say(self) -> None:
+        past, at = self.past, self._paused_at
+        looking = past is not None and at is not None
+        if self._live.visible != looking:
+            self._live.visible = self._words.visible = looking
+        if past is not None and at is not None:
+            text = block(f"<b>Looking back</b>: t = {past:.2f} s, {at - past:.2f} s before the pause")
+            if self._words.content != text:
+                self._words.content = text
+
+    def close(self) -> None:
+        self._closed = True

@@ -1,0 +1,1 @@
+"""Controls and plots of torque-level scenes."""

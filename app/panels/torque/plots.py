@@ -1,0 +1,77 @@
+"""The plots about the whole controller: error per level, solve time, leaks."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.client.decimated import Window
+from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB
+from app.link.messages import Ready
+from app.panels.widgets.chart import Chart, Line, of_ghost
+
+_ERROR = (1e-3, 1e3)  # mm or degrees
+_TIME = (1e-2, 1e2)  # ms
+_LEAK = (1e-12, 1e2)  # m/s² or rad/s²
+
+
+class LevelPlots:
+    """Logarithmic axes: they need not jump to show both a micrometre and a lost level. A ghost has dashed
+    curves of its own; the page's loop builds the charts anew when one comes or goes."""
+
+    def __init__(self, gui: viser.GuiApi, ready: Ready, colours: dict[str, RGB]) -> None:
+        self._gui, self._tasks, self._colours = gui, ready.tasks, colours
+        self._place = gui.add_folder(None)
+        self._charts: list[Chart] = []
+        self._build(ghost=False)
+
+    def _build(self, ghost: bool) -> None:
+        for chart in self._charts:
+            chart.remove()
+        self._with_ghost = ghost
+        errors = [
+            Line(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours.get(t.level, BOUND))
+            for t in self._tasks
+        ]
+        step = [Line("whole step", LEVELS[1], width=2.0)]
+        leaks = [Line("priority (own model)", LEVELS[2]), Line("dynamic (true plant)", BAD)]
+        errors, step, leaks = ([*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks))
+        budget = Line("budget", GOOD, dashed=True, fill=0.12)
+        with self._place:
+            self._charts = [
+                Chart(self._gui, title, lines, span, height=height, log=True)
+                for title, lines, span, height in (
+                    ("Error per task, mm or °", errors, _ERROR, 200),
+                    ("Control step, ms", [*step, budget], _TIME, 170),
+                    ("Leak into higher levels, m/s² or rad/s²", leaks, _LEAK, 170),
+                )
+            ]
+
+    def draw(self, window: Window, ghost: Window | None, T_s: float) -> None:
+        """ghost: the same stretch of time of the ghost."""
+        if (ghost is not None) != self._with_ghost:
+            self._build(ghost is not None)
+        windows = [window] if ghost is None else [window, ghost]
+        ages = window.ages()
+        error, step, leak = self._charts
+        error.show(ages, [curve for each in windows for curve in self._errors(each)])
+        times = [1e-3 * each.columns(each.layout.fields["step_us"])[:, 0] for each in windows]
+        step.show(ages, [*times, np.full_like(ages, 1e3 * T_s)])
+        leak.show(ages, [curve for each in windows for curve in _leaks(each)])
+
+    def _errors(self, window: Window) -> list[np.ndarray]:
+        fields = window.layout.fields
+        return [
+            np.linalg.norm(window.columns(fields[f"error/{task.name}"]), axis=1)
+            * (1e3 if task.unit == "m" else np.degrees(1.0))
+            for task in self._tasks
+        ]
+
+
+def _leaks(window: Window) -> list[np.ndarray]:
+    fields = window.layout.fields
+    known = np.isfinite(window.columns(fields["t"])[:, 0])
+    return [
+        np.where(known, np.nan_to_num(window.columns(fields[name])[:, 0], nan=0.0), np.nan)
+        for name in ("priority_leak", "dynamic_leak")
+    ]

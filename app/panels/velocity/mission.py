@@ -1,0 +1,179 @@
+"""The mission as a list: done, in the window, ahead; and the buttons that change it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+
+from app.client.wish import Send
+from app.html.palette import GOOD, RGB, css
+from app.html.text import badge, block, esc, free_name, swatch
+from app.link.messages import MissionRow, Status, TaskView
+from app.panels.widgets.snapshot import Snapshot
+from lessons.events import MoveLevel
+from lessons.mobile.events import InsertTask, Release, RemoveTask
+from lessons.mobile.settings import MobileSettings
+
+_EARLIER, _LATER, _REMOVE = "▲ Earlier", "▼ Later", "Remove"
+_END, _NOTHING = "at the end", "–"
+_DONE_SHOWN = 3
+
+
+class MissionPanel:
+    """The list, Release, and buttons that insert, remove and reorder tasks."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        points: Sequence[TaskView],
+        colours: dict[str, RGB],
+        post: Send,
+        status: Callable[[], Status | None],
+        places: Callable[[], dict[str, np.ndarray]],
+    ) -> None:
+        """points: what can be sent somewhere; colours: by role; status: the newest one; places: where each
+        role's goal is drawn, (3,) m."""
+        self._points = {task.name: task for task in points}
+        self._colours, self._post, self._status, self._places = colours, post, status, places
+        self._filled = False
+        self._list = gui.add_html("")
+        self._swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
+        self._release = gui.add_button("Release", visible=False, color=GOOD)
+        with gui.add_folder("Change a task"):
+            self._task = gui.add_dropdown("Task", _options())
+            self._change = gui.add_button_group("Change", (_EARLIER, _LATER, _REMOVE))
+        with gui.add_folder("Add a task", expand_by_default=False):
+            self._role = gui.add_dropdown("Point", tuple(self._points))
+            self._goal = gui.add_vector3("Goal [m]", (0.0, 0.0, 0.0), step=0.05, hint="A base goes to x, y")
+            self._before = gui.add_dropdown("Before", _options(_END))
+            hold = gui.add_checkbox("Hold until released", False)
+            add = gui.add_button("Add")
+
+        @self._swap.on_click
+        async def _(_: object) -> None:
+            swap(self._rows(), post)
+
+        @self._release.on_click
+        async def _(_: object) -> None:
+            waiting = _waiting(self._rows())
+            if waiting is not None:
+                post(Release(waiting.name))
+
+        @self._change.on_click
+        async def _(_: object) -> None:
+            self._changed(str(self._change.value), str(self._task.value))
+
+        @self._role.on_update
+        async def _(_: object) -> None:
+            self._goal.value = self._start()
+
+        @add.on_click
+        async def _(_: object) -> None:
+            self._add(bool(hold.value))
+
+    def _rows(self) -> tuple[MissionRow, ...]:
+        status = self._status()
+        return () if status is None or status.mission is None else status.mission.rows
+
+    def _start(self) -> tuple[float, float, float]:
+        """The role's goal as it is drawn now, a first guess for another one."""
+        x, y, z = self._places().get(str(self._role.value), np.zeros(3))
+        return round(float(x), 2), round(float(y), 2), round(float(z), 2)
+
+    def _changed(self, what: str, name: str) -> None:
+        ahead = [row.name for row in self._rows() if row.state != "done"]
+        if name not in ahead:
+            return
+        if what == _REMOVE:
+            self._post(RemoveTask(name))
+            return
+        to = ahead.index(name) + (-1 if what == _EARLIER else 1)
+        if 0 <= to < len(ahead):
+            self._post(MoveLevel(name, to))
+
+    def _add(self, hold: bool) -> None:
+        role, before = str(self._role.value), str(self._before.value)
+        axes = self._points[role].axes
+        goal = tuple(float(self._goal.value["xyz".index(axis)]) for axis in axes)
+        name = free_name(f"{role} added", [row.name for row in self._rows()])
+        self._post(
+            InsertTask(name, role, goal, None if before == _END else before, hold=None if hold else 0.0)
+        )
+
+    def update(self, now: Snapshot[MobileSettings]) -> None:
+        mission = now.status.mission
+        if mission is None:
+            return
+        self._list.content = block(_listed(mission.rows, self._colours, mission.done))
+        ahead = tuple(row.name for row in mission.rows if row.state != "done")
+        for menu, options in ((self._task, _options(*ahead)), (self._before, _options(_END, *ahead))):
+            if menu.options != options:
+                menu.options = options
+        if not self._filled:
+            self._filled = True
+            self._goal.value = self._start()
+        waiting = _waiting(mission.rows)
+        self._swap.visible = len(ahead) > 1
+        self._release.visible = waiting is not None
+        if waiting is not None and self._release.label != f"Release {waiting.name}":
+            self._release.label = f"Release {waiting.name}"
+
+
+def swap(rows: tuple[MissionRow, ...], post: Send) -> None:
+    """Puts the second open task first."""
+    ahead = [row.name for row in rows if row.state != "done"]
+    if len(ahead) > 1:
+        post(MoveLevel(ahead[1], 0))
+
+
+def _options(*names: str) -> tuple[str, ...]:
+    """What a menu offers; it cannot be empty."""
+    return names or (_NOTHING,)
+
+
+def _waiting(rows: tuple[MissionRow, ...]) -> MissionRow | None:
+    """The first open task, if it stays until it is released."""
+    first = next((row for row in rows if row.state != "done"), None)
+    return first if first is not None and first.hold is None else None
+
+
+def _listed(rows: tuple[MissionRow, ...], colours: dict[str, RGB], done: bool) -> str:
+    first = next((row for row in rows if row.state != "done"), None)
+    over = max(0, sum(row.state == "done" for row in rows) - _DONE_SHOWN)
+    lines = "".join(_line(row, colours, first is row) for row in rows[over:])
+    if over:
+        lines = f"<tr><td>✓</td><td colspan='3' style='opacity:0.55'>{over} more before</td></tr>{lines}"
+    head = (
+        badge("MISSION DONE", GOOD) if done else f"{sum(r.state == 'done' for r in rows)} of {len(rows)} done"
+    )
+    return (
+        f"{head}<div style='max-height:17em;overflow-y:auto;margin-top:0.3em'>"
+        f"<table style='width:100%;border-spacing:0 0.1em'>{lines}</table></div>"
+    )
+
+
+def _line(row: MissionRow, colours: dict[str, RGB], first: bool) -> str:
+    colour = colours[row.role]
+    mark = {"done": "✓", "active": "▶" if first else "▷", "ahead": ""}[row.state]
+    style = {
+        "done": "opacity:0.55",
+        "active": f"background:{css(colour, 0.16)};font-weight:{600 if first else 400}",
+        "ahead": "",
+    }[row.state]
+    goal = "a given trajectory" if row.goal is None else "(" + ", ".join(f"{x:.2f}" for x in row.goal) + ") m"
+    return (
+        f"<tr style='{style}'><td style='width:1.3em;text-align:center'>{mark}</td>"
+        f"<td>{swatch(colour)}{esc(row.name)}</td><td>{goal}</td><td>{_when(row)}</td></tr>"
+    )
+
+
+def _when(row: MissionRow) -> str:
+    if row.done_at is not None:
+        return f"{row.done_at:.1f} s"
+    if row.there_s is not None:
+        return "there, until released" if row.hold is None else f"holds {row.there_s:.1f} / {row.hold:g} s"
+    if row.hold is None:
+        return "until released"
+    return f"hold {row.hold:g} s" if row.hold else ""

@@ -1,0 +1,106 @@
+"""The plots about a velocity-level controller: errors and bounds, solve time, base speed, manipulability."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.client.decimated import Window
+from app.html.palette import BOUND, GOOD, JOINTS, LEVELS, RGB
+from app.html.text import block
+from app.link.messages import Ready, TaskView
+from app.panels.widgets.chart import Chart, Line, of_ghost
+from himpc.htmpc import base_joints
+
+_ERROR = (1e-2, 1e4)  # mm or degrees
+_TIME = (1e-1, 1e3)  # ms
+_W = (1e-4, 1e1)  # m³
+
+
+class TrackingPlots:
+    """Errors on a logarithmic axis: it need not jump to show both a millimetre and three metres."""
+
+    def __init__(self, gui: viser.GuiApi, ready: Ready, colours: dict[str, RGB]) -> None:
+        self._tasks = ready.tasks
+        self._gui, self._colours, self._limits = gui, colours, ready.robot.v_limit
+        self._base = list(base_joints(ready.robot))[:2]
+        self._place = gui.add_folder(None)
+        self._charts: list[Chart] = []
+        self._build(ghost=False)
+        gui.add_html(
+            block("Dashed: the bound under which the levels below must keep a task's error, one knot ahead; "
+                  "the last level has none.")
+        )  # fmt: skip
+
+    def _build(self, ghost: bool) -> None:
+        for chart in self._charts:
+            chart.remove()
+        self._with_ghost = ghost
+        errors = [
+            Line(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours[t.level], width=2.0)
+            for t in self._tasks
+        ]
+        bounds = [Line(f"|e*| + δ of {t.name}", self._colours[t.level], dashed=True) for t in self._tasks]
+        step = [Line("whole step", LEVELS[1], width=2.0)]
+        period = Line("period", GOOD, dashed=True, fill=0.12)
+        w = [Line("w", LEVELS[3])]
+        with self._place:
+            self._charts = [
+                self._chart(
+                    "Error per task, mm or °", [*errors, *bounds, *of_ghost(errors, ghost)], _ERROR, 220
+                ),
+                self._chart("Control step, ms", [*step, period, *of_ghost(step, ghost)], _TIME, 160),
+                self._chart("Manipulability of the arm w, m³", [*w, *of_ghost(w, ghost)], _W, 150),
+            ]
+            if self._base:
+                self._charts.append(self._speed(ghost))
+
+    def _chart(self, title: str, lines: list[Line], span: tuple[float, float], height: int) -> Chart:
+        return Chart(self._gui, title, lines, span, height=height, log=True)
+
+    def _speed(self, ghost: bool) -> Chart:
+        limit = float(self._limits[self._base].max())
+        speeds = [Line("x", JOINTS[0]), Line("y", JOINTS[3])]
+        return Chart(
+            self._gui,
+            "Base speed, m/s",
+            [
+                *speeds,
+                Line("upper bound", BOUND, dashed=True),
+                Line("lower bound", BOUND, dashed=True),
+                *of_ghost(speeds, ghost),
+            ],
+            (-1.2 * limit, 1.2 * limit),
+            height=160,
+            bands=((2, 3, GOOD),),
+        )
+
+    def draw(self, window: Window, ghost: Window | None, T_s: float) -> None:
+        """ghost: the same stretch of time of the ghost."""
+        if (ghost is not None) != self._with_ghost:
+            self._build(ghost is not None)
+        beside = [] if ghost is None else [ghost]
+        ages, fields = window.ages(), window.layout.fields
+        error, step, w = self._charts[:3]
+        bounds = [_unit(task) * window.columns(fields[f"bound/{task.level}"])[:, 0] for task in self._tasks]
+        dashed = [curve for each in beside for curve in self._errors(each)]
+        error.show(ages, [*self._errors(window), *bounds, *dashed])
+        times, *others = (1e-3 * each.columns(fields["step_us"])[:, 0] for each in (window, *beside))
+        step.show(ages, [times, np.full_like(ages, 1e3 * T_s), *others])
+        w.show(ages, [each.columns(fields["manipulability"])[:, 0] for each in (window, *beside)])
+        if self._base:
+            limit = window.columns(fields["v_limit"])[:, self._base].min(axis=1)
+            limit = np.where(np.isfinite(limit), limit, float(self._limits[self._base].max()))
+            own, *rest = (each.columns(fields["v"])[:, self._base].T for each in (window, *beside))
+            self._charts[3].show(ages, [*own, limit, -limit, *(curve for each in rest for curve in each)])
+
+    def _errors(self, window: Window) -> list[np.ndarray]:
+        fields = window.layout.fields
+        return [
+            _unit(task) * np.linalg.norm(window.columns(fields[f"error/{task.name}"]), axis=1)
+            for task in self._tasks
+        ]
+
+
+def _unit(task: TaskView) -> float:
+    return 1e3 if task.unit == "m" else float(np.degrees(1.0))

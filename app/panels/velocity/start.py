@@ -1,0 +1,146 @@
+"""The first tab of a velocity-level scene: what to do first, how it goes, and what the scene shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import viser
+
+from app.html.palette import RGB
+from app.html.text import badge, block, esc, quantity, swatch
+from app.panels.widgets.snapshot import Snapshot
+from lessons.mobile.settings import MobileSettings
+from robots.collision import Ball
+
+_STILL = 0.02
+"""m/s and rad/s: joints slower than this are at rest."""
+_FAR = 0.05
+"""m: a point farther than this from its goal has not got there."""
+
+
+class BeginPanel:
+    """Guidance that follows what the learner has already done. The callbacks are set by the face."""
+
+    def __init__(
+        self, gui: viser.GuiApi, scene: str, colours: dict[str, RGB], drives: bool, dark: bool
+    ) -> None:
+        """scene: its name; colours: per role; drives: whether there is a mobile base."""
+        self.on_theme: Callable[[bool], None] = lambda _: None
+        self.on_swap: Callable[[], None] = lambda: None
+        self.on_look: Callable[[], None] = lambda: None
+        self.on_obstacle: Callable[[], None] = lambda: None
+        self.on_clear: Callable[[], None] = lambda: None
+        self._colours = colours
+        self._dragged = False
+        self._next = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
+        self._guide = gui.add_html(_guide(_FIRST.get(scene, _WATCH if drives else _FIRST_ARM)))
+        self._live = gui.add_html("")
+        swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
+        look = gui.add_button("Look at the robot", hint="Turns the camera to where it is now")
+        obstacle = gui.add_button(
+            "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
+        )
+        self._clear = gui.add_button(
+            "Take the last ball away", hint="Of those that the robot keeps clear of", visible=False
+        )
+        with gui.add_folder("Show", expand_by_default=False):
+            self.trace = gui.add_checkbox("Trace of the hand and the base", True)
+            self.prediction = gui.add_checkbox("Predicted paths", True)
+            self.reach = gui.add_checkbox("Reach of the arm", True, visible=drives)
+            self.arrows = gui.add_checkbox("Arrows of obstacles", True)
+            self.frames = gui.add_checkbox("Target and actual frames", True)
+        self.dark = gui.add_checkbox("Dark theme", dark)
+
+        @swap.on_click
+        async def _(_: object) -> None:
+            self.on_swap()
+
+        @look.on_click
+        async def _(_: object) -> None:
+            self.on_look()
+
+        @obstacle.on_click
+        async def _(_: object) -> None:
+            self.on_obstacle()
+
+        @self._clear.on_click
+        async def _(_: object) -> None:
+            self.on_clear()
+
+        @self.dark.on_update
+        async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+            if event.client is not None:
+                self.on_theme(bool(self.dark.value))
+
+    def dragged(self) -> None:
+        """The first drag happened: go on to what comes next."""
+        if not self._dragged:
+            self._dragged = True
+            self._guide.content = _guide(self._next)
+
+    def update(self, now: Snapshot[MobileSettings]) -> None:
+        lines = [self._line(now, level.name, level.tasks[0].unit) for level in now.settings.levels]
+        mission = now.status.mission
+        if mission is not None and mission.done:
+            lines.append(badge("MISSION DONE", self._colours[now.settings.levels[0].name]))
+        there = last_ball(now.settings) is not None
+        if self._clear.visible != there:
+            self._clear.visible = there
+        self._live.content = block("<br>".join(lines))
+
+    def _line(self, now: Snapshot[MobileSettings], role: str, unit: str) -> str:
+        head = f"{swatch(self._colours[role])}<b>{esc(role)}</b>"
+        place, error = now.number(f"level/{role}"), now.error(role)
+        if place != place:
+            return f"{head}: has no task now"
+        text = f"{head} (level {place:.0f}): <b>{quantity(error, unit)}</b> off what is asked of it now"
+        if unit == "m" and error > _FAR and place > 1 and bool((abs(now.field("v")) < _STILL).all()):
+            text += ". It rests: going on would disturb level 1"
+        return text
+
+
+def last_ball(settings: MobileSettings) -> Ball | None:
+    """The ball that came last among what the robot keeps clear of."""
+    return next((each for each in reversed(settings.htmpc.obstacles) if isinstance(each, Ball)), None)
+
+
+def _guide(text: tuple[str, str]) -> str:
+    head, rest = text
+    return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
+
+
+_FIRST = {
+    "ridgeback-ur10-drag": (
+        "Drag the two targets by their arrows.",
+        "The orange ball is for the robot's hand: <b>level 1</b>. The blue disc on the floor is for its "
+        "base: <b>level 2</b>. Drag the disc so far from the ball that the arm is too short for both.",
+    ),
+    "ridgeback-ur10-square": (
+        "Watch the base stop where the arm is stretched.",
+        "The hand has to stay (<b>level 1</b>); the base is sent out of reach for 8 s, then home (<b>level "
+        "2</b>). Reset and swap which comes first, or set N to 1 in <b>Control</b>.",
+    ),
+}
+_WATCH = (
+    "Watch the robot do the next task while it finishes this one.",
+    "The tab <b>Mission</b> lists the tasks; those in the window (▶ first, ▷ second) are the levels. Drag "
+    "the ball or the disc: the current task of hand or base goes elsewhere at the next control step.",
+)
+_NEXT_DRAG = (
+    "Now swap which comes first.",
+    "As long as the hand comes first, the base stops where the arm is stretched. Swap, and the base goes and "
+    "takes the hand along. Then put δ and N to the test in <b>Control</b>.",
+)
+_NEXT_MISSION = (
+    "Now change the mission.",
+    "Tasks can be moved, put earlier or later, removed and added in the tab <b>Mission</b>, and a hold that "
+    "waits for somebody is ended there by <b>Release</b>.",
+)
+_FIRST_ARM = (
+    "Drag the target by its arrows.",
+    "The hand follows: that is <b>level 1</b>. Orientation (level 2) gets only the freedom that is left.",
+)
+_NEXT_ARM = (
+    "Now swap which comes first.",
+    "Then drag the target out of reach, or bound the speed in the tab <b>Control</b>.",
+)

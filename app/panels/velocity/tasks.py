@@ -1,0 +1,120 @@
+"""The levels of a velocity-level controller: which point each moves, on or off, Q, live error and bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import viser
+
+from app.client.wish import Wish
+from app.html.palette import BAD, DAMPING, RGB, css
+from app.html.text import badge, block, esc, quantity, swatch
+from app.panels.widgets.mirror import Bindings, scalar
+from app.panels.widgets.sliders import add_slider
+from app.panels.widgets.snapshot import Snapshot
+from himpc.stack import Level
+from lessons.events import Set
+from lessons.mobile.settings import MobileSettings
+from lessons.mobile.telemetry import RUNGS
+
+
+class RolesPanel:
+    """One folder per role, in the order of the mission's window."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        bindings: Bindings[MobileSettings],
+        settings: MobileSettings,
+        colours: dict[str, RGB],
+        current: Callable[[], MobileSettings],
+    ) -> None:
+        self._current = current
+        self._order = tuple(level.name for level in settings.levels)
+        self._enabled: dict[str, Wish[bool]] = {name: Wish() for name in self._order}
+        gui.add_html(
+            block("The levels come in the order of the tasks in the mission's window: change it in the tab "
+                  "<b>Mission</b>. The numbers are keys.")
+        )  # fmt: skip
+        self._cards = [
+            _Card(gui, bindings, settings, level, colours[level.name], place)
+            for place, level in enumerate(settings.levels)
+        ]
+
+    def toggle(self, place: int) -> Set | None:
+        """The event for the hotkey of a place (0-based); None if no level stands there."""
+        if place >= len(self._order):
+            return None
+        name = self._order[place]
+        enabled = next(level.enabled for level in self._current().levels if level.name == name)
+        wish = self._enabled[name]
+        return Set(f"levels.{name}.enabled", wish.ask(not wish.now(enabled)))
+
+    def update(self, now: Snapshot[MobileSettings]) -> None:
+        places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
+        inside = sorted((name for name in places if places[name] == places[name]), key=places.__getitem__)
+        self._order = (*inside, *(name for name in places if name not in inside))
+        for card in self._cards:
+            level = next(level for level in now.settings.levels if level.name == card.name)
+            card.update(now, level, self._order.index(card.name), card.name in inside)
+
+
+class _Card:
+    """One role."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        bindings: Bindings[MobileSettings],
+        settings: MobileSettings,
+        level: Level,
+        colour: RGB,
+        place: int,
+    ) -> None:
+        name = self.name = level.name
+        self._colour = colour
+        self._folder = gui.add_folder(_title(place, name), order=float(place + 1))
+        with self._folder:
+            self._live = gui.add_html("")
+            on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
+            add_slider(
+                gui,
+                bindings,
+                settings,
+                "Q",
+                f"levels.{name}.Q",
+                (0.1, 100.0, 0.1),
+                lambda s: scalar(_find(s, name).Q),
+                "Weight of this level's errors against its effort",
+            )
+        bindings.bind(
+            on, lambda s: _find(s, name).enabled, lambda value: Set(f"levels.{name}.enabled", bool(value))
+        )
+
+    def update(self, now: Snapshot[MobileSettings], level: Level, place: int, inside: bool) -> None:
+        title = _title(place, level.name)
+        if self._folder.label != title:
+            self._folder.label = title
+            self._folder.order = float(place + 1)
+        task = level.tasks[0]
+        text = f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
+        bound = now.number(f"bound/{level.name}")
+        if bound == bound:
+            text += f", levels below may bring it to {quantity(bound, task.unit)}"
+        notes = "" if level.enabled else " " + badge("OFF", DAMPING)
+        if not inside:
+            text, notes = "no task of it in the window", ""
+        rung = now.number(f"rung/{level.name}")
+        if rung == rung and rung > 0:
+            notes += " " + badge(RUNGS[int(rung)], BAD)
+        self._live.content = block(
+            f"{swatch(self._colour)}{text}{notes}", f"border-left:3px solid {css(self._colour)}"
+        )
+
+
+def _title(place: int, name: str) -> str:
+    return f"{place + 1} · {esc(name)}"
+
+
+def _find(settings: MobileSettings, name: str) -> Level:
+    return next(level for level in settings.levels if level.name == name)

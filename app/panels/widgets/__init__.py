@@ -1,0 +1,1 @@
+"""Controls, charts and windows that all panels share."""

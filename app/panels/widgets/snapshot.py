@@ -1,0 +1,38 @@
+"""What panels are shown: one instant of a learner's session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from app.link.messages import Ready, Status
+from lessons.kinds import AnySettings
+
+S_co = TypeVar("S_co", bound=AnySettings, covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot(Generic[S_co]):
+    """latest: the last telemetry row; bound_seconds (n, 3): s each joint spent at its torque, velocity and
+    position bound since the last reset."""
+
+    ready: Ready
+    settings: S_co
+    status: Status
+    latest: np.ndarray
+    bound_seconds: np.ndarray
+
+    def field(self, name: str) -> np.ndarray:
+        """A field of the last row."""
+        return self.latest[self.ready.layout.fields[name]]
+
+    def number(self, name: str) -> float:
+        """A scalar field of the last row; NaN if the layout has none of that name."""
+        where = self.ready.layout.fields.get(name)
+        return float("nan") if where is None else float(self.latest[where][0])
+
+    def error(self, task: str) -> float:
+        """‖x̃‖ of a task, m or rad."""
+        return float(np.linalg.norm(self.field(f"error/{task}")))

@@ -1,0 +1,1 @@
+"""Who may come in: the server, sessions, the classroom."""

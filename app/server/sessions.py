@@ -1,0 +1,102 @@
+"""Who is here: one learner per browser tab, resumed after a reload, ended some seconds after a tab closed."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import threading
+import time
+from collections.abc import Sequence
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.process import Spares
+from app.worker import main as worker
+
+GRACE = 10.0  # s a session outlives its tab: the time of a reload
+_PERIOD = 0.5  # s between looks at who has left
+
+
+class Sessions:
+    """At most `max_sessions` learners, and one warm process ahead while there is room."""
+
+    def __init__(self, choice: SceneChoice, max_sessions: int, grace: float = GRACE) -> None:
+        self.max_sessions = max_sessions
+        self._choice = choice
+        self._grace = grace
+        self._spares = Spares(worker.main)
+        self._lock = threading.Lock()
+        self._learners: dict[str, Learner] = {}
+        self._closed = threading.Event()
+        self._spares.refill()
+        self._keeper = threading.Thread(target=self._keep, daemon=True)
+        self._keeper.start()
+
+    @property
+    def learners(self) -> tuple[Learner, ...]:
+        with self._lock:
+            return tuple(self._learners.values())
+
+    def enter(self, tokens: Sequence[str]) -> Learner | None:
+        """The learner this browser left behind (its tokens, latest last) or a new one; None if all places
+        are taken."""
+        with self._lock:
+            if self._closed.is_set():
+                return None
+            for token in reversed(tokens):
+                known = self._learners.get(token)
+                if known is not None and not known.attached:
+                    known.attached = True
+                    return known
+            gone = None
+            if len(self._learners) >= self.max_sessions:
+                gone = self._longest_gone()
+                if gone is None:
+                    return None
+                del self._learners[gone.token]
+            learner = Learner(secrets.token_urlsafe(12), self._choice, self._spares)
+            learner.attached = True
+            self._learners[learner.token] = learner
+        if gone is not None:
+            gone.close()
+        return learner
+
+    def _longest_gone(self) -> Learner | None:
+        left = [learner for learner in self._learners.values() if not learner.attached]
+        return min(left, key=lambda learner: learner.left_at, default=None)
+
+    def leave(self, learner: Learner) -> None:
+        """The tab was closed or reloaded."""
+        learner.left_at = time.monotonic()
+        learner.attached = False
+
+    def _keep(self) -> None:
+        while not self._closed.wait(_PERIOD):
+            now = time.monotonic()
+            with self._lock:
+                ended = [
+                    learner
+                    for learner in self._learners.values()
+                    if not learner.attached and now - learner.left_at > self._grace
+                ]
+                for learner in ended:
+                    del self._learners[learner.token]
+                room = len(self._learners) < self.max_sessions
+            for learner in ended:
+                learner.close()
+            if room:
+                self._spares.refill()
+
+    def close(self) -> None:
+        """Ends every process."""
+        self._closed.set()
+        self._keeper.join()
+        with self._lock:
+            learners, self._learners = list(self._learners.values()), {}
+        threads = [threading.Thread(target=learner.close) for learner in learners]
+        threads.append(threading.Thread(target=self._spares.close))
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            with contextlib.suppress(RuntimeError):
+                thread.join()

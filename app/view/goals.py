@@ -1,0 +1,104 @@
+"""The learner's hand in a scene with a mission: one goal per role, and what is posted when it is moved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+
+from app.client.wish import Send
+from app.html.palette import RGB
+from app.html.text import free_name, quantity
+from app.link.messages import MissionRow, Ready, Status, TaskView
+from app.view.goal import Goal
+from lessons.events import MoveTarget
+from lessons.mobile.events import InsertTask
+
+_THERE = 5e-3
+"""m: a point this near has got there."""
+
+
+def point(values: Sequence[float] | np.ndarray) -> np.ndarray:
+    """A point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
+    return np.array([*values, 0.0][:3], float)
+
+
+def open_row(rows: Sequence[MissionRow], role: str) -> MissionRow | None:
+    """The first task of a role that is not completed."""
+    return next((row for row in rows if row.role == role and row.state != "done"), None)
+
+
+class Goals:
+    """A goal per position role. One that is sent along a given trajectory from the start cannot be dragged:
+    it shows what is asked of its point now."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        ready: Ready,
+        colours: dict[str, RGB],
+        size: float,
+        post: Send,
+        status: Callable[[], Status | None],
+        dragged: Callable[[], None],
+    ) -> None:
+        """size: of the arrows of a hand, m; status: the newest one; dragged: called at every move."""
+        self._post, self._status, self._dragged = post, status, dragged
+        self._roles = {task.name: task for task in ready.tasks if task.kind == "position"}
+        self._given = frozenset(name for name, task in self._roles.items() if task.raw is None)
+        self._goals = {
+            name: Goal(
+                scene,
+                name,
+                task.axes,
+                colours[task.level],
+                np.zeros(3) if task.raw is None else point(task.raw),
+                size if "z" in task.axes else 2 * size,
+                None if task.raw is None else lambda place, task=task: self._moved(task, place),
+            )
+            for name, task in self._roles.items()
+        }
+        self._asked: dict[str, str] = {}
+
+    def _moved(self, task: TaskView, place: np.ndarray) -> None:
+        """Moves the role's open task; if none is left, a new one keeps the point where the hand puts it."""
+        status = self._status()
+        if status is None or status.mission is None:
+            return
+        self._dragged()
+        goal = tuple(float(place["xyz".index(axis)]) for axis in task.axes)
+        row, names = open_row(status.mission.rows, task.name), [each.name for each in status.mission.rows]
+        asked = self._asked.get(task.name)
+        if row is not None:
+            self._post(MoveTarget(row.name, goal))
+        elif asked is not None and asked not in names:
+            self._post(MoveTarget(asked, goal))  # the session has not answered yet
+        else:
+            name = self._asked[task.name] = free_name(f"{task.name} by hand", names)
+            self._post(InsertTask(name, task.name, goal, hold=None))
+
+    def follow(self, status: Status, latest: np.ndarray | None, fields: dict[str, slice]) -> None:
+        """Goals and lines of a new status and the newest row of telemetry."""
+        rows = () if status.mission is None else status.mission.rows
+        for name, goal in self._goals.items():
+            row, target = open_row(rows, name), status.targets.get(name)
+            text = f"{name}: done" if row is None else row.name
+            at, wanted = (
+                (np.full(3, np.nan), np.full(3, np.nan))
+                if latest is None
+                else (latest[fields[f"x/{name}"]], latest[fields[f"x_d/{name}"]])
+            )
+            if target is None and name in self._given and np.isfinite(wanted).all():
+                target = wanted
+            if target is not None and np.isfinite(at).all():
+                goal.reach_from(point(at))
+                away = float(np.linalg.norm(at - target))
+                if away > _THERE:
+                    text += f": {quantity(away, 'm')} to go"
+            goal.follow(None if target is None else point(target), text)
+
+    @property
+    def places(self) -> dict[str, np.ndarray]:
+        """Where each goal is drawn, (3,) m."""
+        return {name: goal.place for name, goal in self._goals.items()}

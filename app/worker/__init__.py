@@ -1,0 +1,1 @@
+"""The simulation's side: the body that runs, pacing, leader and follower."""

@@ -1,0 +1,96 @@
+"""The process of a ghost: a simulation without a clock of its own, that runs up to where its leader is."""
+
+from __future__ import annotations
+
+import time
+from multiprocessing.connection import Connection
+
+from app.link.choice import SceneChoice
+from app.link.messages import Begin, Command, Follow, Quit, Reached, Refused
+from app.worker.reports.start import Run
+from app.worker.simulation import Body
+from lessons.follow import Follower, followed
+from lessons.kinds import AnyScene
+from robots import InputError
+
+_POSES = 1 / 60  # s
+_REACHED = 1 / 50  # s
+_STATUS = 0.1  # s
+_CHUNK = 0.01  # s: the longest run before commands are looked at again
+
+
+class Shadow(Body):
+    """A body whose session follows another's."""
+
+    def __init__(self, begin: Begin, own: tuple[str, ...]) -> None:
+        """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
+        self._leader, self._own = begin.settings, own
+        super().__init__(begin.choice)
+        self.follower = Follower(self.session, begin.settings, own)
+
+    def _load_scene(self, choice: SceneChoice) -> AnyScene:
+        return followed(super()._load_scene(choice), self._leader, self._own)
+
+    def _lecturer(self, choice: SceneChoice, run: Run) -> None:
+        """A lesson judges the robot, not its ghost."""
+
+    def catch_up(self, until: float) -> bool:
+        """Runs what is due, but not longer than to a moment of `perf_counter`; whether anything was."""
+        ran = False
+        while self.follower.due and (not ran or time.perf_counter() < until):
+            self.tick()
+            self.follower.take()
+            ran = True
+        return ran
+
+
+def follow(pipe: Connection, first: Follow) -> None:
+    """Follows until the page says Quit; `first` is what a process that waited for work was told."""
+    shadow = _hear(pipe, None, first)
+    next_pose = next_reached = next_status = 0.0
+    reached = -1.0
+    try:
+        while True:
+            while pipe.poll(None if shadow is None else 0.0):
+                command: Command = pipe.recv()
+                if isinstance(command, Quit):
+                    return
+                if isinstance(command, Follow):
+                    shadow = _hear(pipe, shadow, command)
+                    if command.script.begin is not None:
+                        reached = -1.0  # the leader waits to hear that its follower is there
+            if shadow is None:
+                continue
+            ran = shadow.catch_up(time.perf_counter() + _CHUNK)
+            now = time.perf_counter()
+            if now >= next_pose:
+                shadow.write_poses()
+                next_pose = now + _POSES
+            t = shadow.session.t
+            if t != reached and now >= next_reached:
+                pipe.send(Reached(t))
+                reached, next_reached = t, now + _REACHED
+            if now >= next_status:
+                pipe.send(shadow.status())
+                next_status = now + _STATUS
+            if not ran:
+                pipe.poll(_POSES)
+    finally:
+        if shadow is not None:
+            shadow.block.close()
+
+
+def _hear(pipe: Connection, shadow: Shadow | None, command: Follow) -> Shadow | None:
+    script = command.script
+    if script.begin is not None:
+        if shadow is not None:
+            shadow.block.close()
+        try:
+            shadow = Shadow(script.begin, command.own)
+        except InputError as error:
+            pipe.send(Refused(str(error)))
+            return None
+        pipe.send(shadow.ready())
+    if shadow is not None:
+        shadow.follower.hear(script.events, script.t)
+    return shadow

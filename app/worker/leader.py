@@ -1,0 +1,46 @@
+"""A simulation that another one follows: what the follower must hear, and how far it may be left behind."""
+
+from __future__ import annotations
+
+import math
+
+from app.link.choice import SceneChoice
+from app.link.messages import Begin, Script
+from lessons.kinds import AnySession
+
+
+class Leader:
+    """Off until `begin`. Whoever follows hears everything that took effect since, in order."""
+
+    def __init__(self) -> None:
+        self.on = False
+        self.leash = math.inf
+        self._begin: Begin | None = None
+        self._told = 0
+        self._t = math.nan
+
+    def begin(self, choice: SceneChoice, session: AnySession) -> None:
+        """The session was just reset: followers begin here, and until one is there no time passes."""
+        self.on, self.leash = True, 0.0
+        self._begin = Begin(choice, session.settings)
+        self._told = len(session.log)
+
+    def end(self) -> None:
+        """Nobody follows any more."""
+        self.on, self.leash = False, math.inf
+
+    def waits(self, t: float) -> bool:
+        """Whether going on to t (s) would leave the follower too far behind."""
+        return t > self.leash + 1e-9
+
+    def script(self, session: AnySession) -> Script | None:
+        """What is new since the last call, if anything is."""
+        if not self.on:
+            return None
+        begin, self._begin = self._begin, None
+        events = tuple(session.log[self._told :])
+        if begin is None and not events and session.t == self._t:
+            return None
+        self._told += len(events)
+        self._t = session.t
+        return Script(events, session.t, begin)

@@ -1,0 +1,254 @@
+"""Follows the run of an exercise in the simulation process: records it, judges it, says when it is over.
+
+A run is what happens from t = 0 to the exercise's duration. Afterwards the robot is free; what was
+measured stays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from typing import Any
+
+import numpy as np
+
+from app.link.exercise import Answer, Curve, Exercise, Lecture, Phase, signals_of
+from app.worker.lesson.reference_run import ghost_of
+from app.worker.lesson.rows import Record, thinned
+from lessons.challenge import Challenge
+from lessons.kinds import (
+    AnyEvent,
+    AnySession,
+    AnySettings,
+    changed_any,
+    mission_over,
+    setting_at,
+    settings_after,
+    within,
+)
+from lessons.lesson import Step
+from lessons.measure import Measure, Signal
+from lessons.prediction import Choice, Grade, Sketch, Value
+from robots import InputError
+
+_JUDGE_EVERY = 5  # reports: twice a second
+_CHUNK = 0.01  # s of the ghost's computation before commands are looked at again
+FAST = 50.0
+"""Speed of a run that is to be over as soon as possible: more than any computer here can keep up with."""
+
+Array = np.ndarray
+
+
+class Lecturer:
+    """Of one exercise. A session is handed over at t = 0, before its first tick."""
+
+    def __init__(self, exercise: Exercise, session: AnySession, seed: int = 0) -> None:
+        self.exercise = exercise
+        self.answer: Answer | None = None
+        self.fast = False
+        self._part = exercise.part
+        self._ghost = ghost_of(exercise, seed)
+        self._attempt = 0
+        self._reports = 0
+        self._grade: Grade | None = None
+        self._truth = math.nan
+        self._sketched: Curve | None = None
+        self._posted: list[AnyEvent] = []
+        self._own = session.settings
+        self._phase: Phase = "waiting"
+        self._enter(session)
+
+    def _enter(self, session: AnySession) -> None:
+        self._session = session
+        self._record = self._empty_record()
+        self._before = -math.inf
+        self._touched = self._differs = False
+        self._foreign = ""
+        self._lost_at: float | None = None
+        self._last: Lecture | None = None
+
+    def _empty_record(self) -> Record:
+        ticks = math.ceil(self._part.duration / self._session.settings.T_s)
+        return Record(self._session.layout, ticks + 1)
+
+    # ---------------------------------------------------------------- the run
+
+    @property
+    def waiting(self) -> bool:
+        """Before the run."""
+        return self._phase in ("waiting", "preparing")
+
+    @property
+    def busy(self) -> bool:
+        """There is something to compute though nothing runs."""
+        return self.waiting and self._ghost is not None and not self._ghost.finished
+
+    @property
+    def pace(self) -> float | None:
+        """Simulated seconds per second that the run asks for; None: what the learner set."""
+        return FAST if self.fast and self._phase == "running" else None
+
+    @property
+    def unanswered(self) -> bool:
+        """Whether a prediction is to be made first."""
+        return (
+            self.waiting
+            and isinstance(self._part, Step)
+            and self._part.prediction is not None
+            and self.answer is None
+        )
+
+    def settings(self, own: bool) -> AnySettings:
+        """What a run begins with: the lesson's own settings, or those the learner made of them. What the
+        script changed in the last run is undone either way."""
+        if own and isinstance(self._part, Step):
+            self._posted.clear()
+        return settings_after(self._own, self._posted)
+
+    def begin(self, session: AnySession, fast: bool) -> bool:
+        """Asked to run a fresh session: whether it can, or the ghost must be finished first."""
+        self._enter(session)
+        self.fast = fast
+        self._attempt += 1
+        self._differs = session.settings != self._own
+        self._foreign = self._foreign_change() if isinstance(self._part, Challenge) else ""
+        self._phase = "waiting"
+        self._phase = "preparing" if self.busy else "running"
+        return self._phase == "running"
+
+    def idle(self) -> bool:
+        """Works on the ghost for a moment; whether a run that waited for it begins now."""
+        if self.waiting and self._ghost is not None:
+            self._ghost.work(_CHUNK)
+        if self._phase != "preparing" or self.busy:
+            return False
+        self._phase, self._last = "running", None
+        return True
+
+    def touch(self, event: AnyEvent) -> None:
+        """The learner changed something, or pushed or dragged."""
+        self._touched = self._touched or self._phase == "running"
+        with contextlib.suppress(InputError):  # what the session refuses changes nothing
+            settings_after(self._session.settings, [event])
+            self._posted.append(event)
+
+    def follow(self, row: Array) -> bool:
+        """Takes a row of telemetry; whether the run ended with it."""
+        session = self._session
+        if self._phase != "running":
+            return False
+        t = float(row[session.layout.fields["t"].start])
+        if t <= self._before:
+            self._record = self._empty_record()  # put back to the start
+        self._before = t
+        self._record.add(row)
+        self._lost_at = session.diverged_at
+        ended = self._lost_at is not None or mission_over(session)
+        if not ended and session.t < self._part.duration - 0.5 * session.settings.T_s:
+            return False
+        self._phase, self._last, self.fast = "done", None, False
+        if not self._words_of_change():
+            self._weigh_prediction()
+        return True
+
+    def _foreign_change(self) -> str:
+        """Why a challenge's attempt cannot count: a setting that is no knob differs, or a knob is beyond its
+        range."""
+        assert isinstance(self._part, Challenge)
+        now = self._session.settings
+        allowed = self._own
+        for knob in self._part.knobs:
+            value: Any = setting_at(now, knob.path)
+            if value != setting_at(self._own, knob.path):
+                if not within(now, knob):
+                    return f"{knob.words} is outside the range this challenge allows."
+                allowed = changed_any(allowed, knob.path, value)
+        return "" if allowed == now else "A setting was changed that is none of this challenge's."
+
+    # ---------------------------------------------------------------- reports
+
+    def report(self) -> Lecture | None:
+        """What is known now; None while there is nothing new."""
+        self._reports += 1
+        due = self._phase == "running" and self._reports % _JUDGE_EVERY == 0
+        if self._last is not None and self._last.answer == self.answer and not due:
+            return None
+        self._last = self._judged()
+        return self._last
+
+    def _judged(self) -> Lecture:
+        part, record, ghost = self._part, self._record, self._ghost_so_far()
+        claims = part.claims if isinstance(part, Step) else part.goals
+        values = tuple(_value(claim.measure, record, ghost) for claim in claims)
+        over = self._phase == "done"
+        signals = signals_of(part)
+        return Lecture(
+            exercise=self.exercise,
+            phase=self._phase,
+            attempt=self._attempt,
+            t=min(float(record["t"][-1, 0]) + self._session.settings.T_s, part.duration)
+            if len(record)
+            else 0.0,
+            duration=part.duration,
+            answer=self.answer,
+            changed=self._words_of_change(),
+            values=values,
+            holds=tuple(
+                None if math.isnan(value) else claim.holds(value)
+                for claim, value in zip(claims, values, strict=True)
+            ),
+            truth=self._truth,
+            grade=self._grade,
+            curves=_curves(signals, record),
+            ghosts=() if ghost is None else _curves(signals, ghost),
+            sketched=self._sketched,
+            result=part.grade(record) if over and isinstance(part, Challenge) else None,
+            points_for=part.score.measure.value(record) if isinstance(part, Challenge) else math.nan,
+            lost_at=self._lost_at,
+        )
+
+    def _ghost_so_far(self) -> Record | None:
+        if self._ghost is None or not len(self._record) or not len(self._ghost.record):
+            return None
+        if self._phase == "done":  # a mission may take one of the two longer than the other
+            return self._ghost.record
+        return self._ghost.record.until(float(self._record["t"][-1, 0]))
+
+    def _words_of_change(self) -> str:
+        if isinstance(self._part, Challenge):
+            moved = "Something was changed or moved while the run went on; only what stands before it counts."
+            return self._foreign or (moved if self._touched else "")
+        if self._differs:
+            return "Your run: its settings are not the lesson's."
+        return "Your run: you changed or moved something while it went on." if self._touched else ""
+
+    def _weigh_prediction(self) -> None:
+        """A prediction is about the lesson's own run, and is measured there."""
+        prediction = self._part.prediction if isinstance(self._part, Step) else None
+        if prediction is None or self.answer is None:
+            return
+        ghost, answer = self._ghost_so_far(), self.answer
+        self._truth = prediction.measure.value(self._record, ghost)
+        match prediction:
+            case Sketch():
+                assert isinstance(answer, tuple)
+                self._grade = prediction.grade(answer, self._record)
+                self._sketched = _curve(prediction.signal, self._record)
+            case Choice():
+                assert isinstance(answer, int)
+                self._grade = prediction.grade(answer, self._record, ghost)
+            case Value():
+                assert isinstance(answer, (int, float))
+                self._grade = prediction.grade(answer, self._record, ghost)
+
+
+def _value(measure: Measure, record: Record, ghost: Record | None) -> float:
+    return measure.value(record, ghost) if len(record) else math.nan
+
+
+def _curve(signal: Signal, record: Record) -> Curve:
+    return Curve(*thinned(record["t"][:, 0], signal.over(record)))
+
+
+def _curves(signals: tuple[Signal, ...], record: Record) -> tuple[Curve, ...]:
+    return tuple(_curve(signal, record) for signal in signals) if len(record) else ()

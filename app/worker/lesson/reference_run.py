@@ -1,0 +1,38 @@
+"""The second robot of a step, computed headless while the learner reads: what claims compare with."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+from app.link.exercise import Exercise
+from app.worker.lesson.rows import Record
+from lessons.kinds import AnyScene, mission_over, session_of
+from lessons.lesson import Step
+
+
+class GhostRun:
+    """A run in small pieces. It is finished when nothing of it is left to be computed."""
+
+    def __init__(self, scene: AnyScene, seed: int) -> None:
+        self._session = session_of(scene, seed)
+        self._ticks = max(1, round(scene.duration / self._session.settings.T_s))
+        self.record = Record(self._session.layout, self._ticks)
+
+    @property
+    def finished(self) -> bool:
+        session = self._session
+        return len(self.record) >= self._ticks or session.diverged_at is not None or mission_over(session)
+
+    def work(self, seconds: float) -> None:
+        """Goes on for about so long (wall time)."""
+        until = perf_counter() + seconds
+        while not self.finished and perf_counter() < until:
+            self.record.add(self._session.tick())
+
+
+def ghost_of(exercise: Exercise, seed: int) -> GhostRun | None:
+    """The second robot's run, where a claim or a prediction is measured against it."""
+    step = exercise.part
+    if not isinstance(step, Step) or step.ghost is None:
+        return None
+    return GhostRun(exercise.run.but(*step.ghost.set).prepared(), seed)

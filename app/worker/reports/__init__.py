@@ -1,0 +1,1 @@
+"""What a running session tells the page, torque or velocity."""

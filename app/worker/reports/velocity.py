@@ -1,0 +1,158 @@
+"""A velocity-level session as the simulation process drives it: every step is one command to the servos."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.link.messages import BindingRow, MissionRow, MissionView, Person, TaskView
+from app.worker.reports.report import LISTED
+from himpc.htmpc import base_joints
+from himpc.missions import Go, MissionTask
+from himpc.tasks import FramePosition, Task
+from lessons.kinds import AnyEvent
+from lessons.mobile.scene import MobileScene
+from lessons.mobile.session import MobileSession
+
+_ABOVE = np.array([0.0, 0.0, 0.015])
+"""m, of predicted paths above the floor, so that it does not hide them."""
+_ARM = 0.55
+"""m from a person's middle to the hand that takes the ball."""
+_AROUND = 1.9
+"""m about a mobile base that the camera should show at least."""
+
+
+class VelocityRun:
+    """See `app.worker.reports.report.Run`.
+
+    A target belongs to a role: it is the goal of the role's first open task."""
+
+    def __init__(self, scene: MobileScene, seed: int) -> None:
+        self.session = MobileSession(scene, seed)
+
+    @property
+    def step_s(self) -> float:
+        return self.session.step_s
+
+    @property
+    def between(self) -> bool:
+        return self.session.between
+
+    def post(self, event: AnyEvent) -> None:
+        self.session.post(event)
+
+    def advance(self) -> np.ndarray | None:
+        return self.session.advance()
+
+    def tasks(self) -> tuple[TaskView, ...]:
+        targets = self.targets()
+        return tuple(
+            self._view(task, level.name, targets.get(task.name))
+            for level in self.session.settings.levels
+            for task in level.tasks
+        )
+
+    def _view(self, task: Task, level: str, raw: np.ndarray | None) -> TaskView:
+        return TaskView(
+            name=task.name,
+            level=level,
+            kind="position" if isinstance(task, FramePosition) else "orientation",
+            unit=task.unit,
+            frame=str(getattr(task, "frame", "")) or self.session.robot.tip,
+            axes=str(getattr(task, "axes", "")),
+            raw=raw,
+            path=None,
+            speed_cap=float("nan"),
+        )
+
+    def targets(self) -> dict[str, np.ndarray]:
+        progress = self.session.progress
+        found: dict[str, np.ndarray] = {}
+        for task in progress.mission[progress.place :]:
+            if task.role not in found and isinstance(task.motion, Go):
+                found[task.role] = np.array(task.motion.goal)
+        return found
+
+    def path(self) -> np.ndarray:
+        tip = self.session.robot.tip
+        for role, task in self.session.roles.items():
+            if isinstance(task, FramePosition) and (task.frame or tip) == tip:
+                return self.session.predicted_path(role)
+        return np.zeros((0, 3))
+
+    def room(self) -> np.ndarray:
+        if not base_joints(self.session.robot):
+            return np.zeros((0, 3))
+        tasks = self.session.progress.mission
+        goals = [_point(task.motion.goal) for task in tasks if isinstance(task.motion, Go)]
+        corners = [np.array([x, y, 0.0]) for x in (-_AROUND, _AROUND) for y in (-_AROUND, _AROUND)]
+        return np.array([*goals, *corners])
+
+    def binding(self) -> tuple[BindingRow, ...]:
+        return tuple(BindingRow(*row) for row in self.session.binding()[:LISTED])
+
+    def gauge(self) -> None:
+        return None
+
+    def mission(self) -> MissionView:
+        session, progress = self.session, self.session.progress
+        completed = dict(progress.completed)
+        active = {each.task.name: each for each in progress.window}
+
+        def row(place: int, task: MissionTask) -> MissionRow:
+            entered = active.get(task.name)
+            reached = None if entered is None else entered.reached
+            return MissionRow(
+                name=task.name,
+                role=task.role,
+                goal=task.motion.goal if isinstance(task.motion, Go) else None,
+                tolerance=task.tolerance,
+                hold=task.hold,
+                state="done" if place < progress.place else "active" if entered is not None else "ahead",
+                there_s=None if reached is None else session.t - reached,
+                done_at=completed.get(task.name),
+            )
+
+        ran = session.plan is not None
+        return MissionView(
+            rows=tuple(row(place, task) for place, task in enumerate(progress.mission)),
+            done=progress.done,
+            paths={
+                role: np.array([_point(at) for at in session.predicted_path(role)]) + _ABOVE
+                for role, task in session.roles.items()
+                if ran and isinstance(task, FramePosition)
+            },
+            people=self._people(),
+        )
+
+    def _people(self) -> tuple[Person, ...]:
+        """Each stands behind the place of the hand-over, seen from where the base goes for it."""
+        options, progress = self.session.settings.options, self.session.progress
+        visits: dict[int, list[tuple[MissionTask, bool]]] = {}
+        beside: np.ndarray | None = None
+        stands: dict[str, np.ndarray] = {}
+        for place, task in enumerate(progress.mission):
+            if not isinstance(task.motion, Go):
+                continue
+            if task.role == "base":
+                beside = np.array(task.motion.goal)
+            person = options.person(task.name)
+            if person is not None:
+                visits.setdefault(person, []).append((task, place < progress.place))
+                stands[task.name] = np.zeros(2) if beside is None else beside
+        people: list[Person] = []
+        for person in sorted(visits):
+            task = next((task for task, done in visits[person] if not done), visits[person][-1][0])
+            assert isinstance(task.motion, Go)
+            hand = _point(task.motion.goal)
+            away = hand[:2] - stands[task.name]
+            x, y = hand[:2] + _ARM * away / max(float(np.linalg.norm(away)), 1e-6)
+            balls = sum(done for _, done in visits[person])
+            people.append(
+                Person((float(hand[0]), float(hand[1]), float(hand[2])), (float(x), float(y)), balls)
+            )
+        return tuple(people)
+
+
+def _point(values: tuple[float, ...] | np.ndarray) -> np.ndarray:
+    """A point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
+    return np.array([*values, 0.0][:3], float)

@@ -1,0 +1,299 @@
+"""The simulation behind one page, without process and without clock: the worker drives it in real time,
+tests drive it by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.link.choice import SceneChoice
+from app.link.messages import (
+    Command,
+    Lead,
+    Leash,
+    Load,
+    Play,
+    Post,
+    Predict,
+    Ready,
+    Refused,
+    Report,
+    ResetAll,
+    RunStep,
+    Speed,
+    Status,
+    Step,
+    Tell,
+    Told,
+)
+from app.link.ring import Block
+from app.worker.leader import Leader
+from app.worker.lesson.lecturer import Lecturer
+from app.worker.link_poses import LinkPoses
+from app.worker.reports.start import Run, start
+from lessons.events import Reset, Set
+from lessons.kinds import AnyScene, AnySession, AnySettings
+from lessons.run import parse_assignment
+from lessons.state import settings_now
+from robots import InputError
+
+
+class Body:
+    """A session, whether it plays and how fast, and the memory its telemetry goes to."""
+
+    def __init__(self, choice: SceneChoice) -> None:
+        """Raises InputError for a scene or robot that cannot be loaded."""
+        self.running = True
+        self.speed = 1.0
+        self.ticks = self.over_budget = self.late = self._steps = 0
+        self.resets = 0
+        self._sent: AnySettings | None = None
+        self.leader = Leader()
+        self._enter(choice)
+        self._make_mine(choice)
+
+    def _enter(self, choice: SceneChoice) -> None:
+        scene = self._load_scene(choice)
+        self._take(choice, scene, start(scene, choice.seed))
+        robot = self.session.robot
+        self._poses = LinkPoses(robot)
+        fields = self.session.layout.fields
+        self._step_us = fields["step_us"].start
+        self._late = fields["late"].start if "late" in fields else None
+        self.block = Block.for_robot(robot, self.session.layout.size)
+        self._fresh_start()
+        self.write_poses()
+
+    def _load_scene(self, choice: SceneChoice) -> AnyScene:
+        return choice.scene()
+
+    def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
+        return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.seed)
+
+    def _take(self, choice: SceneChoice, scene: AnyScene, run: Run) -> None:
+        """A run at its beginning. A lesson's robot stands still until its script begins."""
+        self.choice, self.scene, self.run = choice, scene, run
+        self.lecturer = self._lecturer(choice, run)
+        self.running, self.speed = self.lecturer is None, 1.0
+
+    def _fresh_start(self) -> None:
+        self.ticks = self.over_budget = self.late = self._steps = 0
+        self.resets += 1
+        self._sent = None
+        if self.leader.on:
+            self.leader.begin(self.choice, self.session)
+
+    @property
+    def session(self) -> AnySession:
+        return self.run.session
+
+    # ---------------------------------------------------------------- commands
+
+    def handle(self, command: Command) -> Report | None:
+        """Obeys a command; the answer, if it has one, goes to the page."""
+        lecturer = self.lecturer
+        if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, Step, RunStep)):
+            self.session.notices.append("First say what you expect: this step asks for a prediction.")
+            return None
+        match command:
+            case Post(Reset()) if lecturer is not None and not lecturer.waiting:
+                self._begin(own=False, fast=False)
+            case Post(Reset() as event):
+                self.run.post(event)
+                self.resets += 1
+                if not self.running:
+                    self._steps = max(self._steps, 1)  # a reset must show while paused, too
+            case Post(event):
+                self.run.post(event)
+                if lecturer is not None:
+                    lecturer.touch(event)
+            case RunStep(own, fast):
+                self._begin(own, fast)
+            case Play(True) if lecturer is not None and lecturer.waiting:
+                self._begin(own=True, fast=False)
+            case Predict(answer):
+                if lecturer is not None:
+                    lecturer.answer = answer
+            case Play(running):
+                self.running, self._steps = running, 0
+                self._finish_period()
+            case Step(ticks):
+                self.running = False
+                self._finish_period()
+                self._steps += ticks
+            case Speed(factor):
+                self.speed = factor
+            case ResetAll():
+                self._restart(self.choice, self.scene, start(self.scene, self.choice.seed))
+            case Load(choice):
+                return self._load(choice)
+            case Tell():
+                return Told(self.choice, settings_now(self.session), tuple(self.session.log), self.session.t)
+            case Lead(on):
+                self._lead(on)
+            case Leash(until):
+                self.leader.leash = until if self.leader.on else self.leader.leash
+            case _:
+                pass
+        return None
+
+    def _lead(self, on: bool) -> None:
+        if not on:
+            self.leader.end()
+            return
+        if self.run.between:
+            self.tick()
+        self.session.post(Reset())
+        self.session.drain()
+        self.resets += 1
+        self.write_poses()
+        self.leader.begin(self.choice, self.session)
+
+    def _restart(self, choice: SceneChoice, scene: AnyScene, run: Run) -> None:
+        self._take(choice, scene, run)
+        self._fresh_start()
+        self.write_poses()
+
+    def _begin(self, own: bool, fast: bool) -> None:
+        """The run of an exercise from its start."""
+        if self.lecturer is None:
+            return
+        settings: Any = self.lecturer.settings(own)
+        self.run = start(replace(self.scene, settings=settings), self.choice.seed)
+        self._fresh_start()
+        self.running = self.lecturer.begin(self.session, fast)
+        self.write_poses()
+
+    def _turn_to(self, choice: SceneChoice) -> bool:
+        """Another step of the same lesson: as long as it looks the same, nothing needs to be built anew."""
+        then, now = self.choice.exercise, choice.exercise
+        if then is None or now is None or then.lesson != now.lesson:
+            return False
+        scene = choice.scene()
+        run = start(scene, choice.seed)
+        if run.session.layout != self.session.layout:
+            return False
+        self._restart(choice, scene, run)
+        return True
+
+    def _load(self, choice: SceneChoice) -> Report | None:
+        before = self.block
+        try:
+            if not self._turn_to(choice):
+                self._enter(choice)
+            self._make_mine(choice)
+        except InputError as error:
+            return Refused(str(error))
+        if self.block is before:
+            return None
+        before.close()
+        return self.ready()
+
+    def _make_mine(self, choice: SceneChoice) -> None:
+        for each in choice.mine:
+            self.handle(Post(Set(*parse_assignment(each))))
+        self.session.drain()
+
+    # ---------------------------------------------------------------- simulation
+
+    def take_steps(self) -> int:
+        """Single ticks that were asked for while paused, once."""
+        steps, self._steps = self._steps, 0
+        return steps
+
+    def tick(self, ticks: int = 1) -> None:
+        """Runs control periods and writes their telemetry."""
+        for _ in range(ticks):
+            while not self.advance():
+                pass
+
+    def advance(self) -> bool:
+        """One step of the run; whether a control period ended with it, and its telemetry was written."""
+        row = self.run.advance()
+        if row is None:
+            return False
+        self.block.write(row)
+        self.ticks += 1
+        self.over_budget += bool(row[self._step_us] > 1e6 * self.session.settings.T_s)
+        self.late += self._late is not None and bool(row[self._late])
+        if self.lecturer is not None and self.lecturer.follow(row):
+            # What is out of control only gets worse; the learner should see where it ended.
+            self.running = self.session.diverged_at is None
+        return True
+
+    @property
+    def pace(self) -> float:
+        """Simulated seconds per second that are asked for."""
+        pace = None if self.lecturer is None else self.lecturer.pace
+        return self.speed if pace is None else pace
+
+    @property
+    def busy(self) -> bool:
+        """There is something to compute, though perhaps nothing runs."""
+        return self.running or (self.lecturer is not None and self.lecturer.busy)
+
+    def _finish_period(self) -> None:
+        # A pause stands between two control periods: what is changed meanwhile takes effect at once, and
+        # where the same events strike again a recording of the run comes out the same.
+        if not self.running and self.run.between:
+            self.tick()
+
+    def settle(self) -> None:
+        """While paused: what was asked for takes effect at once, though no time passes."""
+        self.session.drain()
+        if self.lecturer is not None and self.lecturer.idle():
+            self.running = True
+
+    def write_poses(self) -> None:
+        """The plant's true link poses, for the 3D view."""
+        poses = self._poses.at(np.asarray(self.session.plant.q))
+        if poses is not None:
+            self.block.write_poses(poses, self.session.t)
+
+    # ---------------------------------------------------------------- reports
+
+    def ready(self) -> Ready:
+        session = self.session
+        return Ready(
+            choice=self.choice,
+            block=self.block.name,
+            robot=session.robot,
+            layout=session.layout,
+            settings=session.settings,
+            tasks=self.run.tasks(),
+            room=self.run.room(),
+        )
+
+    def status(self, real_time_factor: float = 0.0, capped: bool = False) -> Status:
+        run, session = self.run, self.session
+        notices = tuple(session.notices)
+        session.notices.clear()
+        settings = session.settings
+        changed = settings is not self._sent
+        self._sent = settings
+        ran = self.ticks > 0
+        return Status(
+            t=session.t,
+            ticks=self.ticks,
+            running=self.running,
+            speed=self.speed,
+            real_time_factor=real_time_factor,
+            capped=capped,
+            over_budget=self.over_budget,
+            late=self.late,
+            resets=self.resets,
+            targets=run.targets(),
+            path=run.path() if ran else np.zeros((0, 3)),
+            binding=run.binding() if ran else (),
+            notices=notices,
+            settings=settings if changed else None,
+            gauge=None if self.running else run.gauge(),
+            mission=run.mission(),
+            lecture=None if self.lecturer is None else self.lecturer.report(),
+        )
+
+    def close(self) -> None:
+        """Frees the memory; for use without a page, which otherwise does it."""
+        self.block.close(unlink=True)
