@@ -72,6 +72,48 @@ def test_imports_go_one_way(package: str) -> None:
     assert not wrong
 
 
+APP = {
+    "commands": ("server", "html", "link"),
+    "server": ("page", "panels", "client", "html", "link", "worker"),
+    "page": ("panels", "view", "client", "html", "link"),
+    "panels": ("view", "client", "html", "link"),
+    "view": ("client", "html", "link"),
+    "client": ("html", "link"),
+    "worker": ("link",),
+    "link": (),
+    "html": (),
+}
+"""What each folder of app/ may import beside itself: two houses that meet in `link`. Only the server
+knows both: it hands the simulation's entry point in."""
+
+
+def test_app_is_the_folders_it_says() -> None:
+    """Every folder has its rule, and no file stands between them."""
+    folders = {path.name for path in (ROOT / "app").iterdir() if path.is_dir() and path.name[0] not in "._"}
+    assert folders == set(APP)
+    assert {path.name for path in (ROOT / "app").glob("*.py")} == {"__init__.py", "__main__.py"}
+
+
+@pytest.mark.parametrize("folder", APP)
+def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
+    """commands → server → page → panels → view → client → link ← worker, never back and never across."""
+    files = sources(f"app/{folder}")
+    assert files
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, "app") and name.split(".")[1] not in (folder, *APP[folder])
+    }
+    assert not wrong
+
+
+@pytest.mark.parametrize("folder", ["worker", "link", "client", "html"])
+def test_what_needs_no_picture_knows_no_viser(folder: str) -> None:
+    """A simulation loads nothing of the page's, and what the page was told is plain data."""
+    assert not {name for path in sources(f"app/{folder}") for name in imports(path) if within(name, "viser")}
+
+
 @pytest.mark.parametrize("library", DOORS)
 def test_heavy_dependencies_have_one_door(library: str) -> None:
     """A library is imported behind its door only, and the door exists."""

@@ -12,10 +12,9 @@ import pytest
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Lead, Leash, Load, Play, Post, ResetAll, Script
-from app.link.process import Spares
+from app.link.process import Spares, wait_until
 from app.link.ring import Block
 from app.worker import main as worker
-from app.worker import wait_until
 from app.worker.follower import Shadow
 from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
