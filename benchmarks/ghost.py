@@ -25,7 +25,7 @@ from app.client.simulation import Simulation
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
-from lessons.lesson import Ghost
+from lessons.teaching.lesson import Ghost
 
 SETTLE = 5.0  # s
 LONG = 120.0  # s

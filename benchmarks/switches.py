@@ -26,7 +26,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Load
 from app.link.process import wait_until
 from app.server.server import PageServer
-from lessons.lesson import Ghost
+from lessons.teaching.lesson import Ghost
 
 SCENES = ("planar3-hold", "iiwa14-hold", "planar3-circle", "panda-hold")
 LONG = 120.0  # s

@@ -14,8 +14,8 @@ from time import perf_counter_ns
 import numpy as np
 
 from himpc.telemetry import write_plan
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.session.torque import Session
 
 
 def measure(scene: str, ticks: int) -> dict[str, dict[str, float] | float]:

@@ -12,7 +12,7 @@ Vector = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Set:
-    """A setting takes a new value; `path` as in `lessons.settings`."""
+    """A setting takes a new value; `path` as in `lessons.settings.torque`."""
 
     path: str
     value: Any

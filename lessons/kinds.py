@@ -7,25 +7,25 @@ from dataclasses import replace
 from typing import Any
 
 from himpc.controllers import CONTROLLERS
-from lessons.control import Control
 from lessons.events import Event, MoveLevel, Set
-from lessons.levels import moved
-from lessons.mobile.events import Appear, MobileEvent
-from lessons.mobile.run import mobile_run
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
-from lessons.mobile.settings import VELOCITY_CONTROLLERS, MobileSettings, with_obstacle
-from lessons.mobile.settings import changed as changed_mobile
-from lessons.mobile.settings import paths as mobile_paths
-from lessons.mobile.settings import value_at as value_at_mobile
-from lessons.mobile.summary import MobileRecording, mobile_arrays, mobile_summary
-from lessons.run import parse_assignment, run, with_assignments
-from lessons.scene import Scene
-from lessons.scenes import SCENES, load_scene
-from lessons.scenes.mobile import MOBILE_SCENES, mobile_scene
-from lessons.session import Session
-from lessons.settings import SceneSettings, changed, paths, value_at
-from lessons.summary import Recording, arrays, summary
+from lessons.recording.run import parse_assignment, run, with_assignments
+from lessons.recording.torque import Recording, arrays, summary
+from lessons.recording.velocity import MobileRecording, mobile_arrays, mobile_summary
+from lessons.recording.velocity_run import mobile_run
+from lessons.scenes.catalog import SCENES, load_scene
+from lessons.scenes.missions import MOBILE_SCENES, mobile_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.torque import Session
+from lessons.session.velocity import MobileSession
+from lessons.settings.levels import moved
+from lessons.settings.torque import SceneSettings, changed, paths, value_at
+from lessons.settings.velocity import VELOCITY_CONTROLLERS, MobileSettings, with_obstacle
+from lessons.settings.velocity import changed as changed_mobile
+from lessons.settings.velocity import paths as mobile_paths
+from lessons.settings.velocity import value_at as value_at_mobile
+from lessons.teaching.control import Control
+from lessons.velocity_events import Appear, MobileEvent
 from robots import InputError
 
 AnyScene = Scene | MobileScene
@@ -118,7 +118,7 @@ def run_scene(
     progress: Callable[[float], None] | None = None,
     to_the_end: bool = False,
 ) -> AnyRecording:
-    """Runs a scene headless; see `lessons.run.run` and `lessons.mobile.run.mobile_run`."""
+    """Runs a scene headless; see `run` and `mobile_run`."""
     if isinstance(scene, Scene):
         return run(scene, duration, seed, progress, to_the_end)
     return mobile_run(scene, duration, seed, progress, to_the_end)
@@ -130,7 +130,7 @@ def summary_of(recording: AnyRecording) -> dict[str, Any]:
 
 
 def arrays_of(recording: AnyRecording, how: dict[str, Any]) -> dict[str, Any]:
-    """The arrays of `himpc-lab run --npz`; see `lessons.summary.arrays`."""
+    """The arrays of `himpc-lab run --npz`; see `lessons.recording.torque.arrays`."""
     if isinstance(recording, Recording):
         return arrays(recording, how)
     return mobile_arrays(recording, how)

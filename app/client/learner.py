@@ -12,7 +12,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Lecture
 from app.link.messages import Lead, Leash, Load, Ready, Report, ResetAll, Script, Status, Tell, Told
 from app.link.process import Process, Spares
-from lessons import lesson
+from lessons.teaching import lesson
 
 
 class Learner(Simulation):

@@ -17,8 +17,8 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
         ticks: timed ticks per contender.
         json: write the result as JSON to this file, or to standard output for "-".
     """
-    from lessons.bench import bench as measure
-    from lessons.bench import ratios
+    from lessons.experiments.bench import bench as measure
+    from lessons.experiments.bench import ratios
     from robots import InputError
 
     if not 10 <= ticks <= 100_000:

@@ -12,6 +12,6 @@ def controllers(json: str | None = None) -> int:
         json: write JSON to this file, or to standard output for "-".
     """
     from himpc import CONTROLLERS
-    from lessons.mobile.settings import VELOCITY_CONTROLLERS
+    from lessons.settings.velocity import VELOCITY_CONTROLLERS
 
     return print_list("Controllers", "controller", CONTROLLERS | VELOCITY_CONTROLLERS, json)

@@ -12,8 +12,8 @@ from app.commands.output import print_table, write_json
 from app.commands.progress import progress_bar
 
 if TYPE_CHECKING:
-    from lessons.check import Verdict
-    from lessons.lesson import Lesson
+    from lessons.teaching.check import Verdict
+    from lessons.teaching.lesson import Lesson
 
 
 def lessons(
@@ -30,8 +30,8 @@ def lessons(
         check: names of the lessons to check; none after --check: all of them.
         json: write JSON to this file, or to standard output for "-".
     """
-    from lessons.check import check as check_lessons
     from lessons.course import COURSE, load_lesson
+    from lessons.teaching.check import check as check_lessons
 
     chosen = [load_lesson(name) for name in dict.fromkeys(check or COURSE)]
     if check is None:

@@ -12,7 +12,7 @@ from app.commands.progress import progress_bar
 from robots import InputError
 
 if TYPE_CHECKING:
-    from lessons.state import State
+    from lessons.replay.state import State
 
 
 def run(
@@ -69,7 +69,7 @@ def run(
 
 def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> State:
     """What to run: the scene that was named, or the state of a code."""
-    from lessons.state import State, decode
+    from lessons.replay.state import State, decode
 
     if code is None:
         if scene is None:

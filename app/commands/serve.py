@@ -43,7 +43,7 @@ def serve(
     if lesson is not None:
         choice = SceneChoice.of_lesson(Exercise(lesson))
     elif state is not None:
-        from lessons.state import decode
+        from lessons.replay.state import decode
 
         choice = SceneChoice.of_state(decode(state))
     else:

@@ -12,7 +12,7 @@ import tyro
 from app.commands.progress import progress_bar
 
 if TYPE_CHECKING:
-    from lessons.sweep import Cell, Sweep
+    from lessons.experiments.sweep import Cell, Sweep
 
 
 def sweep(
@@ -42,9 +42,9 @@ def sweep(
         metric: what the map shows; by default the RMSE of level 1 after the first second.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
-    from lessons.jobs import Job
+    from lessons.experiments.jobs import Job
+    from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
     from lessons.parallel import on_cluster, on_cores
-    from lessons.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
 
     definition = make_sweep(Job(scene, controller, tuple(set), duration, seed), over)
     choices = metrics(definition)
@@ -67,7 +67,7 @@ def sweep(
 
 
 def _conclude(definition: Sweep, cells: list[Cell], metric: str, out: Path) -> None:
-    from lessons.sweep import best_cell, draw_sweep
+    from lessons.experiments.sweep import best_cell, draw_sweep
 
     picture = draw_sweep(definition, cells, metric, out)
     lost = sum(cell.diverged for cell in cells)

@@ -35,10 +35,10 @@ def tune(
         set: change a setting in all runs, e.g. --set plant.encoder_resolution_deg=0.001.
         json: write the steps as JSON to this file, or to standard output for "-".
     """
-    from lessons.run import with_assignments
-    from lessons.scenes import load_scene
-    from lessons.tune import chosen
-    from lessons.tune import tune as tune_scene
+    from lessons.experiments.tune import chosen
+    from lessons.experiments.tune import tune as tune_scene
+    from lessons.recording.run import with_assignments
+    from lessons.scenes.catalog import load_scene
 
     loaded = load_scene(scene)
     loaded = replace(loaded, settings=with_assignments(loaded.settings, set))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from app.link.exercise import Exercise
-from lessons.assignments import differences
 from lessons.kinds import AnyScene, find_scene, prepared
-from lessons.state import State
+from lessons.replay.state import State
+from lessons.settings.assignments import differences
 from robots import InputError
 
 

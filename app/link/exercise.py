@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from lessons.challenge import Challenge, Result
 from lessons.course import load_lesson
-from lessons.lesson import Lesson, Run, Step
-from lessons.measure import Signal
-from lessons.prediction import Grade
+from lessons.teaching.challenge import Challenge, Result
+from lessons.teaching.lesson import Lesson, Run, Step
+from lessons.teaching.measure import Signal
+from lessons.teaching.prediction import Grade
 from robots import InputError
 
 Answer = int | float | tuple[tuple[float, float], ...]

@@ -25,7 +25,7 @@ from app.view.robot import RobotView, camera_for
 from app.view.target import Frames
 from app.view.trails import Trails
 from lessons.events import Set
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 
 class TorqueFace:

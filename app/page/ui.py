@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.page.scene_ui import Context, Face
 from app.page.torque_ui import TorqueFace
 from app.page.velocity_ui import VelocityFace
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 __all__ = ["Context", "Face", "face_for"]
 

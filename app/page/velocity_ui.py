@@ -28,8 +28,8 @@ from app.view.target import Frames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Set
-from lessons.mobile.events import Appear
-from lessons.mobile.settings import MobileSettings
+from lessons.settings.velocity import MobileSettings
+from lessons.velocity_events import Appear
 from robots.stretch import horizontal_reach
 
 _AHEAD, _RADIUS = 0.7, 0.2

@@ -11,7 +11,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Command
 from app.link.process import Spares
 from app.worker import main as worker
-from lessons import lesson
+from lessons.teaching import lesson
 
 STEERING = "The instructor steers: this page only watches."
 

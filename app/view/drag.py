@@ -17,7 +17,7 @@ from app.view.coordinates import draggable, full, raw, xyzw
 from app.view.reachability import Judge, Question, Verdict
 from app.view.target import Frames, TargetGizmo
 from lessons.events import MoveTarget
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 _OWN = 1.0
 """s after a drag in which targets that change are taken to be the hand's own."""

@@ -9,8 +9,8 @@ from app.link.choice import SceneChoice
 from app.link.messages import Begin, Command, Follow, Quit, Reached, Refused
 from app.worker.reports.start import Run
 from app.worker.simulation import Body
-from lessons.follow import Follower, followed
 from lessons.kinds import AnyScene
+from lessons.session.follower import Follower, followed
 from robots import InputError
 
 _POSES = 1 / 60  # s

@@ -35,8 +35,8 @@ from app.worker.link_poses import LinkPoses
 from app.worker.reports.start import Run, start
 from lessons.events import Reset, Set
 from lessons.kinds import AnyScene, AnySession, AnySettings
-from lessons.run import parse_assignment
-from lessons.state import settings_now
+from lessons.recording.run import parse_assignment
+from lessons.replay.state import settings_now
 from robots import InputError
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from lessons.lesson import Lesson
+from lessons.teaching.lesson import Lesson
 from robots.errors import unknown_name
 
 COURSE: tuple[str, ...] = (

@@ -8,12 +8,12 @@ You need: lesson "first-hold-then-reach"
 
 from __future__ import annotations
 
-from lessons.challenge import Challenge, Score
-from lessons.claim import Claim
-from lessons.control import Control
-from lessons.lesson import Ghost, Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option
+from lessons.teaching.challenge import Challenge, Score
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
 
 HAND = Signal("error/ee", "mm")
 BASE = Signal("error/base", "m")

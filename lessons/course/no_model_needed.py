@@ -8,13 +8,13 @@ You need: lesson "one-task"; mass times acceleration is force
 
 from __future__ import annotations
 
-from lessons.challenge import Challenge, Score
-from lessons.claim import Claim
-from lessons.control import Control
 from lessons.events import MoveTarget, Set
-from lessons.lesson import Ghost, Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option, Value
+from lessons.teaching.challenge import Challenge, Score
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option, Value
 
 HAND = Signal("error/position", "mm")
 GAUGE = Signal("gauge_radius")

@@ -8,13 +8,13 @@ You need: a mass on a spring with a damper
 
 from __future__ import annotations
 
-from lessons.challenge import Challenge, Score
-from lessons.claim import Claim
-from lessons.control import Control
 from lessons.events import Push
-from lessons.lesson import Ghost, Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option, Sketch
+from lessons.teaching.challenge import Challenge, Score
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option, Sketch
 
 HAND = Signal("error/position", "mm")
 HIT = ((0.1, Push("joint_3", force=(10.0, 0.0, 0.0), seconds=0.2)),)

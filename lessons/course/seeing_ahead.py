@@ -8,11 +8,11 @@ You need: lesson "first-hold-then-reach"
 
 from __future__ import annotations
 
-from lessons.claim import Claim
-from lessons.control import Control
-from lessons.lesson import Ghost, Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option, Value
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option, Value
 
 HAND = Signal("error/ee", "mm")
 BASE = Signal("error/base", "m")

@@ -8,13 +8,13 @@ You need: lesson "torque-has-a-limit"; braking distance
 
 from __future__ import annotations
 
-from lessons.challenge import Challenge, Score
-from lessons.claim import Claim
-from lessons.control import Control
 from lessons.events import MoveTarget
-from lessons.lesson import Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option
+from lessons.teaching.challenge import Challenge, Score
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
 
 RANGE = Signal("position share", "%")
 TORQUE = Signal("torque share", "%")

@@ -8,11 +8,11 @@ You need: lesson "when-tasks-fight"; the rank of a matrix
 
 from __future__ import annotations
 
-from lessons.claim import Claim
-from lessons.control import Control
-from lessons.lesson import Ghost, Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
 
 HAND = Signal("error/position", "mm")
 TORQUE = Signal("torque share", "%")

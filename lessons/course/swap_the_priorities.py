@@ -8,12 +8,12 @@ You need: lesson "two-tasks"
 
 from __future__ import annotations
 
-from lessons.claim import Claim
-from lessons.control import Control
 from lessons.events import MoveLevel, MoveTarget
-from lessons.lesson import Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option, Value
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option, Value
 
 HAND = Signal("error/position", "mm")
 POSTURE = Signal("error/posture", "deg")

@@ -8,11 +8,11 @@ You need: lesson "two-tasks"; the null space of a matrix
 
 from __future__ import annotations
 
-from lessons.claim import Claim
-from lessons.control import Control
-from lessons.lesson import Lesson, Step, card_of
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Option
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
 
 HAND = Signal("error/position", "mm")
 Q1 = Signal("error/q1", "deg")

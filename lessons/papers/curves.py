@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lessons.jobs import Run
+from lessons.experiments.jobs import Run
 from lessons.plots.panels import Curve, Panel
 from lessons.plots.style import name
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.plots.panels import Picture
 
 CLOSE = 0.10

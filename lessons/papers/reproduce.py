@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lessons.jobs import Results, perform_all
+from lessons.experiments.jobs import Results, perform_all
 from lessons.papers.item import Check, Item, Row, Section, Table
 from lessons.papers.words import number
 from lessons.plots.draw import draw

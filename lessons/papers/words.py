@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from lessons.jobs import Run
+from lessons.experiments.jobs import Run
 from lessons.papers.item import Row
-from lessons.scenes import load_scene
+from lessons.scenes.catalog import load_scene
 
 
 def number(value: float | None) -> str:

@@ -13,8 +13,8 @@ from himpc.limits import Limits
 from himpc.references import Circle, Hold, Phase, Reference, Sinusoid
 from himpc.stack import Level, Stack
 from himpc.tasks import FrameOrientation, FramePosition, Joints
-from lessons.scene import Scene
-from lessons.settings import SceneSettings
+from lessons.scenes.torque_scene import Scene
+from lessons.settings.torque import SceneSettings
 from robots import Plant, PlantSettings, Robot, load_robot
 
 Array = NDArray[np.float64]

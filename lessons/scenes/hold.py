@@ -8,8 +8,8 @@ import numpy as np
 
 from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
-from lessons.scene import Scene
-from lessons.settings import SceneSettings
+from lessons.scenes.torque_scene import Scene
+from lessons.settings.torque import SceneSettings
 from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar
 
 PLANAR3_PLANT = PlantSettings(armature=(0.05, 0.05, 0.03))

@@ -6,8 +6,8 @@ import numpy as np
 
 from himpc.stack import Level
 from himpc.tasks import FramePosition
-from lessons.scene import Scene
-from lessons.settings import SceneSettings
+from lessons.scenes.torque_scene import Scene
+from lessons.settings.torque import SceneSettings
 from robots import load_robot
 
 

@@ -13,8 +13,8 @@ from himpc.references import Circle, Hold, Phase, Preview, Reference, Sinusoid
 from himpc.references.preview import sampled, times
 from himpc.stack import Level, Stack
 from himpc.tasks import FramePosition, Joints
-from lessons.scene import Scene
-from lessons.settings import SceneOptions, SceneSettings
+from lessons.scenes.torque_scene import Scene
+from lessons.settings.torque import SceneOptions, SceneSettings
 from robots import InputError, NominalSettings, PlantSettings, Robot, load_robot
 
 OMEGA = 2 * math.pi / 8

@@ -19,7 +19,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import parts_of
 from app.server.server import PageServer
 from lessons.course import COURSE, load_lesson
-from lessons.lesson import Lesson, Step
+from lessons.teaching.lesson import Lesson, Step
 
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT = 1200, 920

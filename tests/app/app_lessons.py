@@ -6,10 +6,10 @@ from app_browser import BETWEEN, key, press, row
 from playwright.sync_api import Locator, Page, expect
 
 from app.link.exercise import parts_of
-from lessons.challenge import Challenge
 from lessons.course import COURSE
-from lessons.lesson import Lesson, Step
-from lessons.prediction import Choice, Prediction, Sketch
+from lessons.teaching.challenge import Challenge
+from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.prediction import Choice, Prediction, Sketch
 
 RUN = 120_000  # ms for a scripted run on a busy machine
 

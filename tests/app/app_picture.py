@@ -14,7 +14,7 @@ from playwright.sync_api import expect, sync_playwright
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.server.server import PageServer
-from lessons.lesson import Step
+from lessons.teaching.lesson import Step
 
 OUT = Path(__file__).parents[2] / "docs" / "page.png"
 EXERCISE = Exercise("a-redundant-arm", 2)

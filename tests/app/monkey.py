@@ -31,7 +31,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 STRICT = ("himpc", "hiqp", "nhimpc")
 """Controllers that keep priorities to rounding."""

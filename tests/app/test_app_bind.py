@@ -22,8 +22,8 @@ from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.window import Window
 from lessons.events import Set
 from lessons.kinds import AnyEvent
-from lessons.scenes import load_scene
-from lessons.settings import SceneSettings, changed
+from lessons.scenes.catalog import load_scene
+from lessons.settings.torque import SceneSettings, changed
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from app.link.ring import Block
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
-from lessons.session import TRUTH_TICKS
-from lessons.settings import SceneSettings
+from lessons.session.torque import TRUTH_TICKS
+from lessons.settings.torque import SceneSettings
 from robots import InputError
 
 

@@ -18,7 +18,7 @@ from app.worker import main as worker
 from app.worker.follower import Shadow
 from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
-from lessons.lesson import Ghost
+from lessons.teaching.lesson import Ghost
 
 LONG = 60.0  # s
 

@@ -16,13 +16,13 @@ from app.link.ring import Block
 from app.worker.lesson.rows import BUCKETS, Record, thinned
 from app.worker.simulation import Body
 from himpc.telemetry import Layout
-from lessons.check import measured
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
 from lessons.kinds import changed_any, chosen, find_scene, prepared, setting_at
-from lessons.lesson import Step
-from lessons.run import parse_assignment
-from lessons.state import State, decode, encode, state_of
+from lessons.recording.run import parse_assignment
+from lessons.replay.state import State, decode, encode, state_of
+from lessons.teaching.check import measured
+from lessons.teaching.lesson import Step
 from robots import InputError
 
 

@@ -15,10 +15,10 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from app.link.messages import Post
 from app.server.server import PageServer
-from lessons.challenge import Challenge
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
-from lessons.run import parse_assignment
+from lessons.recording.run import parse_assignment
+from lessons.teaching.challenge import Challenge
 
 
 @pytest.fixture(scope="module")

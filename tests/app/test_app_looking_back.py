@@ -24,7 +24,7 @@ from himpc.telemetry import Layout
 from lessons.events import Push
 from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
-from lessons.table import as_csv, as_npz, named
+from lessons.recording.table import as_csv, as_npz, named
 from robots import Plant, PlantSettings, load_robot
 
 

@@ -25,7 +25,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import MissionView
 from app.server.server import PageServer
-from lessons.mobile.settings import MobileSettings
+from lessons.settings.velocity import MobileSettings
 from robots.collision import Ball, Box, Floor
 
 

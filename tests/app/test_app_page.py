@@ -36,7 +36,7 @@ from app.link.messages import Load
 from app.link.process import wait_until
 from app.server.server import PageServer
 from app.server.wake import WakeUp
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 from robots import CATALOG
 
 

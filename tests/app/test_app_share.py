@@ -9,8 +9,8 @@ from playwright.sync_api import Page, expect
 
 from app.client.learner import Learner
 from app.server.server import PageServer
-from lessons.settings import SceneSettings
-from lessons.state import decode
+from lessons.replay.state import decode
+from lessons.settings.torque import SceneSettings
 
 
 def horizon(learner: Learner) -> int:

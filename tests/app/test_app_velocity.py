@@ -16,7 +16,7 @@ from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.mobile.events import InsertTask, Release, RemoveTask
+from lessons.velocity_events import InsertTask, Release, RemoveTask
 
 
 def opened(scene: str) -> Iterator[Body]:

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
-from lessons.jobs import TIMING_KEYS
-from lessons.state import State, command_line, encode
+from lessons.experiments.jobs import TIMING_KEYS
+from lessons.replay.state import State, command_line, encode
 from robots import CATALOG
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ import json
 import pytest
 
 from app.__main__ import main
-from lessons.check import Verdict
 from lessons.course import COURSE
+from lessons.teaching.check import Verdict
 
 
 def test_lessons_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -38,16 +38,18 @@ def verdicts(fault: str) -> list[Verdict]:
 
 def test_a_fault_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """One sentence per fault; without one the exit code is 0."""
-    monkeypatch.setattr("lessons.check.check", lambda *args, **options: verdicts("it is false: 3 mm"))
+    monkeypatch.setattr(
+        "lessons.teaching.check.check", lambda *args, **options: verdicts("it is false: 3 mm")
+    )
     assert main(["lessons", "--check", "one-task"]) == 1
     assert "one-task, s: “Here.”: it is false: 3 mm" in capsys.readouterr().out.replace("\n", "")
-    monkeypatch.setattr("lessons.check.check", lambda *args, **options: verdicts(""))
+    monkeypatch.setattr("lessons.teaching.check.check", lambda *args, **options: verdicts(""))
     assert main(["lessons", "--check", "one-task"]) == 0
 
 
 def test_the_verdicts_as_json(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Standard output is one JSON object, valid also where nothing was measured."""
-    monkeypatch.setattr("lessons.check.check", lambda *args, **options: verdicts("it is false"))
+    monkeypatch.setattr("lessons.teaching.check.check", lambda *args, **options: verdicts("it is false"))
     assert main(["lessons", "--check", "one-task", "--json", "-"]) == 1
     result = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert result["sound"] is False

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lessons.scene import Scene
-from lessons.scenes import load_scene
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
 from robots import Robot, load_robot
 
 Array = NDArray[np.float64]

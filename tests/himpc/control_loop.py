@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from himpc import FrameOrientation, FramePosition, Joints, Level, Settings
 from himpc.configuration import Configuration
 from himpc.references import Hold, Preview
-from lessons.session import Session
+from lessons.session.torque import Session
 from robots import Robot
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from himpc import HIMPC, Joints, Level, Limits
 from lessons.events import MoveTarget, Set
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 from robots import Robot, load_robot
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from himpc import HIMPC, FramePosition, Joints, Level
 from himpc.telemetry import AT_TORQUE
 from lessons.events import Event, MoveLevel, MoveTarget, Set
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 from robots import InputError, Robot
 
 Array = NDArray[np.float64]

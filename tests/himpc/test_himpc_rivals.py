@@ -20,8 +20,8 @@ from himpc.plan import Plan
 from himpc.qp import QPSolution
 from himpc.references import Hold, Preview
 from himpc.rotation import log3
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.session.torque import Session
 from robots import InputError, NominalModel, NominalSettings, Robot, load_robot
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ from control_loop import field, rows_of
 from numpy.typing import NDArray
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Set
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 
 
 @pytest.fixture(scope="module")

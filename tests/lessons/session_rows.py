@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lessons.session import Session
+from lessons.session.torque import Session
 
 
 def value(session: Session, row: np.ndarray, name: str) -> np.ndarray:

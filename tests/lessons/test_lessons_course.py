@@ -13,20 +13,20 @@ import pytest
 from latex2mathml.converter import convert
 
 from himpc.telemetry import layout_of
-from lessons.challenge import Challenge, Score
-from lessons.check import Verdict, check
-from lessons.claim import Claim
-from lessons.control import Control
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
 from lessons.kinds import AnyScene, changed_any, paths_of
-from lessons.lesson import Card, Ghost, Lesson, Step, card_of
-from lessons.measure import DERIVED, Measure, Signal
-from lessons.mobile.telemetry import layout_of as mobile_layout_of
 from lessons.parallel import one_by_one
-from lessons.prediction import Choice, Option, Sketch, Value
-from lessons.run import parse_assignment
-from lessons.scene import Scene
+from lessons.recording.run import parse_assignment
+from lessons.scenes.torque_scene import Scene
+from lessons.session.velocity_rows import layout_of as mobile_layout_of
+from lessons.teaching.challenge import Challenge, Score
+from lessons.teaching.check import Verdict, check
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Card, Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import DERIVED, Measure, Signal
+from lessons.teaching.prediction import Choice, Option, Sketch, Value
 from robots import InputError
 
 HAND = Signal("error/position", "mm")

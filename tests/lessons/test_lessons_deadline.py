@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from session_rows import value
 
-from lessons.deadline import Outbox
 from lessons.events import MoveTarget, Reset, Set
-from lessons.run import run, with_assignments
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
-from lessons.settings import changed
+from lessons.recording.run import run, with_assignments
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.deadline import Outbox
+from lessons.session.torque import Session
+from lessons.settings.torque import changed
 
 ASIDE = ((0.01, MoveTarget("position", (0.6, 0.3))),)
 

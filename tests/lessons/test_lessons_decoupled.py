@@ -6,8 +6,8 @@ import numpy as np
 
 from himpc.htmpc import base_joints
 from lessons.kinds import find_scene, prepared
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.velocity import MobileSession
 
 SETTLED = 12
 """Ticks after a new task in which what must rest may still be braking."""

@@ -11,9 +11,9 @@ import pytest
 from session_rows import value
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set, as_data, from_data
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 from robots import InputError
 
 EVENTS: list[Event] = [

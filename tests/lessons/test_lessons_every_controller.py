@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from himpc import CONTROLLERS
-from lessons.run import run
-from lessons.scenes import SCENES, load_scene
-from lessons.settings import changed
-from lessons.summary import Recording
+from lessons.recording.run import run
+from lessons.recording.torque import Recording
+from lessons.scenes.catalog import SCENES, load_scene
+from lessons.settings.torque import changed
 from robots import CATALOG, load_robot
 
 SECONDS = 2.0

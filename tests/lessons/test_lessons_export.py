@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.export import script
 from lessons.kinds import prepared
-from lessons.mobile.events import Appear, InsertTask, MobileEvent, Release
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
-from lessons.scene import Scene
-from lessons.session import Session
-from lessons.state import State
+from lessons.replay.script import script
+from lessons.replay.state import State
+from lessons.scenes.torque_scene import Scene
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.torque import Session
+from lessons.session.velocity import MobileSession
+from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release
 
 ROOT = Path(__file__).parents[2]
 Events = Sequence[tuple[float, MobileEvent]]

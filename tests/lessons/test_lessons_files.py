@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from lessons.events import MoveTarget, Set, from_data
-from lessons.run import run, with_assignments
-from lessons.scene import Scene
-from lessons.scenes import SCENES, load_scene
-from lessons.session import Session
-from lessons.summary import arrays
+from lessons.recording.run import run, with_assignments
+from lessons.recording.torque import arrays
+from lessons.scenes.catalog import SCENES, load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 from robots import InputError
 
 

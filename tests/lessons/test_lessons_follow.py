@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.follow import Follower, followed, swapped
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.follower import Follower, followed, swapped
+from lessons.session.torque import Session
 from robots import InputError
 
 

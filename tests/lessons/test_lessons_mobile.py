@@ -12,17 +12,17 @@ import pytest
 from himpc.missions import Go
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.kinds import find_scene, prepared, run_scene, summary_of
-from lessons.mobile.events import Appear, InsertTask, MobileEvent, Release, RemoveTask, as_data, from_data
-from lessons.mobile.options import random_peaks
-from lessons.mobile.run import mobile_run
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
-from lessons.mobile.settings import changed, paths
-from lessons.mobile.summary import MobileRecording, mobile_arrays
 from lessons.papers import ITEMS
 from lessons.papers.htmpc_paper.runs import square
 from lessons.papers.htmpc_paper.squares import collinear
 from lessons.papers.printed import printed
+from lessons.recording.velocity import MobileRecording, mobile_arrays
+from lessons.recording.velocity_run import mobile_run
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.velocity import MobileSession
+from lessons.settings.missions import random_peaks
+from lessons.settings.velocity import changed, paths
+from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release, RemoveTask, as_data, from_data
 from robots import InputError
 from robots.collision import Ball, CollisionModel
 

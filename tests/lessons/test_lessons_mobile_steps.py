@@ -11,10 +11,10 @@ import pytest
 from himpc.htmpc import HTMPC, VelocityPlan
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.kinds import find_scene, prepared
-from lessons.mobile.events import MobileEvent
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
-from lessons.mobile.telemetry import AT_ACCELERATION, AT_VELOCITY
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.velocity import MobileSession
+from lessons.session.velocity_rows import AT_ACCELERATION, AT_VELOCITY
+from lessons.velocity_events import MobileEvent
 from robots.stretch import horizontal_reach
 
 OUT_OF_REACH = MoveTarget("base", (-1.5, 0.0))

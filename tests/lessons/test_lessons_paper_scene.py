@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lessons.run import run, with_assignments
-from lessons.scenes import load_scene
-from lessons.session import Session
-from lessons.settings import changed
-from lessons.summary import Recording, summary
+from lessons.recording.run import run, with_assignments
+from lessons.recording.torque import Recording, summary
+from lessons.scenes.catalog import load_scene
+from lessons.session.torque import Session
+from lessons.settings.torque import changed
 from robots import InputError
 
 Array = NDArray[np.float64]

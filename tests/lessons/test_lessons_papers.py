@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lessons.jobs import Job, Results, Run, perform_all
+from lessons.experiments.jobs import Job, Results, Run, perform_all
 from lessons.kinds import paths_of
 from lessons.papers import ITEMS
 from lessons.papers.himpc_paper.accuracy import model_errors

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from himpc.configuration import Configuration
-from lessons.run import run, with_assignments
-from lessons.scenes import load_scene
+from lessons.recording.run import run, with_assignments
+from lessons.recording.torque import Recording, summary
+from lessons.scenes.catalog import load_scene
 from lessons.scenes.planar import OMEGA, SingularOptions
-from lessons.session import Session
-from lessons.settings import changed, paths
-from lessons.summary import Recording, summary
+from lessons.session.torque import Session
+from lessons.settings.torque import changed, paths
 from robots import InputError
 
 SCENES = ("planar3-circle", "planar3-conflict", "planar3-singular")

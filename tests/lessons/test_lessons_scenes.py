@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from lessons.events import Event, MoveTarget, Push
-from lessons.run import run, with_assignments
-from lessons.scenes import load_scene
-from lessons.summary import Recording, summary
+from lessons.recording.run import run, with_assignments
+from lessons.recording.torque import Recording, summary
+from lessons.scenes.catalog import load_scene
 
 
 def record(

@@ -10,10 +10,10 @@ import pytest
 from session_rows import value
 
 from lessons.events import MoveTarget, Push, Set
-from lessons.run import run, with_assignments
-from lessons.scene import Scene
-from lessons.session import Session
-from lessons.summary import summary
+from lessons.recording.run import run, with_assignments
+from lessons.recording.torque import summary
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 
 
 def test_rows_tell_the_filtered_target(session: Session) -> None:

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lessons.run import parse_assignment, with_assignments
-from lessons.scenes import load_scene
-from lessons.settings import SceneSettings, changed, paths, value_at
+from lessons.recording.run import parse_assignment, with_assignments
+from lessons.scenes.catalog import load_scene
+from lessons.settings.torque import SceneSettings, changed, paths, value_at
 from robots import InputError
 
 START = load_scene("iiwa14-circle").settings

@@ -16,15 +16,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lessons.assignments import differences
 from lessons.events import MoveLevel, Set
 from lessons.kinds import AnyScene, changed_any, find_scene, paths_of, prepared, run_scene, settings_after
-from lessons.mobile.events import Appear, MobileEvent
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
-from lessons.scene import Scene
-from lessons.session import Session
-from lessons.state import MAX_CODE, State, command_line, decode, encode, settings_now, state_of
+from lessons.replay.state import MAX_CODE, State, command_line, decode, encode, settings_now, state_of
+from lessons.scenes.torque_scene import Scene
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.torque import Session
+from lessons.session.velocity import MobileSession
+from lessons.settings.assignments import differences
+from lessons.velocity_events import Appear, MobileEvent
 from robots import InputError
 
 find = cache(find_scene)

@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lessons.jobs import Job
-from lessons.parallel import Failed, on_cluster, on_cores, one_by_one
-from lessons.plots.heat import draw_map
-from lessons.sweep import (
+from lessons.experiments.jobs import Job
+from lessons.experiments.sweep import (
     Cell,
     best_cell,
     carry_on,
@@ -25,6 +23,8 @@ from lessons.sweep import (
     make_sweep,
     metrics,
 )
+from lessons.parallel import Failed, on_cluster, on_cores, one_by_one
+from lessons.plots.heat import draw_map
 from robots import InputError
 
 SHORT = Job("planar3-circle", duration=0.02)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from himpc import CONTROLLERS
 from lessons.events import MoveTarget, Reset, Set
-from lessons.handover import HANDOVER_SECONDS, Handover
-from lessons.scene import Scene
-from lessons.scenes import load_scene
-from lessons.session import Session
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.session.bumpless import HANDOVER_SECONDS, Handover
+from lessons.session.torque import Session
 
 Array = NDArray[np.float64]
 

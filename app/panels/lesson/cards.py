@@ -14,7 +14,7 @@ from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from lessons.course import COURSE, load_lesson
-from lessons.lesson import Lesson
+from lessons.teaching.lesson import Lesson
 
 Choose = Callable[[SceneChoice], None]
 

@@ -10,11 +10,11 @@ from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB, css
 from app.html.text import badge, bar, block, esc, figure
 from app.link.exercise import Curve, Exercise, Lecture, parts_of, signals_of
 from app.panels.lesson.drawing import Bound, chart
-from lessons.challenge import Challenge
-from lessons.claim import Claim
 from lessons.course import COURSE
-from lessons.lesson import Step
-from lessons.measure import Signal
+from lessons.teaching.challenge import Challenge
+from lessons.teaching.claim import Claim
+from lessons.teaching.lesson import Step
+from lessons.teaching.measure import Signal
 
 Part = Step | Challenge
 

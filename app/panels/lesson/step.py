@@ -18,9 +18,9 @@ from app.panels.lesson.claims import after, heading, idea, pictures, state
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.path_control import add_control
-from lessons.challenge import Challenge
 from lessons.kinds import AnyEvent, AnySettings
-from lessons.lesson import Step
+from lessons.teaching.challenge import Challenge
+from lessons.teaching.lesson import Step
 
 _AGAIN, _MINE, _RESET = "Run again", "Run with my settings", "Reset this step"
 _BACK, _SKIP, _ALL = "◀ Back", "Skip ▶", "All lessons"

@@ -13,10 +13,10 @@ from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
 from app.panels.widgets.snapshot import Snapshot
-from lessons.follow import swapped
 from lessons.kinds import AnySettings
-from lessons.lesson import Ghost
-from lessons.menu import controllers_for, usual_settings
+from lessons.session.follower import swapped
+from lessons.settings.presets import controllers_for, usual_settings
+from lessons.teaching.lesson import Ghost
 from robots import InputError
 
 _SAME = "as the robot"

@@ -16,7 +16,7 @@ from app.html.text import block
 from lessons.kinds import AnySettings
 from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
-from lessons.table import as_csv, as_npz, named
+from lessons.recording.table import as_csv, as_npz, named
 
 _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 

@@ -10,8 +10,8 @@ from app.client.learner import Learner
 from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import Told
-from lessons.export import script
-from lessons.state import State, command_line, decode, encode, state_of
+from lessons.replay.script import script
+from lessons.replay.state import State, command_line, decode, encode, state_of
 from robots import InputError
 
 

@@ -12,8 +12,8 @@ from app.panels.widgets.sliders import add_slider
 from app.panels.widgets.snapshot import Snapshot
 from himpc.controllers import CONTROLLERS
 from lessons.events import Set
-from lessons.handover import HANDOVER_SECONDS
-from lessons.settings import SceneSettings
+from lessons.session.bumpless import HANDOVER_SECONDS
+from lessons.settings.torque import SceneSettings
 from robots import Robot
 
 

@@ -10,7 +10,7 @@ from app.html.text import block
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import Set
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 _LOOKS = 9
 """Looks at the counters over which the share of late ticks is taken: about two seconds."""

@@ -7,7 +7,7 @@ import viser
 from app.html.text import block
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 from robots import Robot
 
 _SLIDERS = (

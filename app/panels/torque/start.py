@@ -13,7 +13,7 @@ from app.html.text import block, esc, quantity
 from app.panels.widgets.snapshot import Snapshot
 from app.view.reachability import Verdict
 from lessons.events import Push, Set
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 _DIRECTIONS = {
     "→ +x": (1, 0, 0),

@@ -14,7 +14,7 @@ from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
 from himpc.telemetry import RUNGS
 from lessons.events import MoveLevel, Set
-from lessons.settings import SceneSettings
+from lessons.settings.torque import SceneSettings
 
 _UP, _DOWN = "▲ Up", "▼ Down"
 

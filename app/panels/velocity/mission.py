@@ -13,8 +13,8 @@ from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import MissionRow, Status, TaskView
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import MoveLevel
-from lessons.mobile.events import InsertTask, Release, RemoveTask
-from lessons.mobile.settings import MobileSettings
+from lessons.settings.velocity import MobileSettings
+from lessons.velocity_events import InsertTask, Release, RemoveTask
 
 _EARLIER, _LATER, _REMOVE = "▲ Earlier", "▼ Later", "Remove"
 _END, _NOTHING = "at the end", "–"

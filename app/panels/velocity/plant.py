@@ -7,7 +7,7 @@ import viser
 from app.html.text import block
 from app.panels.widgets.mirror import Bindings, scalar
 from app.panels.widgets.sliders import add_box, add_menu, add_slider
-from lessons.mobile.settings import MobileSettings
+from lessons.settings.velocity import MobileSettings
 from robots.servo import MODES
 
 _SLIDERS = (

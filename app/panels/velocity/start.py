@@ -9,7 +9,7 @@ import viser
 from app.html.palette import RGB
 from app.html.text import badge, block, esc, quantity, swatch
 from app.panels.widgets.snapshot import Snapshot
-from lessons.mobile.settings import MobileSettings
+from lessons.settings.velocity import MobileSettings
 from robots.collision import Ball
 
 _STILL = 0.02

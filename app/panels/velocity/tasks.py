@@ -14,8 +14,8 @@ from app.panels.widgets.sliders import add_slider
 from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
 from lessons.events import Set
-from lessons.mobile.settings import MobileSettings
-from lessons.mobile.telemetry import RUNGS
+from lessons.session.velocity_rows import RUNGS
+from lessons.settings.velocity import MobileSettings
 
 
 class RolesPanel:

@@ -9,9 +9,9 @@ import viser
 
 from app.html.text import figure
 from app.panels.widgets.mirror import Bindings, scalar
-from lessons.control import Control
 from lessons.events import Set
 from lessons.kinds import AnySettings, chosen, setting_at
+from lessons.teaching.control import Control
 
 STEPS = 200
 """Places of a logarithmic slider."""

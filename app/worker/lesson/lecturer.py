@@ -15,7 +15,6 @@ import numpy as np
 from app.link.exercise import Answer, Curve, Exercise, Lecture, Phase, signals_of
 from app.worker.lesson.reference_run import ghost_of
 from app.worker.lesson.rows import Record, thinned
-from lessons.challenge import Challenge
 from lessons.kinds import (
     AnyEvent,
     AnySession,
@@ -26,9 +25,10 @@ from lessons.kinds import (
     settings_after,
     within,
 )
-from lessons.lesson import Step
-from lessons.measure import Measure, Signal
-from lessons.prediction import Choice, Grade, Sketch, Value
+from lessons.teaching.challenge import Challenge
+from lessons.teaching.lesson import Step
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Grade, Sketch, Value
 from robots import InputError
 
 _JUDGE_EVERY = 5  # reports: twice a second

@@ -7,7 +7,7 @@ from time import perf_counter
 from app.link.exercise import Exercise
 from app.worker.lesson.rows import Record
 from lessons.kinds import AnyScene, mission_over, session_of
-from lessons.lesson import Step
+from lessons.teaching.lesson import Step
 
 
 class GhostRun:

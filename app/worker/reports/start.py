@@ -4,7 +4,7 @@ from app.worker.reports.report import Run
 from app.worker.reports.torque import TorqueRun
 from app.worker.reports.velocity import VelocityRun
 from lessons.kinds import AnyScene
-from lessons.scene import Scene
+from lessons.scenes.torque_scene import Scene
 
 __all__ = ["Run", "TorqueRun", "VelocityRun", "start"]
 

@@ -9,8 +9,8 @@ from app.worker.reports.report import LISTED
 from himpc.tasks import Task
 from lessons.events import Event
 from lessons.kinds import AnyEvent
-from lessons.scene import Scene
-from lessons.session import Session
+from lessons.scenes.torque_scene import Scene
+from lessons.session.torque import Session
 from robots import convergence_gauge
 
 

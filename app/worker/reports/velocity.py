@@ -10,8 +10,8 @@ from himpc.htmpc import base_joints
 from himpc.missions import Go, MissionTask
 from himpc.tasks import FramePosition, Task
 from lessons.kinds import AnyEvent
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.session import MobileSession
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.velocity import MobileSession
 
 _ABOVE = np.array([0.0, 0.0, 0.015])
 """m, of predicted paths above the floor, so that it does not hide them."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.effort import EffortJob
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET
 from lessons.papers.himpc_paper.planar import RT1

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.planar import RT1
 from lessons.papers.item import Item, Section, Table, at_least
 from lessons.papers.words import number, trouble

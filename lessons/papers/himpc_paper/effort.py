@@ -13,7 +13,7 @@ from himpc.configuration import Configuration
 from himpc.controllers.forms import StackForm, measure, stack_form
 from himpc.references import Preview
 from himpc.references.hold import still
-from lessons.jobs import Job, Run
+from lessons.experiments.jobs import Job, Run
 from robots import Plant
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.curves import PLANAR_ERRORS, curve, error_panels, excerpt, joint_panels
 from lessons.papers.himpc_paper.planar import COMPARED, ENCODER, SOURCE, roughness, rt1, rt2, rt3
 from lessons.papers.item import Item, Section, Table, at_most

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.curves import PLANAR_ERRORS, curve, error_panels, joint_panels
 from lessons.papers.himpc_paper.planar import SOURCE, level_1, rt1, rt2, rt3
 from lessons.papers.item import Item, Row, Section

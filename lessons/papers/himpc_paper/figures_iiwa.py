@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.curves import by_controller, curve, excerpt
 from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
 from lessons.papers.himpc_paper.table_6 import horizon_job, horizons

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lessons.jobs import Job
+from lessons.experiments.jobs import Job
 
 RT4, RT4_DATA_SHEET = "iiwa14-circle-paper", "iiwa14-circle"
 SOURCE = "HIMPC (T-RO 2024), section VI"

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lessons.jobs import Job, Run
+from lessons.experiments.jobs import Job, Run
 
 RT1, RT2, RT3 = "planar3-circle", "planar3-conflict", "planar3-singular"
 COMPARED = ("osf", "tdeosf", "hqp", "himpc")

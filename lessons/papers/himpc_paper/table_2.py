@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.planar import (
     COMPARED,
     COORDINATES,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.planar import (
     COMPARED,
     SOURCE,

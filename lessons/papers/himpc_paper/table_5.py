@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import COORDINATES, DISTURBED, OPEN, RT4, RT4_DATA_SHEET, SOURCE, rt4
 from lessons.papers.item import Check, Item, Row, Section, Table, at_most
 from lessons.papers.printed import printed

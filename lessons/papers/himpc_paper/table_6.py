@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import OPEN, SOURCE, rt4
 from lessons.papers.item import Item, Row, Section, Table, at_most
 from lessons.papers.printed import printed

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.iiwa import RT4, SOURCE
 from lessons.papers.item import Item, Row, Section, Table, at_least
 from lessons.papers.printed import printed

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
 from lessons.papers.item import Check, Item, Row, Section, at_most
 from lessons.papers.printed import printed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.item import Check, Item, Section
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE, MobileJob
 from lessons.papers.item import Check, Item, Row, Section, Table, at_least, at_most
 from lessons.papers.printed import printed

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.jobs import Job, Run
+from lessons.experiments.jobs import Job, Run
 from lessons.kinds import find_scene, prepared
-from lessons.mobile.options import random_peaks
-from lessons.mobile.run import mobile_run
-from lessons.mobile.scene import MobileScene
-from lessons.mobile.summary import mobile_summary
+from lessons.recording.velocity import mobile_summary
+from lessons.recording.velocity_run import mobile_run
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.settings.missions import random_peaks
 
 Array = NDArray[np.float64]
 

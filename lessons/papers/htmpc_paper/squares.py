@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import gaussian_kde
 
-from lessons.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.htmpc_paper.runs import (
     EE_HOME,
     METHODS,

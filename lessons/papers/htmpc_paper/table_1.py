@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE, example, hand_mm, normalised
 from lessons.papers.item import Check, Item, Row, Section, Table
 from lessons.papers.printed import printed

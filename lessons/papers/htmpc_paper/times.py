@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, MobileJob, example
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.printed import printed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lessons.jobs import Job, Results
+from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE, MobileJob
 from lessons.papers.item import Item, Section, Table
 from lessons.papers.words import number, trouble

@@ -1,0 +1,109 @@
+"""Control-step times of the routes and solvers, taken side by side in one run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from himpc.cascade.cascade import Route
+from himpc.qp import Solver, is_installed
+from lessons.scenes.catalog import load_scene
+from lessons.session.torque import Session
+
+HORIZONS = (5, 10, 20, 30)
+CONTENDERS: tuple[tuple[Route, Solver], ...] = (
+    ("structured", "daqp"),
+    ("explicit", "daqp"),
+    ("explicit", "proxqp"),
+    ("explicit", "qpoases"),
+)
+"""The last takes part if CasADi is installed."""
+_LONGEST_EXPLICIT = 20
+"""The explicit route is left out beyond this horizon: one step takes seconds there."""
+_TURN = 5
+"""Ticks a contender runs before the next one has its turn: all of them see the same noise."""
+_BUDGET_S = 6.0
+"""A contender that has used this much wall time stops early; its number of ticks is reported."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Times of one contender, ms: the whole step (state in, torque out) and the QP solver's share."""
+
+    horizon: int
+    route: str
+    solver: str
+    ticks: int
+    step_ms: dict[str, float]
+    qp_ms: float
+
+
+def bench(
+    scene: str = "iiwa14-circle",
+    horizons: Sequence[int] = HORIZONS,
+    ticks: int = 300,
+    progress: Callable[[float], None] | None = None,
+) -> list[Timing]:
+    """Runs every contender on its own copy of a scene, in turns.
+
+    Args:
+        scene: the scene.
+        horizons: horizons N.
+        ticks: timed ticks per contender.
+        progress: called with the share that is done.
+    """
+    loaded = load_scene(scene)
+    timings = []
+    for place, N in enumerate(horizons):
+        sessions = {}
+        contenders = CONTENDERS if N <= _LONGEST_EXPLICIT else CONTENDERS[:1]
+        for route, solver in (each for each in contenders if is_installed(each[1])):
+            settings = replace(loaded.settings, horizon=N, route=route, solver=solver)
+            sessions[route, solver] = Session(replace(loaded, settings=settings))
+        steps: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
+        solves: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
+        for _ in range(-(-ticks // _TURN)):
+            for key, session in sessions.items():
+                for _ in range(_TURN if sum(steps[key]) < 1e3 * _BUDGET_S else 0):
+                    session.tick()
+                    if session.plan is not None:
+                        steps[key].append(session.plan.step_us / 1e3)
+                        solves[key].append(sum(level.qp_us for level in session.plan.levels) / 1e3)
+        timings += [
+            Timing(N, route, solver, len(times), _spread(times), float(np.median(solves[route, solver])))
+            for (route, solver), times in steps.items()
+        ]
+        if progress is not None:
+            progress((place + 1) / len(horizons))
+    return timings
+
+
+def _spread(times: list[float]) -> dict[str, float]:
+    return {
+        "median": float(np.median(times)),
+        "p95": float(np.percentile(times, 95)),
+        "p99": float(np.percentile(times, 99)),
+    }
+
+
+def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
+    """How many times slower than the structured route, and ProxQP's QP time over DAQP's, per horizon."""
+    found = {(t.horizon, t.route, t.solver): t for t in timings}
+    result = {}
+    for N in sorted({t.horizon for t in timings}):
+        structured = found[N, "structured", "daqp"].step_ms["median"]
+        if (N, "explicit", "daqp") not in found:
+            continue
+        daqp, proxqp = found[N, "explicit", "daqp"], found[N, "explicit", "proxqp"]
+        result[str(N)] = {
+            "explicit_daqp_over_structured": daqp.step_ms["median"] / structured,
+            "explicit_proxqp_over_structured": proxqp.step_ms["median"] / structured,
+            "proxqp_qp_over_daqp_qp": proxqp.qp_ms / daqp.qp_ms if daqp.qp_ms else None,
+        }
+        qpoases = found.get((N, "explicit", "qpoases"))
+        if qpoases is not None and daqp.qp_ms:
+            result[str(N)]["qpoases_qp_over_daqp_qp"] = qpoases.qp_ms / daqp.qp_ms
+    return result

@@ -1,0 +1,174 @@
+"""A run as a description that can be sent to another process, compared and used as a key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lessons.parallel import Failed, on_cores, one_by_one
+from lessons.recording.run import run, with_assignments
+from lessons.recording.torque import Recording, summary
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.torque_scene import Scene
+from lessons.settings.torque import changed
+
+Array = NDArray[np.float64]
+
+TIMING_KEYS = ("step_ms", "real_time_factor")
+"""Keys of a summary that differ from run to run; all others are the same to the bit."""
+
+_KEPT = ("t", "q", "v", "tau", "tau_demand", "tau_lower", "tau_upper", "v_limit", "at_bound", "delta_tau")
+_KEPT_PER_TASK = ("x", "x_d", "error")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of one scene. A subclass may run something else: see `do`.
+
+    Attributes:
+        scene: name of the scene.
+        controller: name of the controller.
+        set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
+        duration: simulated seconds; None: the scene's own.
+        seed: seed of the run.
+        timed: its step times are what it is run for: nothing else runs meanwhile.
+    """
+
+    scene: str
+    controller: str = "himpc"
+    set: tuple[str, ...] = ()
+    duration: float | None = None
+    seed: int = 0
+    timed: bool = False
+
+    def prepared(self) -> Scene:
+        """The scene with controller and assignments. Raises InputError for what cannot be."""
+        scene = load_scene(self.scene)
+        settings = with_assignments(changed(scene.settings, "controller", self.controller), self.set)
+        return replace(scene, settings=settings)
+
+    def do(self) -> Run:
+        """The run. Raises InputError for what cannot be."""
+        recording = run(self.prepared(), self.duration, self.seed)
+        return Run(self, summary(recording), _arrays(recording))
+
+    @property
+    def words(self) -> str:
+        """The command that does this run."""
+        parts = [f"himpc-lab run {self.scene} --controller {self.controller}"]
+        parts += [f"--set {assignment}" for assignment in self.set]
+        parts += [f"--duration {self.duration:g}"] if self.duration is not None else []
+        parts += [f"--seed {self.seed}"] if self.seed else []
+        return " ".join(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What came out of a job: the summary of `himpc-lab run --json` and the rows that plots need.
+
+    A run that failed has an `error`, an empty summary and no arrays; figures of it are NaN.
+    """
+
+    job: Job
+    summary: Mapping[str, Any]
+    arrays: Mapping[str, Array]
+    error: str | None = None
+
+    def __getitem__(self, field: str) -> Array:
+        """A field over time, (ticks, width); no rows if the run failed."""
+        return self.arrays.get(field, np.empty((0, 1)))
+
+    def column(self, field: str, k: int = 0) -> Array:
+        """One number of a field over time, (ticks,); no rows if the run failed."""
+        return self.arrays[field][:, k] if field in self.arrays else np.empty(0)
+
+    @property
+    def t(self) -> Array:
+        """Times of the rows, s."""
+        return self.column("t")
+
+    @property
+    def lost_at(self) -> float | None:
+        """When control was lost, s; None if it was not."""
+        return self.summary.get("diverged_at_s")
+
+    @property
+    def completed(self) -> bool:
+        """Ran to its end without losing control."""
+        return self.error is None and not self.summary["diverged"]
+
+    def figure(self, *path: str | int) -> float:
+        """A number of the summary, e.g. figure("limits", "torque", "max_ratio"); NaN where there is none."""
+        found: Any = self.summary
+        try:
+            for key in path:
+                found = found[key]
+        except (KeyError, IndexError):
+            return float("nan")
+        return float("nan") if found is None else float(found)
+
+    def error_of(self, task: str, coordinate: int = 0, measure: str = "rmse_after_1s") -> float:
+        """An error figure of one coordinate of a task, m or deg; NaN if there is none or control was lost."""
+        if not self.completed:
+            return float("nan")
+        tasks = self.summary.get("tasks", ())
+        place = next((k for k, each in enumerate(tasks) if each["name"] == task), -1)
+        return self.figure("tasks", place, measure, coordinate) if place >= 0 else float("nan")
+
+
+Results = Mapping[Job, Run]
+
+
+def _do(job: Job) -> Run:
+    return job.do()
+
+
+def _arrays(recording: Recording) -> dict[str, Array]:
+    layout = recording.layout
+    names = [
+        *_KEPT,
+        *(f"{field}/{task.name}" for task in layout.tasks for field in _KEPT_PER_TASK),
+        *(f"cost/{level}" for level in layout.levels),
+        "step_us",
+    ]
+    return {name: np.ascontiguousarray(recording[name]) for name in names}
+
+
+def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = None) -> Results:
+    """Does jobs, equal ones once: on all cores, then the timed ones one after the other in this process.
+
+    Args:
+        jobs: what to run.
+        progress: called after each job with the share of the expected work that is done.
+
+    Returns:
+        the runs by job. A job that cannot be done is a run with an error sentence.
+    """
+    # Long ones first: a core is not left idle at the end.
+    unique = sorted(dict.fromkeys(jobs), key=_work, reverse=True)
+    shared = [job for job in unique if not job.timed]
+    timed = [job for job in unique if job.timed]
+    total = sum(map(_work, unique))
+    found: dict[Job, Run] = {}
+    done = 0.0
+    for batch, spread in ((shared, on_cores), (timed, one_by_one)):
+        with closing(spread(_do, batch)) as outcomes:
+            for place, outcome in outcomes:
+                job = batch[place]
+                found[job] = Run(job, {}, {}, outcome.reason) if isinstance(outcome, Failed) else outcome
+                done += _work(job)
+                if progress is not None:
+                    progress(done / total)
+    return found
+
+
+def _work(job: Job) -> float:
+    """A guess of a job's cost, to order jobs and to show progress."""
+    horizons = [float(each.partition("=")[2]) for each in job.set if each.startswith("horizon=")]
+    horizon = horizons[-1] if horizons else 5.0
+    return (job.duration or 8.0) * (1.0 + 0.1 * horizon) * (20.0 if job.controller == "nhimpc" else 1.0)

@@ -1,0 +1,19 @@
+"""A grid of runs over one or more settings. A run that fails or loses control is a cell, not the end."""
+
+from lessons.experiments.sweep.cells import Cell, best_cell, check_metric, metrics
+from lessons.experiments.sweep.folder import carry_on, finished_cells
+from lessons.experiments.sweep.grid import Axis, Sweep, make_sweep
+from lessons.experiments.sweep.picture import draw_sweep
+
+__all__ = [
+    "Axis",
+    "Cell",
+    "Sweep",
+    "best_cell",
+    "carry_on",
+    "check_metric",
+    "draw_sweep",
+    "finished_cells",
+    "make_sweep",
+    "metrics",
+]

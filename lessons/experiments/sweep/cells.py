@@ -1,0 +1,94 @@
+"""A finished cell and what can be read from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lessons.experiments.jobs import TIMING_KEYS, Job
+from lessons.experiments.sweep.grid import Sweep
+from lessons.recording.run import run
+from lessons.recording.torque import summary
+from robots.errors import unknown_name
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A finished cell: the run's summary without its timing, or why there is none."""
+
+    index: int
+    summary: dict[str, Any] | None
+    error: str | None
+
+    @property
+    def diverged(self) -> bool:
+        """Ran, and lost control."""
+        return self.summary is not None and bool(self.summary["diverged"])
+
+    def value(self, metric: str) -> float:
+        """A metric of the run; NaN if it has none, failed or lost control."""
+        if self.summary is None or self.diverged:
+            return math.nan
+        return dict(_numbers(self.summary)).get(metric, math.nan)
+
+
+_NO_METRIC = ("seed", "duration_s", "level", "finite", "diverged")
+"""Numbers of a summary that are not worth a map."""
+
+
+def metrics(sweep: Sweep) -> list[str]:
+    """What can be shown of a cell, the default first; found by running one tick of the base scene."""
+    scene = sweep.base.prepared()
+    recording = run(scene, scene.settings.T_s, sweep.base.seed)
+    found = dict(_numbers(_without_timing(summary(recording))))
+    names = [name for name in found if not name.endswith(_NO_METRIC)]
+    seconds = scene.duration if sweep.base.duration is None else sweep.base.duration
+    measure = "rmse_after_1s" if seconds > 1.0 else "rmse"
+    first = min(summary(recording)["tasks"], key=lambda task: task["level"])["name"]
+    default = f"tasks.{first}.{measure}"
+    return [default, *(name for name in names if name != default)]
+
+
+def check_metric(metric: str, choices: Sequence[str]) -> str:
+    """The metric. Raises InputError if it is none of the choices."""
+    if metric not in choices:
+        raise unknown_name("metric", metric, choices)
+    return metric
+
+
+def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Every number of a summary by its dotted path; a list of numbers is the root of its sum of squares."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _numbers(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, list):
+        if all(isinstance(each, dict) for each in data):
+            for each in data:
+                yield from _numbers(each, f"{path}.{each.get('name')}")
+        elif path.startswith("average_cost"):
+            for place, each in enumerate(data, start=1):
+                yield f"{path}.{place}", math.nan if each is None else float(each)
+        elif not any(isinstance(each, str) for each in data):
+            known = data and all(each is not None for each in data)
+            yield path, math.sqrt(sum(each**2 for each in data)) if known else math.nan
+    elif data is None:
+        yield path, math.nan
+    elif not isinstance(data, str):
+        yield path, float(data)
+
+
+def _without_timing(data: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in data.items() if key not in TIMING_KEYS}
+
+
+def perform_cell(job: Job) -> dict[str, Any]:
+    """The summary of a run, without its timing. Raises InputError for what cannot be."""
+    return _without_timing(summary(run(job.prepared(), job.duration, job.seed)))
+
+
+def best_cell(cells: Sequence[Cell], metric: str) -> Cell | None:
+    """The cell with the least value of a metric; None if no cell has one."""
+    known = [cell for cell in cells if math.isfinite(cell.value(metric))]
+    return min(known, key=lambda cell: cell.value(metric), default=None)

@@ -1,0 +1,95 @@
+"""The folder of a sweep, so that a stopped one goes on where it was.
+
+It holds `sweep.json` (what is swept), `cells.jsonl` (one line per finished cell, appended as it finishes)
+and, at the end, `results.json` (the cells in the order of the grid).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from lessons.experiments.sweep.cells import Cell, perform_cell
+from lessons.experiments.sweep.grid import Sweep
+from lessons.parallel import Failed, Spread
+from robots import InputError
+
+
+def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
+    """The cells that the folder already holds; makes the folder if need be.
+
+    Raises:
+        InputError: the folder holds another sweep, or cannot be written.
+    """
+    wanted = sweep.as_data()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        definition, file = folder / "sweep.json", folder / "cells.jsonl"
+        if not definition.exists():
+            file.write_text("")
+            definition.write_text(json.dumps(wanted, indent=2) + "\n")
+        held = json.loads(definition.read_text())
+        if held != wanted:
+            different = ", ".join(key for key in wanted if held.get(key) != wanted[key])
+            raise InputError(
+                f"--out {folder} holds another sweep ({different} differ): give another folder, or repeat "
+                "the command that began it"
+            )
+        written = file.read_bytes()
+        whole = written[: written.rfind(b"\n") + 1]
+        if len(whole) < len(written):
+            # Whoever was stopped while writing left a torn line at the end: that cell is run again.
+            os.truncate(file, len(whole))
+        cells = [Cell(**json.loads(line)) for line in whole.splitlines()]
+    except OSError as error:
+        raise InputError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
+    except (json.JSONDecodeError, TypeError, AttributeError):
+        raise InputError(f"--out {folder}: its files are not a sweep's; give another folder") from None
+    return {cell.index: cell for cell in cells}
+
+
+def carry_on(
+    sweep: Sweep, folder: Path, spread: Spread, progress: Callable[[int, int], None] | None = None
+) -> list[Cell]:
+    """Runs the cells that are missing and writes `results.json`.
+
+    Args:
+        sweep: what is swept.
+        folder: where its cells are kept.
+        spread: how the work is spread.
+        progress: called with (finished cells, all cells).
+
+    Returns:
+        all cells in the order of the grid. Interrupted, everything finished so far is in the folder.
+    """
+    cells = finished_cells(sweep, folder)
+    total = len(sweep.points)
+    missing = [index for index in range(total) if index not in cells]
+    if progress is not None:
+        progress(len(cells), total)
+    work = spread(perform_cell, [sweep.job(index) for index in missing])
+    with (folder / "cells.jsonl").open("a") as file, closing(work) as outcomes:
+        for place, outcome in outcomes:
+            if isinstance(outcome, Failed):
+                cell = Cell(missing[place], None, outcome.reason)
+            else:
+                cell = Cell(missing[place], outcome, None)
+            file.write(json.dumps(asdict(cell), allow_nan=False) + "\n")
+            file.flush()
+            cells[cell.index] = cell
+            if progress is not None:
+                progress(len(cells), total)
+    ordered = [cells[index] for index in range(total)]
+    data = {**sweep.as_data(), "cells": [_as_data(sweep, cell) for cell in ordered]}
+    (folder / "results.json").write_text(json.dumps(data, indent=1, allow_nan=False) + "\n")
+    return ordered
+
+
+def _as_data(sweep: Sweep, cell: Cell) -> dict[str, Any]:
+    at = dict(zip((axis.path for axis in sweep.axes), sweep.points[cell.index], strict=True))
+    return {"at": at, "summary": cell.summary, "error": cell.error}

@@ -1,0 +1,119 @@
+"""What is swept: every combination of the values of one or more settings, on top of one run."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lessons.experiments.jobs import Job
+from lessons.settings.torque import SceneSettings, changed
+from robots import InputError
+
+MAX_CELLS = 100_000
+_DECADE = 10.0
+"""A range from `lo` to this many times `lo` or more is divided in equal ratios, not equal steps."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept path and its values; `log` if they are in equal ratios."""
+
+    path: str
+    values: tuple[float, ...]
+    log: bool
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is swept: every combination of the axes' values on top of a job."""
+
+    base: Job
+    axes: tuple[Axis, ...]
+
+    @cached_property
+    def points(self) -> list[tuple[float, ...]]:
+        """Values per axis of every cell, the last axis running fastest."""
+        return list(itertools.product(*(axis.values for axis in self.axes)))
+
+    def job(self, cell: int) -> Job:
+        """The run of a cell."""
+        at = zip(self.axes, self.points[cell], strict=True)
+        return replace(self.base, set=(*self.base.set, *(f"{axis.path}={value!r}" for axis, value in at)))
+
+    def as_data(self) -> dict[str, Any]:
+        """As JSON-ready data; two sweeps with equal data have equal cells."""
+        base = self.base
+        return {
+            "scene": base.scene,
+            "controller": base.controller,
+            "set": list(base.set),
+            "duration": base.duration,
+            "seed": base.seed,
+            "over": [{"path": axis.path, "values": list(axis.values)} for axis in self.axes],
+        }
+
+
+def make_sweep(base: Job, over: Sequence[str]) -> Sweep:
+    """A sweep from "PATH=lo:hi:n" texts.
+
+    Values go in equal steps, or in equal ratios if hi ≥ 10 lo > 0 and fractions are allowed there;
+    "PATH=lo:hi:n:lin" and "…:log" decide it. Settings that take whole numbers get whole numbers.
+
+    Raises:
+        InputError: a text that cannot be read, a path or value the scene refuses, or no or too many cells.
+    """
+    if not over:
+        raise InputError("--over is missing: give at least one, e.g. --over M_bar_scale=0.2:4:20")
+    settings = base.prepared().settings
+    axes = tuple(_axis(text, settings) for text in over)
+    paths = [axis.path for axis in axes]
+    if len(set(paths)) < len(paths):
+        raise InputError(f"--over names {max(paths, key=paths.count)} twice: give each path once")
+    cells = math.prod(len(axis.values) for axis in axes)
+    if cells > MAX_CELLS:
+        raise InputError(f"--over asks for {cells} cells: at most {MAX_CELLS}; take fewer values")
+    return Sweep(base, axes)
+
+
+def _axis(text: str, settings: SceneSettings) -> Axis:
+    path, equals, span = text.partition("=")
+    parts = span.split(":")
+    try:
+        if not equals or not path or len(parts) not in (3, 4) or parts[3:] not in ([], ["lin"], ["log"]):
+            raise ValueError
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise ValueError
+    except ValueError:
+        raise InputError(
+            f"--over {text}: write it as PATH=lo:hi:n, e.g. --over M_bar_scale=0.2:4:20 "
+            "(or …:20:log, …:20:lin)"
+        ) from None
+    if count < 1 or (count > 1 and not low < high):
+        raise InputError(f"--over {text}: needs lo < hi and n of 1 or more")
+    whole = _takes_whole_numbers(settings, path, low)
+    log = parts[3] == "log" if parts[3:] else low > 0 and high >= _DECADE * low and not whole
+    if log and low <= 0:
+        raise InputError(f"--over {text}: equal ratios need lo above 0; take …:lin")
+    spaced = np.geomspace(low, high, count) if log else np.linspace(low, high, count)
+    values = tuple(round(float(value)) if whole else float(f"{value:.9g}") for value in spaced)
+    if len(set(values)) < count:
+        raise InputError(f"--over {text}: {path} takes whole numbers, and {count} do not fit between them")
+    for value in values:
+        changed(settings, path, value)
+    return Axis(path, values, log)
+
+
+def _takes_whole_numbers(settings: SceneSettings, path: str, low: float) -> bool:
+    changed(settings, path, round(low) if low == round(low) else low)
+    try:
+        changed(settings, path, math.floor(low) + 0.5)
+    except InputError as error:
+        return "whole number" in str(error)
+    return False

@@ -1,0 +1,112 @@
+"""How to find M̄ without a model: Remark 4 of the HIMPC paper, step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lessons.recording.run import run
+from lessons.recording.torque import Recording, summary
+from lessons.scenes.torque_scene import Scene
+from lessons.settings.torque import changed
+from robots import InputError
+
+MAX_STEPS = 60
+
+
+@dataclass(frozen=True)
+class Step:
+    """One trial.
+
+    Attributes:
+        scale: factor on the scene's M̄.
+        M_bar: the diagonal tried, kg·m².
+        error: RMS of the level-1 error in the second half of the run, m or rad.
+        roughness: RMS over joints and ticks of the second half of Δτ over the joint's torque limit.
+        gauge: largest spectral radius of I − M⁻¹M̄ on the way; a tuner with a real robot does not know it.
+        verdict: "go on", "too small", "satisfactory", "noisy" or "control lost".
+    """
+
+    scale: float
+    M_bar: tuple[float, ...]
+    error: float
+    roughness: float
+    gauge: float
+    verdict: str
+
+
+def tune(
+    scene: Scene,
+    start: float,
+    factor: float,
+    accuracy: float,
+    noise: float,
+    seconds: float,
+    seed: int = 0,
+) -> Iterator[Step]:
+    """Remark 4: begin with a sufficiently small M̄; increase it until tracking is satisfactory or the closed
+    loop almost shows a noisy response.
+
+    All M̄_i grow together. `chosen` tells which step is the result.
+
+    Args:
+        scene: where it is tuned; its M̄ gives the proportions.
+        start: first factor on the scene's M̄.
+        factor: from one step to the next, > 1.
+        accuracy: a level-1 error below this, m or rad, is satisfactory.
+        noise: a roughness above this is noisy.
+        seconds: simulated seconds per step.
+        seed: seed of the runs.
+
+    Raises:
+        InputError: a start, factor, accuracy or noise that leads nowhere.
+    """
+    for name, value in (("start", start), ("accuracy", accuracy), ("noise", noise)):
+        if not (math.isfinite(value) and value > 0):
+            raise InputError(f"--{name} is {value}: give a finite number above 0")
+    if not 1.01 <= factor <= 10:
+        raise InputError(f"--factor is {factor}: give a factor from 1.01 to 10, e.g. 1.5")
+    scale, kept_control = start, False
+    for _ in range(MAX_STEPS):
+        settings = changed(scene.settings, "M_bar_scale", scene.settings.M_bar_scale * scale)
+        recording = run(replace(scene, settings=settings), seconds, seed)
+        error, roughness = _error(recording), _roughness(recording)
+        if recording.session.diverged_at is not None:
+            # Before anything worked it is lost for want of estimation, afterwards for too much of it.
+            verdict = "control lost" if kept_control else "too small"
+        elif roughness > noise:
+            verdict = "noisy"
+        else:
+            verdict = "satisfactory" if error <= accuracy else "go on"
+            kept_control = True
+        yield Step(
+            scale=scale,
+            M_bar=tuple(float(f"{value * settings.M_bar_scale:.3g}") for value in settings.M_bar),
+            error=error,
+            roughness=roughness,
+            gauge=float(np.nanmax(recording["gauge_radius"])),
+            verdict=verdict,
+        )
+        if verdict not in ("go on", "too small"):
+            return
+        scale *= factor
+
+
+def chosen(steps: list[Step]) -> Step | None:
+    """The step with the least error among those that kept control without noise; None if none did."""
+    good = [step for step in steps if step.verdict in ("go on", "satisfactory")]
+    return min(good, key=lambda step: step.error, default=None)
+
+
+def _error(recording: Recording) -> float:
+    first = min(summary(recording)["tasks"], key=lambda task: task["level"])["name"]
+    error = recording[f"error/{first}"]
+    return float(np.sqrt((error[len(error) // 2 :] ** 2).sum(axis=1).mean()))
+
+
+def _roughness(recording: Recording) -> float:
+    steps = recording["delta_tau"] / recording.session.robot.tau_limit
+    return float(np.sqrt((steps[len(steps) // 2 :] ** 2).mean()))

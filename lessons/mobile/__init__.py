@@ -1,1 +1,0 @@
-"""Velocity-level scenes: missions for a mobile manipulator, their headless session and its summary."""

@@ -1,0 +1,1 @@
+"""A run as data: rows, summary, arrays, tables."""

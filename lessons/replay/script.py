@@ -1,0 +1,142 @@
+"""A run as a short Python script that repeats it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from lessons.events import Reset
+from lessons.kinds import AnySettings, settings_after
+from lessons.replay.state import State
+from lessons.settings.assignments import differences
+from lessons.settings.torque import SceneSettings
+from lessons.velocity_events import MobileEvent
+
+Log = Sequence[tuple[float, MobileEvent]]
+_COMMON = ("Set", "MoveLevel", "MoveTarget", "Push")
+
+
+def script(state: State, log: Log, duration: float) -> str:
+    """A stand-alone script that repeats a run to the last bit on the same machine.
+
+    What was before the last reset is left out: the script begins there, with the settings that were in force.
+
+    Args:
+        state: what the run started from, before anything in the log.
+        log: `Session.log`, (time in s, event) of every event that took effect.
+        duration: s since the last reset, `Session.t`.
+
+    Raises:
+        InputError: the state cannot be prepared, or its settings cannot be told as assignments.
+    """
+    scene = state.prepared()
+    resets = [place for place, (_, event) in enumerate(log) if isinstance(event, Reset)]
+    start = resets[-1] + 1 if resets else 0
+    settings = settings_after(scene.settings, (event for _, event in log[:start]))
+    assignments = differences(state.loaded(), settings)
+    events = log[start:]
+    find = ", ".join(repr(each) for each in _arguments(state))
+    parts = [
+        _HEAD.format(
+            what=f"{state.scene} under {settings.controller}, {duration:g} s",
+            when=" since the last reset" if resets else "",
+            caution=_CAUTION if _measures_time(settings, events) else "",
+        ),
+        *_imports(events),
+        _IMPORTS,
+        f"SCENE = find_scene({find})",
+        _tuple("SETTINGS", (repr(each) for each in assignments)),
+        _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
+        f"DURATION = {_literal(float(duration))}  # s",
+        f"SEED = {state.seed}",
+        _TAIL,
+    ]
+    return "\n".join(parts)
+
+
+_HEAD = '''"""{what}{when}, as exported by himpc-lab.
+
+python THIS_FILE [FILE.npz] repeats the run, prints its summary and saves one row per control tick.{caution}
+"""
+
+import json
+import os
+import sys
+from dataclasses import replace
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as himpc-lab does, before NumPy is imported
+
+import numpy as np
+'''
+
+_CAUTION = """
+Measured computing times took part in it, so every repetition comes out a little different."""
+
+_IMPORTS = """from lessons.kinds import arrays_of, find_scene, prepared, run_scene, summary_of
+"""
+
+_TAIL = """
+scene = replace(prepared(SCENE, None, SETTINGS), events=EVENTS)
+recording = run_scene(scene, DURATION, SEED, to_the_end=True)
+print(json.dumps(summary_of(recording), indent=2))
+if len(sys.argv) > 1:
+    np.savez_compressed(sys.argv[1], **arrays_of(recording, {"scene": SCENE.name, "seed": SEED}))
+"""
+
+
+def _arguments(state: State) -> tuple[str | None, ...]:
+    if state.tip is not None:
+        return (state.scene, state.urdf, state.tip)
+    return (state.scene,) if state.urdf is None else (state.scene, state.urdf)
+
+
+def _measures_time(settings: AnySettings, events: Log) -> bool:
+    """Whether the clock on the wall ever decided anything."""
+    for event in (None, *(event for _, event in events)):
+        settings = settings if event is None else settings_after(settings, (event,))
+        if not isinstance(settings, SceneSettings):
+            if settings.delay_measured:
+                return True
+        elif settings.deadline_ms and not settings.solve_ms_per_knot:
+            return True
+    return False
+
+
+def _imports(events: Log) -> list[str]:
+    names = sorted({type(event).__name__ for _, event in events})
+    lines = []
+    for module, own in (
+        ("lessons.events", [name for name in names if name in _COMMON]),
+        ("lessons.velocity_events", [name for name in names if name not in _COMMON]),
+    ):
+        lines += [f"from {module} import {', '.join(own)}"] if own else []
+    # kinds sorts between the two; a script is not linted, but it should look as if.
+    return lines
+
+
+def _tuple(name: str, items: Iterable[str]) -> str:
+    lines = "".join(f"    {item},\n" for item in items)
+    return f"{name} = (\n{lines})" if lines else f"{name} = ()"
+
+
+def _call(event: MobileEvent) -> str:
+    """An event as the call that makes it; what is as by default is left out."""
+    given = [
+        f"{field.name}={_literal(value)}" if place > 1 else _literal(value)
+        for place, field in enumerate(fields(event))
+        if (value := getattr(event, field.name)) != field.default
+    ]
+    return f"{type(event).__name__}({', '.join(given)})"
+
+
+def _literal(value: Any) -> str:
+    """A Python literal: NumPy's numbers and arrays as plain ones."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _literal(value.tolist())
+    if isinstance(value, (list, tuple)):
+        inner = ", ".join(_literal(each) for each in value)
+        return f"[{inner}]" if isinstance(value, list) else f"({inner},)" if len(value) == 1 else f"({inner})"
+    return repr(value)

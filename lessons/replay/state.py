@@ -1,0 +1,236 @@
+"""A whole setting as data, as a short code to pass on, and as a command line."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import re
+import shlex
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from lessons.course import COURSE
+from lessons.kinds import AnyScene, AnySettings, find_scene, prepared
+from lessons.recording.run import parse_assignment
+from lessons.scenes.catalog import SCENES
+from lessons.scenes.missions import MOBILE_SCENES
+from lessons.session.torque import Session
+from lessons.session.velocity import MobileSession
+from lessons.settings.assignments import differences
+from lessons.settings.missions import OrderOptions
+from lessons.settings.torque import SceneSettings
+from robots import CATALOG, InputError
+from robots.errors import unknown_name
+
+VERSION = 1
+"""Of the code; it changes when an older himpc-lab could not read it."""
+
+MAX_CODE = 12_000
+"""Characters: a link or a chat line still carries that."""
+_MAX_TEXT = 60_000
+_MAX_ASSIGNMENTS = 500
+_MAX_ASSIGNMENT = 2_000
+_MAX_SEED = 2**63 - 1
+_PREFIX = re.compile(r"hl(\d{1,6})-")
+_KEYS = {"scene": "s", "urdf": "r", "tip": "t", "set": "a", "seed": "n", "lesson": "l", "step": "p"}
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that is set, and nothing that has happened.
+
+    Attributes:
+        scene: its name.
+        urdf: for the scene "hold": name of a catalog robot, or path of a URDF file.
+        tip: end-effector frame, for the scene "hold".
+        set: what differs from the scene's own settings, assignments "PATH=VALUE" in order.
+        seed: of the run.
+        lesson: name of the lesson that is being taken.
+        step: its place in the lesson, 1 being the first.
+    """
+
+    scene: str
+    urdf: str | None = None
+    tip: str | None = None
+    set: tuple[str, ...] = ()
+    seed: int = 0
+    lesson: str | None = None
+    step: int | None = None
+
+    def loaded(self) -> AnyScene:
+        """The scene as it is without the assignments. Raises InputError for one that cannot be loaded."""
+        return find_scene(self.scene, self.urdf, self.tip)
+
+    def prepared(self) -> AnyScene:
+        """The scene with every assignment. Raises InputError, one sentence, for what cannot be."""
+        return prepared(self.loaded(), None, self.set)
+
+
+def state_of(
+    scene: str,
+    settings: AnySettings,
+    *,
+    urdf: str | None = None,
+    tip: str | None = None,
+    seed: int = 0,
+    lesson: str | None = None,
+    step: int | None = None,
+) -> State:
+    """The state of a scene under settings reached from its own.
+
+    Raises:
+        InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
+    """
+    own = find_scene(scene, urdf, tip)
+    return State(scene, urdf, tip, differences(own, settings), seed, lesson, step)
+
+
+def settings_now(session: Session | MobileSession) -> AnySettings:
+    """The settings in force in a session. At velocity level priorities belong to the run: where a scene can
+    begin with others, those of now stand among the settings."""
+    settings = session.settings
+    if isinstance(settings, SceneSettings) or not isinstance(settings.options, OrderOptions):
+        return settings
+    assert isinstance(session, MobileSession)
+    names = [task.name for task in session.progress.mission]
+    order = tuple(name for name in names if name in session.roles)
+    if len(order) < len(session.roles):
+        return settings
+    own = () if order == tuple(session.roles) and not settings.options.order else order
+    return replace(settings, options=replace(settings.options, order=own))
+
+
+def command_line(state: State) -> str:
+    """The line for a shell that runs the state headless."""
+    words = ["himpc-lab", "run", state.scene]
+    words += ["--urdf", state.urdf] if state.urdf is not None else []
+    words += ["--tip", state.tip] if state.tip is not None else []
+    assignments = list(state.set)
+    if assignments and assignments[0].startswith("controller="):
+        words += ["--controller", str(parse_assignment(assignments.pop(0))[1])]
+    words += ["--seed", str(state.seed)] if state.seed else []
+    for each in assignments:
+        words += ["--set", each]
+    return shlex.join(words)
+
+
+# ------------------------------------------------------------------ codes
+
+
+def encode(state: State) -> str:
+    """The state as a code that fits into a link: letters, digits, "-" and "_".
+
+    Raises:
+        InputError: the robot comes from a file, which a code cannot carry; or it would be too long.
+    """
+    if state.urdf is not None and state.urdf not in CATALOG:
+        raise InputError(
+            "a code cannot carry a robot from a file: pass on the file and the command line instead"
+        )
+    given = {_KEYS[name]: value for name, value in vars(state).items() if value not in (None, (), 0)}
+    text = json.dumps(given, ensure_ascii=False, separators=(",", ":")).encode()
+    code = f"hl{VERSION}-" + base64.urlsafe_b64encode(zlib.compress(text, 9)).decode().rstrip("=")
+    if len(code) > MAX_CODE or len(text) > _MAX_TEXT or not _fits(state.set):
+        raise InputError("this setting is too long for a code: use the command line or the script instead")
+    return code
+
+
+def decode(code: str) -> State:
+    """The state of a code. It is data only: names and numbers, which are checked once more when the scene is
+    prepared; nothing in it is executed, and it opens no file.
+
+    Raises:
+        InputError: the text is no code, incomplete, changed, or made by a newer version.
+    """
+    body = _body("".join(code.split()))
+    try:
+        packed = base64.urlsafe_b64decode(body + "=" * (-len(body) % 4))
+        if base64.urlsafe_b64encode(packed).decode().rstrip("=") != body:
+            raise ValueError
+        unpacking = zlib.decompressobj()
+        text = unpacking.decompress(packed, _MAX_TEXT)
+        if not unpacking.eof or unpacking.unused_data:
+            raise ValueError
+        given = json.loads(text.decode(), parse_constant=_no_constant)
+    except (ValueError, binascii.Error, zlib.error, RecursionError):
+        raise InputError("the code is incomplete or was changed on its way: copy all of it again") from None
+    return _checked(given)
+
+
+def _body(code: str) -> str:
+    found = _PREFIX.match(code)
+    if found is None or not re.fullmatch(r"[\w-]+", code, re.ASCII):
+        raise InputError(
+            f"this is no state code: one begins with hl{VERSION}- and has no other signs than - and _"
+        )
+    if int(found[1]) > VERSION:
+        raise InputError(
+            f"the code was made by a newer himpc-lab (format {found[1]}, this one reads {VERSION}): update it"
+        )
+    if int(found[1]) < 1:
+        raise InputError(f"this is no state code: there is no format {found[1]}, the first one is 1")
+    if len(code) > MAX_CODE:
+        raise InputError(
+            f"the code has {len(code)} characters and at most {MAX_CODE} are allowed: copy it again"
+        )
+    return code[found.end() :]
+
+
+def _no_constant(constant: str) -> Any:
+    raise ValueError(constant)
+
+
+def _checked(given: Any) -> State:
+    if not isinstance(given, dict) or not given.keys() <= set(_KEYS.values()):
+        raise InputError("the code holds something else than a state of himpc-lab: copy it again")
+    scene = _text(given, "s", "scene") or ""
+    if scene not in SCENES and scene not in MOBILE_SCENES:
+        raise unknown_name("scene", scene, (*SCENES, *MOBILE_SCENES))
+    urdf = _text(given, "r", "robot")
+    if urdf is not None and urdf not in CATALOG:
+        raise InputError(
+            "the code names a robot that is not in the catalog, and a code may not open files: "
+            "start with --urdf and your own file instead"
+        )
+    assignments = given.get("a", [])
+    if not isinstance(assignments, list) or not all(isinstance(each, str) for each in assignments):
+        raise _wrong("list of settings")
+    if not _fits(assignments):
+        raise _wrong("number or length of settings")
+    lesson = _text(given, "l", "lesson")
+    if lesson is not None and lesson not in COURSE:
+        raise unknown_name("lesson", lesson, COURSE)
+    return State(
+        scene,
+        urdf,
+        _text(given, "t", "tip"),
+        tuple(assignments),
+        _whole(given, "n", "seed", _MAX_SEED) or 0,
+        lesson,
+        _whole(given, "p", "step", 100),
+    )
+
+
+def _fits(assignments: tuple[str, ...] | list[str]) -> bool:
+    return len(assignments) <= _MAX_ASSIGNMENTS and all(len(each) <= _MAX_ASSIGNMENT for each in assignments)
+
+
+def _wrong(what: str) -> InputError:
+    return InputError(f"the {what} in the code cannot be: copy it again")
+
+
+def _text(given: Mapping[str, Any], key: str, what: str) -> str | None:
+    value = given.get(key)
+    if value is not None and not (isinstance(value, str) and len(value) <= 200 and value.isprintable()):
+        raise _wrong(what)
+    return value
+
+
+def _whole(given: Mapping[str, Any], key: str, what: str, largest: int) -> int | None:
+    value = given.get(key)
+    if value is not None and not (type(value) is int and 0 <= value <= largest):
+        raise _wrong(what)
+    return value

@@ -1,0 +1,120 @@
+"""The mobile manipulator's scenes: hold, square wave, waypoints, delivery, handover, cluttered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from himpc.htmpc import HTMPCSettings
+from himpc.stack import Level
+from himpc.tasks import FrameOrientation, FramePosition
+from lessons.events import MoveTarget
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.settings.missions import (
+    CLUTTER,
+    ClutteredOptions,
+    DeliveryOptions,
+    HandoverOptions,
+    MobileOptions,
+    SquareOptions,
+    Stay,
+    WaypointOptions,
+)
+from lessons.settings.velocity import STAGE_WEIGHT, MobileSettings
+from lessons.velocity_events import MobileEvent, Release
+from robots import Robot, load_robot
+
+MOBILE_SCENES: dict[str, str] = {
+    "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
+    "ridgeback-ur10-square": "the HTMPC paper's test: the hand stays, the base is sent out of reach and back",
+    "ridgeback-ur10-waypoints": "two places for the hand; the base finds its own way past the first (Fig. 8)",
+    "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
+    "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
+    "ridgeback-ur10-cluttered": "the base is sent past obstacles it must keep clear of",
+    "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
+    "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
+}
+"""One line per scene."""
+
+DELIVERY_SPEEDS = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0)
+"""m/s and rad/s: a robot that works among people."""
+
+
+def mobile_scene(name: str) -> MobileScene:
+    """A scene of MOBILE_SCENES."""
+    return _MAKERS[name]()
+
+
+def _ridgeback(
+    name: str, options: MobileOptions, duration: float, events: tuple[tuple[float, MobileEvent], ...] = ()
+) -> MobileScene:
+    levels = (
+        Level((FramePosition(name="ee"),), Q=STAGE_WEIGHT["proximal"]),
+        Level((FramePosition(name="base", frame="base", axes="xy"),), Q=STAGE_WEIGHT["proximal"]),
+    )
+    return _scene(name, load_robot("ridgeback-ur10"), levels, options, duration, events)
+
+
+def _scene(
+    name: str,
+    robot: Robot,
+    levels: tuple[Level, ...],
+    options: MobileOptions,
+    duration: float,
+    events: tuple[tuple[float, MobileEvent], ...] = (),
+) -> MobileScene:
+    return MobileScene(
+        name=name,
+        title=MOBILE_SCENES[name],
+        robot=robot,
+        settings=MobileSettings(HTMPCSettings(levels), options=options),
+        q_0=robot.home,
+        duration=duration,
+        events=events,
+    )
+
+
+def _among_people(scene: MobileScene) -> MobileScene:
+    return replace(scene, robot=replace(scene.robot, v_limit=np.array(DELIVERY_SPEEDS)))
+
+
+def _handover() -> MobileScene:
+    """The ball is taken after 14 s; meanwhile the second person moves, and shifts the hand later on."""
+    events = (
+        (8.0, MoveTarget("base 2", (-1.2, -0.4))),
+        (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),
+        (14.0, Release("ee 1")),
+        (17.5, MoveTarget("ee 2", (-1.9, -0.4, 1.0))),
+        (24.0, Release("ee 2")),
+    )
+    return _among_people(_ridgeback("ridgeback-ur10-handover", HandoverOptions(), 60.0, events))
+
+
+def _cluttered() -> MobileScene:
+    scene = _ridgeback("ridgeback-ur10-cluttered", ClutteredOptions(), 30.0)
+    htmpc = replace(scene.settings.htmpc, obstacles=CLUTTER)
+    return replace(scene, settings=replace(scene.settings, htmpc=htmpc))
+
+
+def _arm(robot: str) -> MobileScene:
+    levels = (
+        Level((FramePosition(name="position"),), Q=STAGE_WEIGHT["proximal"]),
+        Level((FrameOrientation(name="orientation"),), Q=STAGE_WEIGHT["proximal"]),
+    )
+    return _scene(f"{robot}-htmpc", load_robot(robot), levels, Stay(), 4.0)
+
+
+_MAKERS: dict[str, Callable[[], MobileScene]] = {
+    "ridgeback-ur10-drag": lambda: _ridgeback("ridgeback-ur10-drag", Stay(), 8.0),
+    "ridgeback-ur10-square": lambda: _ridgeback("ridgeback-ur10-square", SquareOptions(), 16.0),
+    "ridgeback-ur10-waypoints": lambda: _ridgeback("ridgeback-ur10-waypoints", WaypointOptions(), 60.0),
+    "ridgeback-ur10-delivery": lambda: _among_people(
+        _ridgeback("ridgeback-ur10-delivery", DeliveryOptions(), 400.0)
+    ),
+    "ridgeback-ur10-handover": _handover,
+    "ridgeback-ur10-cluttered": _cluttered,
+    "iiwa14-htmpc": lambda: _arm("iiwa14"),
+    "panda-htmpc": lambda: _arm("panda"),
+}

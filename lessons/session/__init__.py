@@ -1,0 +1,1 @@
+"""The headless loop of one run, at torque and at velocity level."""

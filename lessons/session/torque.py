@@ -1,0 +1,269 @@
+"""The headless loop: one scene, one controller, one plant, one mailbox."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.controllers import make_controller
+from himpc.plan import Binding, Plan
+from himpc.references import Preview, Reference, Target
+from himpc.rotation import quaternion
+from himpc.stack import Stack
+from himpc.tasks import FramePosition, Task
+from himpc.telemetry import Layout, layout_of, write_plan
+from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.scenes.torque_scene import Scene
+from lessons.session.bumpless import Handover, settled
+from lessons.session.deadline import Outbox
+from lessons.session.leak import dynamic_leak
+from lessons.session.targets import move_target, target_at
+from lessons.settings.levels import moved
+from lessons.settings.torque import SceneSettings, changed
+from robots import InputError, Plant, convergence_gauge
+
+Array = NDArray[np.float64]
+
+TRUTH_TICKS = 20
+"""What needs the plant's M (the gauge of M̄ and the honest leak) is refreshed every so many ticks."""
+
+LOST_POSITION = 0.5
+"""m: a level-1 position error above this counts as divergence."""
+LOST_SPEED = 20.0
+"""A joint faster than this many times its limit counts as divergence."""
+
+
+class Session:
+    """One learner's run. `tick` advances one control period; events wait in the mailbox until then.
+
+    Attributes:
+        scene: what it started from.
+        seed: seed of the run; all randomness must come from it.
+        robot: the scene's robot.
+        plant: the simulation.
+        settings: the settings in force.
+        layout: where the fields of a row lie.
+        plan: the last plan, None before the first tick.
+        notices: sentences for the learner (refused events, divergence); drain them.
+        log: (time, event) of every event that took effect.
+    """
+
+    def __init__(self, scene: Scene, seed: int = 0) -> None:
+        """Raises InputError if the scene's settings do not fit its robot."""
+        self.scene = scene
+        self.seed = seed
+        self.robot = scene.robot
+        self.settings: SceneSettings = scene.settings
+        self.plant = Plant(scene.robot, scene.settings.plant)
+        self.controller = make_controller(
+            scene.settings.controller, scene.robot, scene.settings.for_controller()
+        )
+        self.layout: Layout = layout_of(scene.robot, scene.settings.levels)
+        self.notices: list[str] = []
+        self.log: list[tuple[float, Event]] = []
+        self._mailbox: deque[Event] = deque()
+        self._data = scene.robot.model.createData()
+        self._row = np.full(self.layout.size, np.nan)
+        self.reset()
+
+    @property
+    def t(self) -> float:
+        """Simulated time since the last reset, s."""
+        return self.plant.t
+
+    def reset(self) -> None:
+        """Back to the scene's start with the settings as they are."""
+        scene = self.scene
+        self.plant.reset(scene.q_0, scene.v_0, scene.tau_0)
+        self.controller.reset(self.plant.tau)
+        self.references = self._fresh_references()
+        self.plan: Plan | None = None
+        self.diverged_at: float | None = None
+        self._script = deque(scene.events)
+        self._push_until = math.inf
+        self._ticks = 0
+        self._outbox = Outbox()
+        self._hands = _hands(self.settings.levels)
+        self._truth = (math.nan, math.nan, math.nan)
+
+    def _fresh_references(self) -> dict[str, Reference]:
+        motion = self.settings.options or self.scene
+        given = dict(motion.references(self.robot, self.settings.levels))
+        start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
+        for task in _tasks(self.settings.levels):
+            if task.name not in given:
+                given[task.name] = target_at(task, task.value(start))
+        return given
+
+    def target(self, task: str) -> Target | None:
+        """The draggable target of a task, None if its reference is a fixed motion."""
+        reference = self.references.get(task)
+        return reference if isinstance(reference, Target) else None
+
+    def post(self, event: Event) -> None:
+        """Puts an event in the mailbox; it takes effect at the next tick, or leaves a notice."""
+        self._mailbox.append(event)
+
+    def drain(self) -> None:
+        """Lets what waits in the mailbox take effect now, without time passing. `tick` does it by itself;
+        a page that is paused does it to show a change at once."""
+        while self._script and self._script[0][0] <= self.t + 1e-9:
+            self._mailbox.append(self._script.popleft()[1])
+        while self._mailbox:
+            event = self._mailbox.popleft()
+            try:
+                self._take(event)
+                self.log.append((self.t, event))
+            except InputError as error:
+                self.notices.append(str(error))
+        if self.t >= self._push_until - 1e-9:
+            self.plant.push(None)
+            self._push_until = math.inf
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Set(path, value):
+                self.adopt(changed(self.settings, path, value))
+            case MoveLevel(level, to):
+                self.adopt(replace(self.settings, levels=moved(self.settings.levels, level, to)))
+            case MoveTarget(task, value):
+                tasks = {each.name: each for each in _tasks(self.settings.levels)}
+                move_target(tasks, self.references, task, value)
+            case Push(body, force, torque, seconds):
+                if not (math.isfinite(seconds) and seconds > 0):
+                    raise InputError(f"a push of {seconds} s cannot be: give a time above 0")
+                try:
+                    self.plant.push(body, np.array(force), np.array(torque))
+                except InputError:
+                    raise
+                except ValueError as error:
+                    raise InputError(f"the push was not applied: {error}") from None
+                self._push_until = self.t + seconds
+            case Reset():
+                self.reset()
+
+    def adopt(self, settings: SceneSettings) -> None:
+        """Takes over settings at once, as an event that changed them would. Raises InputError if they do
+        not fit."""
+        if settings.plant != self.settings.plant:
+            self.plant.configure(settings.plant)
+        if settings.controller == self.settings.controller:
+            self.controller.configure(settings.for_controller())
+        else:
+            taking = make_controller(settings.controller, self.robot, settings.for_controller())
+            taking.reset(self.plant.tau)
+            self.controller = Handover(self.controller, taking)
+        self.settings = settings
+        self._hands = _hands(settings.levels)
+
+    def tick(self) -> Array:
+        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it).
+
+        A row holds the true joint state, the references, what the controller decided, and the torque
+        applied from this tick on.
+        """
+        self.drain()
+        settings, plant = self.settings, self.plant
+        T_s, N, t = settings.T_s, settings.horizon, plant.t
+        q, v = plant.q, plant.v
+        state = plant.measure(T_s)
+        previews = {name: reference.preview(t, T_s, N) for name, reference in self.references.items()}
+        self.controller = settled(self.controller)
+        plan = self.controller.step(state.q, state.v, previews, plant.tau)
+        row = self._row
+        row.fill(np.nan)
+        fields = self.layout.fields
+        row[fields["t"]] = t
+        row[fields["q"]] = q
+        row[fields["v"]] = v
+        write_plan(row, self.layout, plan)
+        self._write_references(row, previews)
+        self._write_truth(row, plan, q)
+        self.plan = plan
+        late = settings.is_late(1e-3 * plan.step_us)
+        row[fields["late"]] = late
+        row[fields["tau"]] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
+        self._ticks += 1
+        if self.diverged_at is None:
+            wild = self._is_wild(q, v)
+            if wild:
+                self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+            if wild or self._is_far(plan):
+                self.diverged_at = t
+        return row
+
+    def _write_references(self, row: Array, previews: Mapping[str, Preview]) -> None:
+        fields = self.layout.fields
+        for task in self.layout.tasks:
+            preview = previews[task.name]
+            value = preview.value
+            row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
+            row[fields[f"v_d/{task.name}"]] = preview.velocity[0]
+            row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
+
+    def _write_truth(self, row: Array, plan: Plan, q: Array) -> None:
+        """What only the plant's M can tell: the gauge of M̄ and the honest leak, held between refreshes."""
+        if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
+            M = self.plant.mass_matrix()
+            M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
+            leak = math.nan
+            if len(plan.levels) > 1:
+                at = Configuration(self.robot, self._data, q, q)
+                leak = dynamic_leak(M, plan, self.settings.levels, at)
+            self._truth = (leak, *convergence_gauge(M, M_bar))
+        # The layout puts these three side by side.
+        start = self.layout.fields["dynamic_leak"].start
+        row[start : start + 3] = self._truth
+
+    def _is_wild(self, q: Array, v: Array) -> bool:
+        share = v / self.robot.v_limit
+        # A comparison with NaN is false, so "not within" also catches what is not finite.
+        slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
+        return self.plant.broken or not slow or not math.isfinite(q.dot(q))
+
+    def _is_far(self, plan: Plan) -> bool:
+        """Level 1 is lost. A hand that drags a target out of reach does that too, so it is no notice."""
+        errors = (plan.errors.get(name) for name in self._hands)
+        return any(error is not None and error.dot(error) > LOST_POSITION**2 for error in errors)
+
+    def predicted_path(self, frame: str = "") -> Array:
+        """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""
+        if self.plan is None:
+            return np.empty((0, 3))
+        return np.array(
+            [Configuration(self.robot, self._data, q, q).placement(frame).translation for q in self.plan.q]
+        )
+
+    def reference_path(self, task: str, points: int = 200) -> Array | None:
+        """One turn of a periodic position reference, (points, 3) m; None for anything else."""
+        reference = self.references.get(task)
+        phase = getattr(reference, "phase", None)
+        tasks = {each.name: each for each in _tasks(self.settings.levels)}
+        found = tasks.get(task)
+        if reference is None or phase is None or not isinstance(found, FramePosition):
+            return None
+        preview = reference.preview(0.0, 2 * np.pi / phase.omega / (points - 1), points - 1)
+        start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
+        path = np.tile(start.placement(found.frame).translation, (points, 1))
+        path[:, found.components] = preview.value + preview.displacement
+        return path
+
+    def binding(self) -> list[Binding]:
+        """The constraints that bind in the last plan."""
+        return [] if self.plan is None else self.plan.binding(self.robot.joint_names)
+
+
+def _tasks(stack: Stack) -> list[Task]:
+    return [task for level in stack for task in level.tasks]
+
+
+def _hands(stack: Stack) -> tuple[str, ...]:
+    """Names of the position tasks of the first level that is on."""
+    first = next((level.tasks for level in stack if level.enabled), ())
+    return tuple(task.name for task in first if isinstance(task, FramePosition))

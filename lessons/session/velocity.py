@@ -1,0 +1,291 @@
+"""The headless loop of a velocity-level scene: mission → window → controller → plant, with a mailbox."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
+from himpc.missions import Progress, advanced, insert, move, release, remove, reorder
+from himpc.plan import Binding
+from himpc.references import Reference
+from himpc.stack import Level, Stack
+from himpc.telemetry import Layout
+from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
+from lessons.scenes.velocity_scene import MobileScene
+from lessons.session.servo_commands import Commands, command_step
+from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
+from lessons.session.velocity_rows import layout_of, write_bounds, write_plan, write_truth
+from lessons.settings.velocity import MobileSettings, changed, with_obstacle
+from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release, RemoveTask
+from robots import InputError, VelocityPlant
+from robots.collision import CollisionModel
+from robots.errors import unknown_name
+
+Array = NDArray[np.float64]
+
+CLEARANCE_WITHIN = 1.0
+"""m: obstacles farther away than this are not measured."""
+LOST_SPEED = 20.0
+"""A joint faster than this many times its limit counts as divergence."""
+
+
+class MobileSession:
+    """One learner's run at velocity level. `tick` advances one control period, `advance` one command of it.
+
+    Attributes:
+        scene: what it started from.
+        seed: seed of the run; all randomness comes from it.
+        robot: the scene's robot.
+        plant: the simulation.
+        settings: the settings in force.
+        bounds: the bounds in force.
+        roles: the tasks of the scene's levels by name: what a mission can move.
+        layout: where the fields of a row lie.
+        progress: how far the mission has come.
+        plan: the last plan, None before the first tick.
+        notices: sentences for the learner (refused events, divergence); drain them.
+        log: (time, event) of every event that took effect.
+    """
+
+    def __init__(self, scene: MobileScene, seed: int = 0) -> None:
+        """Raises InputError if the scene's settings do not fit its robot."""
+        self.scene = scene
+        self.seed = seed
+        self.robot = scene.robot
+        self._take_settings(scene.settings)
+        self._data = scene.robot.model.createData()
+        self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
+        self.layout: Layout = layout_of(scene.robot, scene.settings.htmpc.stack)
+        self.notices: list[str] = []
+        self.log: list[tuple[float, MobileEvent]] = []
+        self._mailbox: deque[MobileEvent] = deque()
+        self._row = np.full(self.layout.size, np.nan)
+        self.plant = VelocityPlant(scene.robot, scene.settings.plant, seed)
+        # What does not fit the robot is refused here, not at the first tick.
+        make_velocity_controller(scene.settings.controller, scene.robot, scene.settings.htmpc)
+        self.reset()
+
+    @property
+    def t(self) -> float:
+        """Simulated time since the last reset, s."""
+        # Adding up command periods must not put a tick a rounding before the moment it stands for.
+        return round(self.plant.t, 9)
+
+    def reset(self) -> None:
+        """Back to the scene's start with the settings as they are."""
+        self.plant.reset(self.scene.q_0)
+        home, _ = self._points(self.scene.q_0, np.zeros(self.robot.n))
+        self.progress = Progress(self.settings.options.mission(home))
+        self._stack: Stack = ()
+        self.plan: VelocityPlan | None = None
+        self.controller: VelocityController | None = None
+        self.diverged_at: float | None = None
+        self._solve_ms = 0.0
+        self._commands: Commands | None = None
+        self._commanded = self._input = np.zeros(self.robot.n)
+        self._nearest = math.inf
+        self._script = deque(self.scene.events)
+
+    def post(self, event: MobileEvent) -> None:
+        """Puts an event in the mailbox; it takes effect at the next control step, or leaves a notice."""
+        self._mailbox.append(event)
+
+    def drain(self) -> None:
+        """Lets what waits in the mailbox take effect now, without time passing; `tick` does it by itself."""
+        while self._script and self._script[0][0] <= self.t + 1e-9:
+            self._mailbox.append(self._script.popleft()[1])
+        while self._mailbox:
+            event = self._mailbox.popleft()
+            try:
+                self._take(event)
+                self.log.append((self.t, event))
+            except InputError as error:
+                self.notices.append(str(error))
+
+    def _take(self, event: MobileEvent) -> None:
+        match event:
+            case Set(path, value):
+                self.adopt(changed(self.settings, path, value))
+            case MoveLevel(name, to):
+                self.progress = reorder(self.progress, name, to)
+            case MoveTarget(name, goal):
+                self.progress = move(self.progress, name, goal)
+            case Release(name):
+                self.progress = release(self.progress, name)
+            case RemoveTask(name):
+                self.progress = remove(self.progress, name)
+            case InsertTask():
+                if event.role not in self.roles:
+                    raise unknown_name("role", event.role, self.roles)
+                self.progress = insert(self.progress, event.task(), event.before)
+            case Appear():
+                self.adopt(with_obstacle(self.settings, event.ball()))
+            case Push():
+                raise InputError("this scene is driven by velocity servos: a push would not move it")
+            case Reset():
+                self.reset()
+
+    def adopt(self, settings: MobileSettings) -> None:
+        """Takes over settings at once, as an event that changed them would. Raises InputError if they do
+        not fit."""
+        # A controller that refuses them leaves everything as it is; the window's order comes with the tick.
+        fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
+        if settings.controller != self.settings.controller:
+            self.controller = fitted if self.controller is not None else None
+        if settings.plant != self.settings.plant:
+            self.plant.configure(settings.plant)
+        self._take_settings(settings)
+
+    def _for_controller(self, settings: MobileSettings) -> HTMPCSettings:
+        """The controller's settings for the levels of this tick."""
+        lag = 1e-3 * settings.felt(self._solve_ms).latency_ms if settings.compensate_delay else 0.0
+        hold = settings.htmpc.hold
+        if settings.options.decoupled and self.progress.window:
+            base = base_joints(self.robot)
+            driving = self.progress.window[0].task.role == "base"
+            # Without turning on the spot an arm that reaches forwards only would not get at what is behind.
+            still = set(range(self.robot.n)) - set(base) if driving else set(base[:2])
+            hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
+        return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold)
+
+    def _take_settings(self, settings: MobileSettings) -> None:
+        self.settings = settings
+        self.bounds = bounds(self.robot, settings.htmpc.limits)
+        self._collision = CollisionModel(self.robot, settings.htmpc.obstacles, settings.htmpc.self_collision)
+
+    def _clearance(self) -> float:
+        """m, from the robot to the nearest obstacle; infinite if none is within `CLEARANCE_WITHIN`."""
+        if self._collision.empty:
+            return math.inf
+        near = self._collision.clearances(self.plant.q[None], CLEARANCE_WITHIN, gradients=False)
+        return float(near.distance.min(initial=math.inf))
+
+    def predicted_path(self, role: str) -> Array:
+        """Where the last plan takes a role's point, knots 0 … N, (N+1, m) m; empty before the first tick."""
+        if self.plan is None:
+            return np.empty((0, 3))
+        task = self.roles[role]
+        return np.array([task.value(Configuration(self.robot, self._data, q, q)) for q in self.plan.q])
+
+    def binding(self) -> list[Binding]:
+        """The constraints that bind in the last plan."""
+        return [] if self.plan is None else [each for level in self.plan.levels for each in level.binding]
+
+    # ---------------------------------------------------------------- one tick
+
+    @property
+    def between(self) -> bool:
+        """Whether a control period has begun and is not over: what is posted now has to wait for its end."""
+        return self._commands is not None
+
+    @property
+    def step_s(self) -> float:
+        """Simulated time of the next `advance`, s."""
+        return command_step(self.settings.T_s)[1] if self._commands is None else self._commands.h
+
+    def tick(self) -> Array:
+        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it)."""
+        row = self.advance()
+        while row is None:
+            row = self.advance()
+        return row
+
+    def advance(self) -> Array | None:
+        """One command to the servos, after planning if a control period begins; the row of `tick` when the
+        period is over, else None."""
+        if self._commands is None:
+            self._commands = self._decide()
+            self._nearest = self._clearance()
+        commands = self._commands
+        self.plant.step(commands.next(), commands.h)
+        self._nearest = min(self._nearest, self._clearance())
+        if not commands.done:
+            return None
+        self._commands = None
+        self._finish(self._row, commands)
+        return self._row
+
+    def _decide(self) -> Commands:
+        """From events and state to a plan; writes what is known at the period's start."""
+        self.drain()
+        settings = self.settings
+        t, q, v = self.t, self.plant.q, self.plant.v
+        state = self.plant.measure()
+        points, speeds = self._points(state.q, state.v)
+        self.progress = advanced(self.progress, settings.options.L, t, points, speeds)
+        controller, references = self._direct()
+        ahead, htmpc = t + controller.settings.delay_s, settings.htmpc
+        previews = {
+            name: reference.preview(ahead, htmpc.dt, htmpc.horizon) for name, reference in references.items()
+        }
+        plan = controller.step(state.q, state.v, previews)
+        self.plan, self._solve_ms = plan, 1e-3 * plan.step_us
+        if (felt := settings.felt(self._solve_ms)) != self.plant.settings:
+            self.plant.configure(felt)
+        row = self._row
+        row.fill(np.nan)
+        fields = self.layout.fields
+        row[fields["t"]], row[fields["q"]], row[fields["v"]] = t, q, v
+        place = row[fields["place"]] = self.progress.place
+        row[fields["left"]] = len(self.progress.mission) - place
+        write_plan(row, self.layout, plan, settings.lexicographic_delta)
+        at = Configuration(self.robot, self._data, q, v)
+        places = {level.name: place for place, level in enumerate(self._stack, start=1)}
+        write_truth(row, self.layout, at, self.roles, places, references)
+        return Commands(plan, htmpc.period, self._commanded)
+
+    def _finish(self, row: Array, commands: Commands) -> None:
+        """What the period brought."""
+        fields, U = self.layout.fields, commands.plan.motion.U
+        row[fields["tau"]] = row[fields["tau_demand"]] = commands.last
+        row[fields["acceleration"]], row[fields["clearance"]] = commands.sharpest, self._nearest
+        row[fields["jerk"]] = (U[0] - self._input) / min(commands.period, self.settings.htmpc.dt)
+        write_bounds(row, self.layout)
+        self._commanded, self._input = commands.last, U[0]
+        if self.diverged_at is None and self._lost(row):
+            t = float(row[fields["t"]][0])
+            self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+            self.diverged_at = t
+
+    def _direct(self) -> tuple[VelocityController, dict[str, Reference]]:
+        """The controller, with the window as its stack, and the references of its tasks by name."""
+        stack: list[Level] = []
+        references: dict[str, Reference] = {}
+        for place, active in enumerate(self.progress.window, start=1):
+            level = self._level(active.task.role)
+            if level.name in references:
+                # The window holds this role twice: the second one is a level of its own.
+                task = replace(self.roles[active.task.role], name=f"{active.task.role} {place}")
+                level = replace(level, tasks=(task,))
+            stack.append(level)
+            references[level.name] = active.reference
+        self._stack = tuple(stack)
+        wanted = self._for_controller(self.settings)
+        if self.controller is None:
+            self.controller = make_velocity_controller(self.settings.controller, self.robot, wanted)
+        elif wanted != self.controller.settings:
+            self.controller.configure(wanted)
+        return self.controller, references
+
+    def _level(self, role: str) -> Level:
+        return next(level for level in self.settings.htmpc.stack if level.tasks[0].name == role)
+
+    def _points(self, q: Array, v: Array) -> tuple[dict[str, Array], dict[str, float]]:
+        """Where each role's point is, and how fast it moves (m/s or rad/s)."""
+        at = Configuration(self.robot, self._data, q, v)
+        points = {name: task.value(at) for name, task in self.roles.items()}
+        speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ v)) for name, task in self.roles.items()}
+        return points, speeds
+
+    def _lost(self, row: Array) -> bool:
+        """Not finite or far too fast. A large error is no sign here: missions send the robot metres away."""
+        fields = self.layout.fields
+        fastest = float((np.abs(row[fields["v"]]) / self.robot.v_limit).max())
+        # A comparison with NaN is false, so "not within" also catches what is not finite.
+        return not fastest <= LOST_SPEED or not math.isfinite(float(row[fields["q"]].sum()))

@@ -1,0 +1,1 @@
+"""Everything a learner can change, by its path."""

@@ -1,0 +1,1 @@
+"""The kit lessons are made of: steps, claims, predictions, challenges, measures."""

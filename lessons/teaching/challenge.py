@@ -1,0 +1,80 @@
+"""A challenge: a measured goal reached by tuning a few settings; more than one way leads there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from inspect import cleandoc
+
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control, Script
+from lessons.teaching.measure import Measure, Rows
+
+
+@dataclass(frozen=True)
+class Score:
+    """Points for how well it was done: 0 at `worst`, 100 at `best` and beyond, straight in between."""
+
+    measure: Measure
+    worst: float
+    best: float
+
+    def points(self, value: float) -> float:
+        """0 to 100; 0 for NaN."""
+        share = (value - self.worst) / (self.best - self.worst)
+        return 100.0 * min(1.0, max(0.0, share)) if share == share else 0.0
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came out of an attempt: which goals are met, and the points (0 unless all are)."""
+
+    met: tuple[bool, ...]
+    score: float
+
+    @property
+    def passed(self) -> bool:
+        """All goals are met."""
+        return all(self.met)
+
+
+@dataclass(frozen=True)
+class Challenge:
+    """A goal, the settings it may be reached with, and the run that decides.
+
+    Attributes:
+        text: what to reach; Markdown with equations in $…$.
+        goals: all must hold at the end of the run.
+        knobs: the settings that may be changed; any other change disqualifies the attempt.
+        score: what makes one solution better than another.
+        solutions: at least two different sets of assignments "PATH=VALUE" to knobs that pass. The run with
+            none of them, the start, does not.
+        set: assignments on top of the lesson's before the learner begins.
+        duration: s.
+        events: the script of the run.
+    """
+
+    text: str
+    goals: tuple[Claim, ...]
+    knobs: tuple[Control, ...]
+    score: Score
+    solutions: tuple[tuple[str, ...], ...]
+    set: tuple[str, ...] = ()
+    duration: float = 2.0
+    events: Script = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", cleandoc(self.text))
+
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        """What a run must be measured for."""
+        return (*(goal.measure for goal in self.goals), self.score.measure)
+
+    def grade(self, rows: Rows) -> Result:
+        """Judges a finished run."""
+        return self.result([measure.value(rows) for measure in self.measures])
+
+    def result(self, values: list[float]) -> Result:
+        """Judges a run by its `measures`, in their order."""
+        met = tuple(goal.holds(value) for goal, value in zip(self.goals, values, strict=False))
+        return Result(met, self.score.points(values[-1]) if all(met) else 0.0)

@@ -1,0 +1,47 @@
+"""A claim: a measurable sentence about a run, that can fail."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from lessons.teaching.measure import Measure, Rows
+
+Relation = Literal["at most", "at least"]
+_SIGNS: dict[Relation, str] = {"at most": "≤", "at least": "≥"}
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence, the number it is about, and the bound on that number.
+
+    Attributes:
+        text: the sentence, for the learner.
+        measure: the number.
+        relation: "at most" or "at least".
+        bound: in the measure's unit.
+        fails_with: assignments "PATH=VALUE" on top of the step's own under which the sentence is false.
+            Goals of a challenge have none: the challenge's start is where they fail.
+        because: why it is false there, in a few words.
+    """
+
+    text: str
+    measure: Measure
+    relation: Relation
+    bound: float
+    fails_with: tuple[str, ...] = ()
+    because: str = ""
+
+    def holds(self, value: float) -> bool:
+        """Whether a measured value fulfils the claim; NaN does not."""
+        return value <= self.bound if self.relation == "at most" else value >= self.bound
+
+    def judge(self, rows: Rows, ghost: Rows | None = None) -> bool | None:
+        """Whether the claim holds in a run so far; None as long as there is nothing to measure."""
+        value = self.measure.value(rows, ghost)
+        return None if value != value else self.holds(value)
+
+    @property
+    def condition(self) -> str:
+        """The claim as an inequality, e.g. "≤ 1 mm"."""
+        return f"{_SIGNS[self.relation]} {self.bound:g} {self.measure.unit}".rstrip()

@@ -1,0 +1,43 @@
+"""What acts on a run, as data: the few controls that matter for a step, and its script."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from lessons.velocity_events import MobileEvent
+
+Script = tuple[tuple[float, MobileEvent], ...]
+"""(time in s, event) in order; a torque-level scene takes those of `lessons.events` only."""
+
+
+@dataclass(frozen=True)
+class Control:
+    """A setting that is offered beside a step.
+
+    Attributes:
+        path: as in `lessons.settings.torque.changed`.
+        words: its label.
+        low, high: the ends of a slider; for a number only.
+        log: the slider is logarithmic; low > 0.
+        choices: the values to choose from instead; (False, True) is a switch.
+    """
+
+    path: str
+    words: str
+    low: float = 0.0
+    high: float = 0.0
+    log: bool = False
+    choices: tuple[Any, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.choices and not self.low < self.high:
+            raise ValueError(f"control '{self.path}' needs choices or low < high")
+        if self.log and self.low <= 0:
+            raise ValueError(f"control '{self.path}' is logarithmic: low must be above 0")
+
+    def takes(self, value: Any) -> bool:
+        """Whether it can be set to a value."""
+        if self.choices:
+            return value in self.choices
+        return isinstance(value, (int, float)) and self.low <= value <= self.high

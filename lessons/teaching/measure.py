@@ -1,0 +1,225 @@
+"""Numbers about a run: a signal over time, a window, a statistic. All of it is data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY
+
+Array = NDArray[np.float64]
+Statistic = Literal["largest", "rms", "mean", "range", "last", "sum"]
+
+UNITS: dict[str, float] = {
+    "": 1.0,
+    "×": 1.0,
+    "s": 1.0,
+    "m": 1.0,
+    "mm": 1e3,
+    "µm": 1e6,
+    "deg": 180 / math.pi,
+    "deg/s": 180 / math.pi,
+    "rad/s": 1.0,
+    "N·m": 1.0,
+    "m/s²": 1.0,
+    "%": 100.0,
+    "µs": 1.0,
+}
+"""How many of a unit are one of the unit that telemetry records (s, m, rad, N·m, share)."""
+
+_NAMES = {
+    "place": "tasks completed",
+    "q": "angle",
+    "v": "speed",
+    "tau": "torque",
+    "delta_tau": "change of torque",
+    "step_us": "computing time",
+}
+_PER_JOINT = ("q", "v", "tau")
+
+
+class Rows(Protocol):
+    """A run, finished or still going on: a field of telemetry over time by its name, (ticks, width)."""
+
+    def __getitem__(self, field: str, /) -> Array: ...
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One number per tick.
+
+    Attributes:
+        name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.layout_of`, and for velocity-level
+            scenes `lessons.session.torque.velocity_rows.layout_of`).
+        unit: a key of UNITS.
+        column: which component of the field; None: its Euclidean norm.
+    """
+
+    name: str
+    unit: str = ""
+    column: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS:
+            raise ValueError(f"signal '{self.name}': unit '{self.unit}' is none of {', '.join(UNITS)}")
+
+    @property
+    def words(self) -> str:
+        """What it is, for legends."""
+        base, _, of = self.name.partition("/")
+        plain = f"{base} of {of}" if of else _NAMES.get(base, base.replace("_", " "))
+        if self.column is None:
+            return plain
+        part = "of joint" if self.name in _PER_JOINT else "component"
+        return f"{plain} {part} {self.column + 1}"
+
+    def over(self, rows: Rows) -> Array:
+        """The signal at every tick, (ticks,); NaN where it is not defined."""
+        found = DERIVED[self.name](rows) if self.name in DERIVED else rows[self.name]
+        one = np.linalg.norm(found, axis=1) if self.column is None else found[:, self.column]
+        # A norm of one component would lose its sign.
+        one = found[:, 0] if found.shape[1] == 1 else one
+        return UNITS[self.unit] * one
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number about a run.
+
+    Attributes:
+        signal: of what.
+        statistic: "largest" absolute value, "rms", "mean", "range" (greatest minus least), "last" (mean over
+            the last 50 ticks) or "sum".
+        after, until: the window, s.
+        over_ghost: divided by the same number of the ghost's run; its unit is then "×".
+    """
+
+    signal: Signal
+    statistic: Statistic = "largest"
+    after: float = 0.0
+    until: float = math.inf
+    over_ghost: bool = False
+
+    @property
+    def words(self) -> str:
+        """What it is, for tables and the page."""
+        since = f" from {self.after:g} s" if self.after > 0 else ""
+        until = f" until {self.until:g} s" if math.isfinite(self.until) else ""
+        ghost = ", over the ghost's" if self.over_ghost else ""
+        return f"{_WORDS[self.statistic]} {self.signal.words}{since}{until}{ghost}"
+
+    @property
+    def unit(self) -> str:
+        """Of the value."""
+        return "×" if self.over_ghost else self.signal.unit
+
+    @property
+    def alone(self) -> Measure:
+        """The same without the ghost."""
+        return replace(self, over_ghost=False)
+
+    def value(self, rows: Rows, ghost: Rows | None = None) -> float:
+        """The number so far; NaN as long as there is nothing to measure. `rows` may be a run half done."""
+        own = self._of(rows)
+        if not self.over_ghost:
+            return own
+        other = math.nan if ghost is None else self._of(ghost)
+        return own / other if other else math.nan
+
+    def _of(self, rows: Rows) -> float:
+        t = rows["t"][:, 0]
+        inside = (t >= self.after - 1e-9) & (t < self.until - 1e-9)
+        values = self.signal.over(rows)[inside]
+        values = values[np.isfinite(values)]
+        return float(_STATISTICS[self.statistic](values)) if values.size else math.nan
+
+
+def _shares(rows: Rows, value: str, limit: str) -> Array:
+    """The largest |value| / limit over the joints that have a limit, (ticks, 1)."""
+    with np.errstate(all="ignore"):
+        share = np.abs(rows[value]) / rows[limit]
+    return np.where(np.isfinite(share), share, 0.0).max(axis=1, keepdims=True)
+
+
+def _position_share(rows: Rows) -> Array:
+    """The largest distance from mid-range over half the range, (ticks, 1)."""
+    lower, upper = rows["q_lower"], rows["q_upper"]
+    with np.errstate(all="ignore"):
+        share = np.abs(rows["q"] - 0.5 * (lower + upper)) / (0.5 * (upper - lower))
+    return np.where(np.isfinite(share), share, 0.0).max(axis=1, keepdims=True)
+
+
+def _at(bit: int) -> Callable[[Rows], Array]:
+    def found(rows: Rows) -> Array:
+        bits = rows["at_bound"]
+        bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
+        return (bits & bit != 0).any(axis=1, keepdims=True).astype(float)
+
+    return found
+
+
+def _joints_moved(rows: Rows) -> Array:
+    """How many joints are more than 1° from where they started, (ticks, 1)."""
+    q = rows["q"]
+    return (np.abs(q - q[:1]) > math.radians(1.0)).sum(axis=1, keepdims=True).astype(float)
+
+
+def _tip_travel(rows: Rows) -> Array:
+    """How far the task `position` is from where it started, (ticks, 1) m."""
+    x = rows["x/position"]
+    return np.linalg.norm(x - x[:1], axis=1, keepdims=True)
+
+
+def _way_of_the_base(rows: Rows) -> Array:
+    """How far the base has driven since the first row, along its path, (ticks, 1) m."""
+    steps = np.linalg.norm(np.diff(rows["x/base"], axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])[: len(rows["t"]), None]
+
+
+def _time_at_work(rows: Rows) -> Array:
+    """t as long as tasks of the mission are left, (ticks, 1) s; then not defined."""
+    return np.where(rows["left"] > 0, rows["t"], math.nan)
+
+
+DERIVED: Mapping[str, Callable[[Rows], Array]] = {
+    "torque share": lambda rows: _shares(rows, "tau_demand", "tau_upper"),
+    "speed share": lambda rows: _shares(rows, "v", "v_limit"),
+    "position share": _position_share,
+    "at a torque bound": _at(AT_TORQUE),
+    "at a speed bound": _at(AT_VELOCITY),
+    "at a position bound": _at(AT_POSITION),
+    "joints moved": _joints_moved,
+    "distance from the start": _tip_travel,
+    "way of the base": _way_of_the_base,
+    "time at work": _time_at_work,
+}
+"""Signals that telemetry does not record as they are. Torque shares suppose symmetric bounds; the last two
+are of velocity-level scenes."""
+
+
+def _last(values: Array) -> float:
+    return float(values[-50:].mean())
+
+
+_WORDS: Mapping[Statistic, str] = {
+    "largest": "largest",
+    "rms": "RMS",
+    "mean": "mean",
+    "range": "range of",
+    "last": "final",
+    "sum": "total",
+}
+
+_STATISTICS: Mapping[Statistic, Callable[[Array], float]] = {
+    "largest": lambda values: np.abs(values).max(),
+    "rms": lambda values: np.sqrt((values**2).mean()),
+    "mean": lambda values: values.mean(),
+    "range": lambda values: values.max() - values.min(),
+    "last": _last,
+    "sum": lambda values: values.sum(),
+}

@@ -1,0 +1,134 @@
+"""Predictions: what a learner says before the run, and how it compares with what the run shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lessons.teaching.measure import Measure, Rows, Signal
+
+
+@dataclass(frozen=True)
+class Grade:
+    """How a prediction did.
+
+    Attributes:
+        score: 0 (far off) to 1 (right).
+        words: one sentence with what was measured.
+    """
+
+    score: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Option:
+    """One answer of a choice: right if the measured number lies in [low, high)."""
+
+    text: str
+    low: float = -math.inf
+    high: float = math.inf
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Several answers; the run decides which one is right.
+
+    Attributes:
+        question: one sentence.
+        options: their intervals do not overlap.
+        measure: the number that decides.
+        tempting: place of the answer that many would give, and that is wrong.
+    """
+
+    question: str
+    options: tuple[Option, ...]
+    measure: Measure
+    tempting: int
+
+    def right(self, value: float) -> int | None:
+        """Place of the option that a measured number makes right; None if there is none."""
+        return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
+
+    def grade(self, picked: int, rows: Rows, ghost: Rows | None = None) -> Grade:
+        """Compares the option picked with the run."""
+        value = self.measure.value(rows, ghost)
+        right = self.right(value)
+        if right is None:
+            return Grade(0.0, "The run gave nothing to measure.")
+        answer = f"{self.options[right].text} ({_number(value, self.measure.unit)})."
+        return Grade(1.0, f"Right: {answer}") if picked == right else Grade(0.0, f"It was: {answer}")
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number set on a scale before the run.
+
+    Attributes:
+        question: one sentence.
+        measure: the number asked for; it is above 0.
+        low, high: ends of the scale, 0 < low < high; the scale is logarithmic.
+        factor: a guess within this factor of the truth is right; one off by its square is worth nothing.
+    """
+
+    question: str
+    measure: Measure
+    low: float
+    high: float
+    factor: float = 1.5
+
+    def grade(self, guess: float, rows: Rows, ghost: Rows | None = None) -> Grade:
+        """Compares the guess with the run."""
+        value = self.measure.value(rows, ghost)
+        unit = self.measure.unit
+        if not (math.isfinite(value) and value > 0 and guess > 0):
+            return Grade(0.0, "The run gave nothing to measure.")
+        off = abs(math.log(guess / value)) / math.log(self.factor)
+        score = min(1.0, max(0.0, 2.0 - off))
+        return Grade(score, f"You said {_number(guess, unit)}, it was {_number(value, unit)}.")
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A curve drawn before the run.
+
+    Attributes:
+        question: one sentence.
+        signal: what is drawn over time.
+        low, high: the drawing's vertical range, in the signal's unit.
+        until: its horizontal range is 0 to this, s.
+        band: a point counts as right within this share of the vertical range.
+    """
+
+    question: str
+    signal: Signal
+    low: float
+    high: float
+    until: float
+    band: float = 0.1
+
+    @property
+    def measure(self) -> Measure:
+        """The largest size of what is drawn: it must have room in the drawing."""
+        return Measure(self.signal, until=self.until)
+
+    def grade(self, points: Sequence[tuple[float, float]], rows: Rows) -> Grade:
+        """Compares the drawn points (t in s, value), joined by straight lines, with the run so far."""
+        t, truth = rows["t"][:, 0], self.signal.over(rows)
+        seen = np.isfinite(truth) & (t <= self.until)
+        if not points or not seen.any():
+            return Grade(0.0, "There is nothing to compare yet.")
+        times, values = np.array(sorted(points), float).T
+        off = np.abs(np.interp(t[seen], times, values) - truth[seen])
+        score = float((off <= self.band * (self.high - self.low)).mean())
+        return Grade(score, f"Your curve is close to the run for {score:.0%} of the time.")
+
+
+Prediction = Choice | Value | Sketch
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.3g} {unit}".rstrip()
