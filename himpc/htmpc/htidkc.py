@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start
+from himpc.htmpc.safety import commandable, plausible
 from himpc.htmpc.settings import Bounds, HTMPCSettings, bounds
 from himpc.htmpc.tracking import check_dimensions
 from himpc.plan import Binding
@@ -74,14 +75,16 @@ class HTIDKC:
             previews: the reference of every task by its name.
 
         Returns:
-            the plan of one knot; finite whatever the state: without a finite one the command fades to zero.
+            the plan of one knot; finite and inside the bounds whatever the state: without a plausible one the
+            command fades to zero.
         """
         started = perf_counter_ns()
         settings, period = self._settings, self._settings.period
-        last = np.array(v, float) if self._last is None else self._last
-        usable = bool(np.isfinite(q).all() and np.isfinite(v).all())
+        usable = plausible(self.robot, q, v)
         q = np.array(q, float) if usable else self.robot.home
-        last = last if np.isfinite(last).all() else np.zeros(self.robot.n)
+        last = self._last
+        if last is None:
+            last = commandable(v, None, self._bounds) if usable else np.zeros(self.robot.n)
         here = Configuration(self.robot, self._data, q, last)
         box = self._level_zero(q, last)
         command = np.clip(np.zeros(self.robot.n), box.lower, box.upper)

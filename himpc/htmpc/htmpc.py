@@ -18,6 +18,7 @@ from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
 from himpc.htmpc.problem import Problem, Tick
 from himpc.htmpc.rows import held, limit_rows
+from himpc.htmpc.safety import commandable, permitted, plausible
 from himpc.htmpc.settings import HTMPCSettings, bounds, efforts
 from himpc.htmpc.sqp import Solved, solve_level
 from himpc.htmpc.tracking import Guard, check_dimensions, tracking
@@ -54,6 +55,7 @@ class HTMPC:
     def reset(self) -> None:
         """Forgets the plan: the robot is taken to move on as measured, with no acceleration."""
         self._past: deque[Motion] = deque(maxlen=_MEMORY)
+        self._since = self._settings.period
 
     def configure(self, settings: HTMPCSettings) -> None:
         """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
@@ -93,8 +95,8 @@ class HTMPC:
                 T_s = Δt and N.
 
         Returns:
-            the plan; finite whatever the state: from one that is not finite the robot brakes along its last
-            plan.
+            the plan; finite and inside the bounds whatever the state: one that is not plausible is taken for
+            where the last plan leads.
         """
         started = perf_counter_ns()
         tick = self._tick(self._start(q, v), previews)
@@ -106,36 +108,39 @@ class HTMPC:
             for level, one in zip(self._levels, solved, strict=True)
         )
         U = at.U if np.isfinite(at.U).all() else tick.brake
-        motion = Motion(tick.start, self._permitted(tick.start, U), self._settings.dt)
+        U = permitted(tick.start, U, self._bounds, self._settings.period)
+        motion = Motion(tick.start, U, self._settings.dt)
         self._past.append(motion)
+        self._since = self._settings.period
         return self._decided(tick, motion, levels, clearance(at.distances), started)
 
     def _start(self, q: Array, v: Array) -> Start:
         """The state from which to plan, predicted forward by the delay, and the input acting before."""
-        period, past = self._settings.period, self._past
-        usable = bool(np.isfinite(q).all() and np.isfinite(v).all())
+        # The rate may have changed: what was commanded until now was so for the period of that time.
+        period, past, still = self._since, self._past, np.zeros(self.robot.n)
+        usable = plausible(self.robot, q, v)
+        if not past and not usable:
+            return Start(self.robot.home, still, still)
         if not past:
-            still = np.zeros(self.robot.n)
-            return Start(np.array(q, float), np.array(v, float), still) if usable else self._rest()
-        acted = (past[-1].velocity(period) - past[-1].start.v) / period
+            return Start(np.array(q, float), commandable(v, None, self._bounds), still)
+        last = past[-1].velocity(period)
+        acted = (last - past[-1].start.v) / period
         if not usable:
-            return Start(past[-1].position(period), past[-1].velocity(period), acted)
+            return Start(past[-1].position(period), last, acted)
         delay = self._settings.delay_s
         if delay == 0.0:
-            return Start(np.array(q, float), np.array(v, float), acted)
+            return Start(np.array(q, float), commandable(v, last, self._bounds), acted)
         # What has been commanded but has not acted yet will happen whatever is decided now.
-        return Start(q + underway(past, period, delay), past[-1].velocity(period), acted)
-
-    def _rest(self) -> Start:
-        still = np.zeros(self.robot.n)
-        return Start(self.robot.home, still, still)
+        return Start(q + underway(past, period, delay), last, acted)
 
     def _tick(self, start: Start, previews: Mapping[str, Preview]) -> Tick:
         settings, limits = self._settings, self._bounds
         N, dt, period = settings.horizon, settings.dt, settings.period
         past, hold = self._past, self._hold
         rows = limit_rows(start, N, dt, period, limits)
-        plan = shifted(past[-1], period, N, dt, limits) if past else braking(start, N, dt, period, limits)
+        plan = (
+            shifted(past[-1], self._since, N, dt, limits) if past else braking(start, N, dt, period, limits)
+        )
         if hold.size:
             brake = braking(start, N, dt, period, limits)
             plan[:, hold] = brake[:, hold]
@@ -167,15 +172,6 @@ class HTMPC:
             guards.append(Guard(level, at.errors(level)))
             solved.append(found)
         return solved
-
-    def _permitted(self, start: Start, U: Array) -> Array:
-        """With softened bounds the first input may leave them: what is commanded does not."""
-        if self._settings.formulation != "paper":
-            return U
-        limits, period = self._bounds, self._settings.period
-        first = np.clip(U[0], -limits.a, limits.a)
-        first = np.clip(first, (-limits.v - start.v) / period, (limits.v - start.v) / period)
-        return np.vstack([first, U[1:]])
 
     def _decided(
         self, tick: Tick, motion: Motion, levels: tuple[LevelEvidence, ...], ahead: float, started: int

@@ -1,0 +1,67 @@
+"""What holds whatever is measured: which states can be used, and which commands may leave."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.htmpc.prediction import Start
+from himpc.htmpc.settings import Bounds
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+_FASTEST = 20.0
+"""A joint measured at more than this many times the robot's limit is a broken measurement."""
+_OUTSIDE = 10.0
+"""rad or m beyond its range at which a joint's position is a broken measurement."""
+_FARTHEST = 1e6
+"""The same for a joint without a range, from zero."""
+
+
+def plausible(robot: Robot, q: Array, v: Array) -> bool:
+    """Whether a measured state can be planned from: finite, and not absurdly far or fast.
+
+    Args:
+        robot: whose limits say what is absurd.
+        q, v: measured joint positions and velocities, (n,).
+    """
+    # A comparison with NaN is false: what is not finite is not plausible either.
+    lower = np.where(np.isfinite(robot.q_lower), robot.q_lower - _OUTSIDE, -_FARTHEST)
+    upper = np.where(np.isfinite(robot.q_upper), robot.q_upper + _OUTSIDE, _FARTHEST)
+    fastest = np.where(np.isfinite(robot.v_limit), _FASTEST * robot.v_limit, _FARTHEST)
+    return bool((q >= lower).all() and (q <= upper).all() and (np.abs(v) <= fastest).all())
+
+
+def commandable(v: Array, last: Array | None, bounds: Bounds) -> Array:
+    """The measured velocity, cut to what may be commanded, (n,).
+
+    The commands of a plan begin there: a robot pushed beyond its limit must not be told to go on like that.
+
+    Args:
+        v: measured, (n,).
+        last: the velocity commanded last, None if there is none. It may exceed bounds that were tightened
+            since: from there the robot brakes.
+        bounds: in force.
+    """
+    most = bounds.v if last is None else np.maximum(bounds.v, np.abs(last))
+    return np.clip(v, -most, most)
+
+
+def permitted(start: Start, U: Array, bounds: Bounds, period: float) -> Array:
+    """The inputs (N, n), the first one such that the commands of this period keep their bounds.
+
+    They do already when the QP's rows were hard and could be met. From a speed above its bound (which was
+    tightened) the robot may brake as slowly as its jerk bound asks, but gets no faster.
+
+    Args:
+        start: where the plan begins.
+        U: finite inputs, (N, n).
+        bounds: in force.
+        period: s, how long the first input is commanded.
+    """
+    fastest = np.maximum(bounds.v, np.abs(start.v))
+    first = np.clip(U[0], (-fastest - start.v) / period, (fastest - start.v) / period)
+    # An acceleration bound tightened below the present input is reached within the jerk bound.
+    most = np.maximum(bounds.a, np.abs(start.u) - bounds.j * period)
+    return np.vstack([np.clip(first, -most, most), U[1:]])
