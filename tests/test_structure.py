@@ -16,7 +16,6 @@ ORDER = ("robots", "himpc", "lessons", "app", "tests")
 DOORS = {
     "mujoco": ("robots/plant.py",),
     "placo": ("robots/reach.py",),
-    "coal": ("robots/collision.py",),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
     "numba": ("himpc/cascade/compiled.py",),
@@ -124,6 +123,16 @@ def test_heavy_dependencies_have_one_door(library: str) -> None:
     }
     assert users
     assert all(user.startswith(DOORS[library]) for user in users)
+
+
+def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:
+    """Distances are in closed form; the collision library only checks them."""
+    packages, tests = (
+        any(within(name, "coal") for path in sources(*where) for name in imports(path))
+        for where in (ORDER[:-1], ORDER[-1:])
+    )
+    assert tests
+    assert not packages
 
 
 def test_the_controller_cannot_peek() -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba import float64, intp, njit
+from numba import boolean, float64, intp, njit
 
-NUMBER, WHOLE = float64, intp
-MATRIX, MATRICES = float64[:, ::1], float64[:, :, ::1]
+NUMBER, WHOLE, FLAG = float64, intp, boolean
+VECTOR, MATRIX, MATRICES, FRAMES = float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, :, ::1]
+INDICES, FLAGS = intp[::1], boolean[:, ::1]
 """Arrays of our own, contiguous."""
 GIVEN, GIVEN_MATRIX, GIVEN_MATRICES = float64[:], float64[:, :], float64[:, :, :]
 GIVEN_INDICES = intp[:]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.htmpc.clearance import Clearances, CollisionModel
 from himpc.htmpc.prediction import integrator
 from himpc.htmpc.rows import Rows
-from robots.collision import Clearances, CollisionModel
 
 Array = NDArray[np.float64]
 

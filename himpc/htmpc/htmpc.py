@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.configuration import Configuration, joint_indices
 from himpc.htmpc.avoidance import Avoidance, clearance
+from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.cost import Effort
 from himpc.htmpc.evidence import evidence
 from himpc.htmpc.kinematics import Knots, desired_values, task_frames
@@ -25,7 +26,6 @@ from himpc.htmpc.tracking import Guard, check_dimensions, tracking
 from himpc.references import Preview
 from himpc.stack import Stack
 from robots import Robot
-from robots.collision import CollisionModel
 
 Array = NDArray[np.float64]
 

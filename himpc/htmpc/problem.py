@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.htmpc.avoidance import PENALTY, Avoidance
+from himpc.htmpc.clearance import Clearances
 from himpc.htmpc.cost import Effort, barrier, barrier_value
 from himpc.htmpc.kinematics import Knots
 from himpc.htmpc.prediction import Start, braking, positions
@@ -17,7 +18,6 @@ from himpc.htmpc.rows import Rows, joined
 from himpc.htmpc.settings import Bounds, HTMPCSettings
 from himpc.htmpc.tracking import Guard, Tracking
 from robots import Robot
-from robots.collision import Clearances
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
 from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
+from himpc.htmpc.clearance import CollisionModel
 from himpc.missions import Progress, advanced, insert, move, release, remove, reorder
 from himpc.plan import Binding
 from himpc.references import Reference
@@ -24,7 +25,6 @@ from lessons.session.velocity_rows import layout_of, write_bounds, write_plan, w
 from lessons.settings.velocity import MobileSettings, changed, with_obstacle
 from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release, RemoveTask
 from robots import InputError, VelocityPlant
-from robots.collision import CollisionModel
 from robots.errors import unknown_name
 
 Array = NDArray[np.float64]

@@ -11,6 +11,7 @@ from htmpc_problems import FREE, at_home, mobile_settings, mobile_stack, point, 
 from himpc import FrameOrientation, FramePosition, Level
 from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
 from himpc.htmpc.avoidance import Avoidance
+from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
 from himpc.htmpc.kinematics import Knots, desired_values, task_frames
 from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
@@ -21,7 +22,7 @@ from himpc.htmpc.tracking import Guard, tracking
 from himpc.references import Hold, Preview
 from himpc.rotation import exp3, log3
 from robots import InputError, Robot, load_robot
-from robots.collision import Ball, CollisionModel
+from robots.collision import Ball
 
 Array = np.ndarray
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from himpc.htmpc.clearance import CollisionModel
 from himpc.missions import Go
 from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.kinds import find_scene, prepared, run_scene, summary_of
@@ -24,7 +25,7 @@ from lessons.settings.missions import random_peaks
 from lessons.settings.velocity import changed, paths
 from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release, RemoveTask, as_data, from_data
 from robots import InputError
-from robots.collision import Ball, CollisionModel
+from robots.collision import Ball
 
 TIMING = ("step_ms", "real_time_factor")
 HOME = np.array([1.48962656, 0.173941])

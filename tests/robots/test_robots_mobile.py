@@ -10,9 +10,8 @@ import pytest
 from scipy.optimize import minimize
 
 from robots import InputError, Plant, VelocityPlant, VelocityPlantSettings, load_robot, load_urdf_text
-from robots.collision import Ball, Box, CollisionModel, Floor
+from robots.collision import Ball, Box
 from robots.robot import Robot
-from robots.spheres import covering_spheres
 
 _DH = (  # d, a, α of the UR10, m and rad: Universal Robots, kinematic parameters
     (0.1273, 0.0, np.pi / 2),
@@ -217,72 +216,6 @@ def test_planar_and_floating_bases_are_refused_in_one_sentence() -> None:
             load_urdf_text(text)
         assert "base" in str(refused.value)
         assert str(refused.value).count("\n") == 0
-
-
-OBSTACLES = (
-    Ball("ball", (1.6, 0.9, 0.8), 0.2),
-    Box("box", (1.9, -0.6, 0.4), (0.4, 0.5, 0.8), 0.4),
-    Floor("floor"),
-)
-
-
-def test_gradients_of_the_distances(robot: Robot) -> None:
-    model = CollisionModel(robot, OBSTACLES, self_collision=True)
-    rng = np.random.default_rng(3)
-    h, compared = 1e-6, 0
-    for _ in range(3):
-        q = robot.home + rng.normal(0, 0.2, 9)
-        at = model.clearances(q[None], 3.0)
-        assert {name for _, name in at.pairs} == {"ball", "box", "floor", "base"}
-        for joint in range(9):
-            e = h * np.eye(9)[joint]
-            ahead, behind = (model.clearances((q + side * e)[None], 3.0).distance for side in (1, -1))
-            np.testing.assert_allclose(at.gradient[:, joint], (ahead - behind) / (2 * h), atol=1e-5)
-            compared += len(ahead)
-    assert compared > 500
-
-
-def test_distances_by_hand(robot: Robot) -> None:
-    """A ball beside the tool, the floor below it, and a ball around it."""
-    at = tool(robot, robot.home)
-    radius = next(sphere.radius for sphere in covering_spheres(robot) if sphere.link == "tool")
-    x, y, z = at
-    beside = Ball("beside", (x + 0.5, y, z), 0.1)
-    around = Ball("around", (x, y, z + 0.01), 0.3)
-    model = CollisionModel(robot, (beside, around, Floor()))
-    near = model.clearances(robot.home[None], 10.0)
-    tools = {(name, d) for (link, name), d in zip(near.pairs, near.distance, strict=True) if link == "tool"}
-    found = {name: min(d for other, d in tools if other == name) for name in ("beside", "around", "floor")}
-    assert found["beside"] == pytest.approx(0.4 - radius, abs=1e-6)
-    assert found["around"] == pytest.approx(0.01 - 0.3 - radius, abs=1e-6)
-    assert found["floor"] == pytest.approx(z - radius, abs=1e-6)
-
-
-def test_the_base_may_stand_on_the_floor_and_the_arm_may_not_enter_the_base(robot: Robot) -> None:
-    floor = CollisionModel(robot, (Floor(),)).clearances(robot.home[None], 10.0)
-    assert floor.distance.min() > 0.3
-    own = CollisionModel(robot, (), self_collision=True)
-    assert own.clearances(robot.home[None], 10.0).distance.min() > 0.1
-    folded = robot.home.copy()
-    folded[3:] = np.pi / 2, np.radians(-10), np.radians(150), 0.0, np.pi / 2, 0.0
-    folded[4] = np.radians(40)
-    assert own.clearances(folded[None], 10.0).distance.min() < 0.0
-
-
-def test_far_pairs_are_left_out(robot: Robot) -> None:
-    model = CollisionModel(robot, OBSTACLES)
-    full = model.clearances(robot.home[None], 10.0)
-    some = model.clearances(robot.home[None], 0.6)
-    assert 0 < len(some.distance) < len(full.distance)
-    np.testing.assert_allclose(np.sort(some.distance), np.sort(full.distance[full.distance <= 0.6]))
-
-
-def test_other_robots_are_covered_along_their_links() -> None:
-    arm = load_robot("iiwa14")
-    spheres = covering_spheres(arm)
-    assert len(spheres) > 7
-    model = CollisionModel(arm, (Ball("ball", (0.0, 0.0, 3.0), 0.5),))
-    assert model.clearances(arm.home[None], 10.0).distance.min() > 0.5
 
 
 def test_wrong_obstacles_are_named() -> None:

@@ -1,0 +1,180 @@
+"""Where all joints of a robot are at many configurations at once: trees of revolute and prismatic joints."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from himpc.cascade.compiled import (
+    FRAMES,
+    INDICES,
+    MATRICES,
+    MATRIX,
+    VECTOR,
+    WHOLE,
+    compiled,
+    inner,
+)
+from robots import Robot
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+class Geometry(NamedTuple):
+    """A robot's tree; row j belongs to joint j, row 0 to the world.
+
+    Attributes:
+        parent: (n+1,) the joint before; it always has a smaller number.
+        turn, shift: (n+1, 3, 3) and (n+1, 3) m, from the joint before to this one at q = 0.
+        axis: (n+1, 3) in the joint's own axes.
+        turns: (n+1,) 1 for a revolute joint, 0 for a prismatic one.
+        moves: (n+1, n) 1 where joint j is carried by the joint of a column.
+    """
+
+    parent: Indices
+    turn: Array
+    shift: Array
+    axis: Array
+    turns: Indices
+    moves: Array
+
+
+class Placed(NamedTuple):
+    """Joints at configurations k.
+
+    Attributes:
+        R: (K, n+1, 3, 3) orientation in the world. p: (K, n+1, 3) m, position. z: (K, n+1, 3) axis.
+    """
+
+    R: Array
+    p: Array
+    z: Array
+
+
+@lru_cache(maxsize=32)
+def geometry(robot: Robot) -> Geometry:
+    """The tables of a robot."""
+    model, n = robot.model, robot.n
+    data = model.createData()
+    # One radian or metre from zero shows the axis of any kind of joint.
+    pin.forwardKinematics(model, data, np.ones(n))
+    axis, turns, moves = np.zeros((n + 1, 3)), np.zeros(n + 1, np.intp), np.zeros((n + 1, n))
+    for joint in range(1, n + 1):
+        motion = model.jointPlacements[joint].actInv(data.liMi[joint])
+        turning = pin.log3(motion.rotation)
+        turns[joint] = int(float(np.linalg.norm(turning)) > 0.5)
+        axis[joint] = turning if turns[joint] else motion.translation
+        axis[joint] /= np.linalg.norm(axis[joint])
+        moves[joint, [other - 1 for other in model.supports[joint] if other > 0]] = 1.0
+    return Geometry(
+        np.array([int(parent) for parent in model.parents], np.intp),
+        np.array([placement.rotation for placement in model.jointPlacements]),
+        np.array([placement.translation for placement in model.jointPlacements]),
+        axis,
+        turns,
+        moves,
+    )
+
+
+@inner
+def _apply(R: Array, x: Array, y: Array) -> None:
+    """y ← R x."""
+    for a in range(3):
+        y[a] = R[a, 0] * x[0] + R[a, 1] * x[1] + R[a, 2] * x[2]
+
+
+@compiled(INDICES, MATRICES, MATRIX, MATRIX, INDICES, MATRIX)
+def _place(
+    parent: Indices, turn: Array, shift: Array, axis: Array, turns: Indices, q: Array
+) -> tuple[Array, Array, Array]:
+    K, joints = len(q), len(parent)
+    R = np.empty((K, joints, 3, 3))
+    p, z = np.zeros((K, joints, 3)), np.zeros((K, joints, 3))
+    F = np.empty((3, 3))
+    for k in range(K):
+        R[k, 0] = 0.0
+        for a in range(3):
+            R[k, 0, a, a] = 1.0
+        for j in range(1, joints):
+            before, here = R[k, parent[j]], R[k, j]
+            x, y, w = axis[j]
+            _apply(before, shift[j], p[k, j])
+            for a in range(3):
+                p[k, j, a] += p[k, parent[j], a]
+                for b in range(3):
+                    F[a, b] = (
+                        before[a, 0] * turn[j, 0, b]
+                        + before[a, 1] * turn[j, 1, b]
+                        + before[a, 2] * turn[j, 2, b]
+                    )
+            if turns[j]:
+                s, c = np.sin(q[k, j - 1]), np.cos(q[k, j - 1])
+                t = 1.0 - c
+                for a in range(3):
+                    f, g, h = F[a]
+                    along = t * (f * x + g * y + h * w)
+                    here[a, 0] = c * f + along * x + s * (g * w - h * y)
+                    here[a, 1] = c * g + along * y + s * (h * x - f * w)
+                    here[a, 2] = c * h + along * w + s * (f * y - g * x)
+            else:
+                here[:] = F
+            _apply(here, axis[j], z[k, j])
+            if not turns[j]:
+                for a in range(3):
+                    p[k, j, a] += q[k, j - 1] * z[k, j, a]
+    return R, p, z
+
+
+def placed(tree: Geometry, q: Array) -> Placed:
+    """All joints at configurations q (K, n)."""
+    return Placed(*_place(tree.parent, tree.turn, tree.shift, tree.axis, tree.turns, np.array(q, float)))
+
+
+@compiled(MATRIX, INDICES, FRAMES, MATRICES, MATRICES, WHOLE, MATRIX, VECTOR)
+def _frame(
+    moves: Array, turns: Indices, R: Array, p: Array, z: Array, joint: int, turn: Array, shift: Array
+) -> tuple[Array, Array, Array]:
+    K, n = len(p), moves.shape[1]
+    place, at, J = np.empty((K, 3, 3)), np.empty((K, 3)), np.zeros((K, 6, n))
+    for k in range(K):
+        _apply(R[k, joint], shift, at[k])
+        for a in range(3):
+            at[k, a] += p[k, joint, a]
+            row = R[k, joint, a]
+            for b in range(3):
+                place[k, a, b] = row[0] * turn[0, b] + row[1] * turn[1, b] + row[2] * turn[2, b]
+        for c in range(n):
+            if moves[joint, c] == 0.0:
+                continue
+            axis = z[k, c + 1]
+            if turns[c + 1]:
+                x, y, w = at[k, 0] - p[k, c + 1, 0], at[k, 1] - p[k, c + 1, 1], at[k, 2] - p[k, c + 1, 2]
+                J[k, 0, c] = axis[1] * w - axis[2] * y
+                J[k, 1, c] = axis[2] * x - axis[0] * w
+                J[k, 2, c] = axis[0] * y - axis[1] * x
+                J[k, 3:, c] = axis
+            else:
+                J[k, :3, c] = axis
+    return place, at, J
+
+
+class Frames(NamedTuple):
+    """A frame at configurations k: orientation R (K, 3, 3), position p (K, 3) m, and J (K, 6, n), linear
+    over angular, world axes, at the frame's origin."""
+
+    R: Array
+    p: Array
+    J: Array
+
+
+def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
+    """A frame of the robot, the tip for an empty name, where its joints are as given."""
+    tree = geometry(robot)
+    frame = robot.model.frames[robot.frame_id(name or robot.tip)]
+    turn, shift = np.ascontiguousarray(frame.placement.rotation), np.array(frame.placement.translation)
+    return Frames(*_frame(tree.moves, tree.turns, *where, frame.parentJoint, turn, shift))
