@@ -6,11 +6,11 @@ import os
 from collections.abc import Iterator
 
 import pytest
-from app_browser import CHROMIUM_ARGS, find_chromium, open_page, press, tab, wait_for_scene
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
+from browsing.hands import CHROMIUM_ARGS, find_chromium, open_page, press, tab, wait_for_scene
 
 
 @pytest.fixture(scope="session")

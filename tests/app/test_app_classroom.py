@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any, cast
 
 import pytest
-from app_browser import SELDOM, open_page, press, write
 from playwright.sync_api import Browser, expect
 
 from app.client.learner import Learner
@@ -15,6 +14,7 @@ from app.link.messages import Play
 from app.link.process import wait_until
 from app.server.classroom import STEERING, Classroom, Watcher
 from app.server.server import PageServer
+from browsing.hands import SELDOM, open_page, press, write
 
 
 @pytest.fixture(scope="module")

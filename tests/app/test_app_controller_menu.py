@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from app_browser import eventually, row, tab
 from playwright.sync_api import Page, expect
 
 from app.client.learner import Learner
 from app.server.server import PageServer
+from browsing.hands import eventually, row, tab
 from himpc.controllers import CONTROLLERS
 
 

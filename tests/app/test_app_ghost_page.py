@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 
 import numpy as np
-from app_browser import eventually, is_drawn, key, position, press, row, tab
 from playwright.sync_api import Page, expect
 
 from app.link.messages import Post
 from app.server.server import PageServer
+from browsing.hands import eventually, is_drawn, key, position, press, row, tab
 from lessons.events import MoveTarget
 
 

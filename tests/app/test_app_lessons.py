@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from app_browser import SELDOM, eventually, key, open_page, press
-from app_lessons import expect_part, hurry, marks, open_lesson, predict, run
 from playwright.sync_api import Browser, Page, expect
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from app.link.messages import Post
 from app.server.server import PageServer
+from browsing.hands import SELDOM, eventually, key, open_page, press
+from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
 from lessons.recording.run import parse_assignment

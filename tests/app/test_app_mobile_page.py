@@ -7,7 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from app_browser import (
+from playwright.sync_api import Browser, Page, expect
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import MissionView
+from app.server.server import PageServer
+from browsing.hands import (
     drag_target,
     eventually,
     is_drawn,
@@ -19,12 +25,6 @@ from app_browser import (
     tab,
     wait_for_scene,
 )
-from playwright.sync_api import Browser, Page, expect
-
-from app.client.learner import Learner
-from app.link.choice import SceneChoice
-from app.link.messages import MissionView
-from app.server.server import PageServer
 from lessons.settings.velocity import MobileSettings
 from robots.collision import Ball, Box, Floor
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from monkey import StandardError, walk
 from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
+from benchmarks.monkey import StandardError, walk
 
 
 def test_a_minute_of_anything_breaks_nothing(browser: Browser) -> None:

@@ -9,7 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from app_browser import (
+from playwright.sync_api import Browser, Page, expect
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import Load
+from app.link.process import wait_until
+from app.server.server import PageServer
+from app.server.wake import WakeUp
+from browsing.hands import (
     camera,
     drag_target,
     eventually,
@@ -28,14 +36,6 @@ from app_browser import (
     wait_for_scene,
     write,
 )
-from playwright.sync_api import Browser, Page, expect
-
-from app.client.learner import Learner
-from app.link.choice import SceneChoice
-from app.link.messages import Load
-from app.link.process import wait_until
-from app.server.server import PageServer
-from app.server.wake import WakeUp
 from lessons.settings.torque import SceneSettings
 from robots import CATALOG
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app_browser import eventually, press, row, set_number, tab, write
 from playwright.sync_api import Page, expect
 
 from app.client.learner import Learner
 from app.server.server import PageServer
+from browsing.hands import eventually, press, row, set_number, tab, write
 from lessons.replay.state import decode
 from lessons.settings.torque import SceneSettings
 

@@ -1,6 +1,6 @@
 """Does memory stay where it is over many changes of lesson, in a real browser and in the server?
 
-    python tests/app/app_memory.py [--switches 50]
+    python -m benchmarks.memory [--switches 50]
 
 Opens lesson after lesson by its card and runs a moment of its first step. After every lesson was open twice
 (until then the browser compiles what it runs often, and keeps that in its heap), measures the page's heap
@@ -20,12 +20,12 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import psutil
-from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
-from app_lessons import open_lesson
 from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
+from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
+from browsing.lessons import open_lesson
 from lessons.course import COURSE, load_lesson
 
 GROWTH = 1.1

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from app_browser import BETWEEN, key, press, row
 from playwright.sync_api import Locator, Page, expect
 
 from app.link.exercise import parts_of
+from browsing.hands import BETWEEN, key, press, row
 from lessons.course import COURSE
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson, Step

@@ -1,6 +1,6 @@
 """A user who tries everything in no order: the page must survive, and the robot must stay inside its bounds.
 
-    python tests/app/monkey.py --minutes 10 --seed 0
+    python -m benchmarks.monkey --minutes 10 --seed 0
 
 Prints what was done as JSON; the exit code is 1 if anything broke.
 """
@@ -23,7 +23,6 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
 from app.client.decimated import History
@@ -31,6 +30,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
+from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from lessons.settings.torque import SceneSettings
 
 STRICT = ("himpc", "hiqp", "nhimpc")

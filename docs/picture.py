@@ -1,22 +1,22 @@
 """Takes the README's picture: docs/page.png, the page with a lesson's step after its run.
 
-python tests/app/app_picture.py
+python -m docs.picture
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
-from app_lessons import expect_part, predict, run
 from playwright.sync_api import expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.server.server import PageServer
+from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
+from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step
 
-OUT = Path(__file__).parents[2] / "docs" / "page.png"
+OUT = Path(__file__).parents[1] / "docs" / "page.png"
 EXERCISE = Exercise("a-redundant-arm", 2)
 
 

@@ -1,4 +1,4 @@
-"""What browser tests need: a running server, a Chromium, and hands that find viser's controls."""
+"""A Chromium, and hands that find the controls viser draws."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Walks through every lesson in a real browser and keeps what it saw: docs/lessons/NAME.webp and an index.
 
-python tests/app/app_gallery.py [NAME …] [--out docs/lessons]
+python -m docs.gallery [NAME …] [--out docs/lessons]
 """
 
 from __future__ import annotations
@@ -9,8 +9,6 @@ import argparse
 import io
 from pathlib import Path
 
-from app_browser import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
-from app_lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Page, expect, sync_playwright
@@ -18,10 +16,12 @@ from playwright.sync_api import Page, expect, sync_playwright
 from app.link.choice import SceneChoice
 from app.link.exercise import parts_of
 from app.server.server import PageServer
+from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
+from browsing.lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from lessons.course import COURSE, load_lesson
 from lessons.teaching.lesson import Lesson, Step
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 WIDTH, HEIGHT = 1200, 920
 PLOTS = 404  # width of the panel on the left, which has nothing to show before a run
 SHOWN = 0.58  # of the pixels, in the pictures that are kept
@@ -93,7 +93,7 @@ def write_index(out: Path) -> None:
     lines = [
         "# The lessons, walked through",
         "",
-        "Every step before and after its run, as the page shows it. `python tests/app/app_gallery.py` makes",
+        "Every step before and after its run, as the page shows it. `python -m docs.gallery` makes",
         "these pictures; the predictions are the tempting ones, so many of them are wrong.",
     ]
     for number, name in enumerate(COURSE, start=1):
