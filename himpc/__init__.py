@@ -1,11 +1,17 @@
 """How a robot is controlled: tasks, limits, prediction, the cascade of QPs, controllers."""
 
-from himpc.controllers import CONTROLLERS, HIMPC, Settings
-from himpc.htmpc import HTMPC, HTMPCSettings
-from himpc.limits import Limits
-from himpc.plan import Plan
-from himpc.stack import Level, Stack
-from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture
+from typing import TYPE_CHECKING
+
+from robots.lazy import lazily
+
+if TYPE_CHECKING:
+    from himpc.catalog import CONTROLLERS
+    from himpc.controllers import HIMPC, Settings
+    from himpc.htmpc import HTMPC, HTMPCSettings
+    from himpc.limits import Limits
+    from himpc.plan import Plan
+    from himpc.stack import Level, Stack
+    from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture
 
 __all__ = [
     "CONTROLLERS",
@@ -23,3 +29,23 @@ __all__ = [
     "Settings",
     "Stack",
 ]
+
+__getattr__ = lazily(
+    "himpc",
+    {
+        "CONTROLLERS": "catalog",
+        "HIMPC": "controllers",
+        "HTMPC": "htmpc",
+        "Damping": "tasks",
+        "FrameOrientation": "tasks",
+        "FramePosition": "tasks",
+        "HTMPCSettings": "htmpc",
+        "Joints": "tasks",
+        "Level": "stack",
+        "Limits": "limits",
+        "Plan": "plan",
+        "Posture": "tasks",
+        "Settings": "controllers",
+        "Stack": "stack",
+    },
+)

@@ -6,21 +6,22 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from himpc.controllers import CONTROLLERS
+from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
 from lessons.events import Event, MoveLevel, Set
 from lessons.recording.run import parse_assignment, run, with_assignments
 from lessons.recording.torque import Recording, arrays, summary
 from lessons.recording.velocity import MobileRecording, mobile_arrays, mobile_summary
 from lessons.recording.velocity_run import mobile_run
-from lessons.scenes.catalog import SCENES, load_scene
-from lessons.scenes.missions import MOBILE_SCENES, mobile_scene
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.missions import mobile_scene
+from lessons.scenes.names import MOBILE_SCENES
 from lessons.scenes.torque_scene import Scene
 from lessons.scenes.velocity_scene import MobileScene
 from lessons.session.torque import Session
 from lessons.session.velocity import MobileSession
 from lessons.settings.levels import moved
 from lessons.settings.torque import SceneSettings, changed, paths, value_at
-from lessons.settings.velocity import VELOCITY_CONTROLLERS, MobileSettings, with_obstacle
+from lessons.settings.velocity import MobileSettings, with_obstacle
 from lessons.settings.velocity import changed as changed_mobile
 from lessons.settings.velocity import paths as mobile_paths
 from lessons.settings.velocity import value_at as value_at_mobile
@@ -33,9 +34,6 @@ AnySession = Session | MobileSession
 AnySettings = SceneSettings | MobileSettings
 AnyEvent = Event | MobileEvent
 AnyRecording = Recording | MobileRecording
-
-ALL_SCENES: dict[str, str] = SCENES | MOBILE_SCENES
-"""One line per scene of either kind."""
 
 
 def find_scene(

@@ -1,17 +1,22 @@
 """What the robot is: its description, its catalog, and the simulated plant."""
 
-from robots.catalog import CATALOG
-from robots.errors import InputError
-from robots.inertia import convergence_gauge, suggest_M_bar
-from robots.load import load_robot, load_urdf_text
-from robots.nominal import NominalModel, NominalSettings
-from robots.plant import Plant
-from robots.report import Finding, ImportReport
-from robots.robot import Robot
-from robots.servo import VelocityPlant, VelocityPlantSettings
-from robots.settings import PlantSettings
-from robots.signals import PlantState
-from robots.urdf import check_urdf
+from typing import TYPE_CHECKING
+
+from robots.lazy import lazily
+
+if TYPE_CHECKING:
+    from robots.catalog import CATALOG
+    from robots.errors import InputError
+    from robots.inertia import convergence_gauge, suggest_M_bar
+    from robots.load import load_robot, load_urdf_text
+    from robots.nominal import NominalModel, NominalSettings
+    from robots.plant import Plant
+    from robots.report import Finding, ImportReport
+    from robots.robot import Robot
+    from robots.servo import VelocityPlant, VelocityPlantSettings
+    from robots.settings import PlantSettings
+    from robots.signals import PlantState
+    from robots.urdf import check_urdf
 
 __all__ = [
     "CATALOG",
@@ -32,3 +37,26 @@ __all__ = [
     "load_urdf_text",
     "suggest_M_bar",
 ]
+
+__getattr__ = lazily(
+    "robots",
+    {
+        "CATALOG": "catalog",
+        "Finding": "report",
+        "ImportReport": "report",
+        "InputError": "errors",
+        "NominalModel": "nominal",
+        "NominalSettings": "nominal",
+        "Plant": "plant",
+        "PlantSettings": "settings",
+        "PlantState": "signals",
+        "Robot": "robot",
+        "VelocityPlant": "servo",
+        "VelocityPlantSettings": "servo",
+        "check_urdf": "urdf",
+        "convergence_gauge": "inertia",
+        "load_robot": "load",
+        "load_urdf_text": "load",
+        "suggest_M_bar": "inertia",
+    },
+)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 _HERE = Path(__file__).parent
 
@@ -29,6 +31,8 @@ class CatalogEntry:
     @property
     def home(self) -> np.ndarray:
         """(n,) rad."""
+        import numpy as np  # not above: the catalog is read where no number is computed
+
         return np.radians(self.home_deg)
 
 

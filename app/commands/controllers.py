@@ -11,7 +11,6 @@ def controllers(json: str | None = None) -> int:
     Args:
         json: write JSON to this file, or to standard output for "-".
     """
-    from himpc import CONTROLLERS
-    from lessons.settings.velocity import VELOCITY_CONTROLLERS
+    from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
 
     return print_list("Controllers", "controller", CONTROLLERS | VELOCITY_CONTROLLERS, json)

@@ -12,9 +12,9 @@ def robots(check: str | None = None, json: str | None = None) -> int:
         check: the URDF file to check. Exit code 1 if it cannot be used.
         json: write JSON to this file, or to standard output for "-".
     """
-    from robots import CATALOG, check_urdf
-
     if check is None:
+        from robots import CATALOG
+
         entries = [
             {"name": entry.name, "title": entry.title, "tip": entry.tip, "joints": len(entry.M_bar)}
             for entry in CATALOG.values()
@@ -25,6 +25,8 @@ def robots(check: str | None = None, json: str | None = None) -> int:
             rows = [[str(value) for value in entry.values()] for entry in entries]
             print_table("Robots", ("robot", "what it is", "tip", "joints"), rows)
         return 0
+    from robots import check_urdf
+
     report = check_urdf(check)
     if json is not None:
         write_json({**report.as_dict(), "usable": report.usable}, json)

@@ -11,6 +11,6 @@ def scenes(json: str | None = None) -> int:
     Args:
         json: write JSON to this file, or to standard output for "-".
     """
-    from lessons.kinds import ALL_SCENES
+    from lessons.scenes.names import ALL_SCENES
 
     return print_list("Scenes", "scene", ALL_SCENES, json)

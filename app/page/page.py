@@ -17,7 +17,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Load, Ready
 from app.page.layout import Stage
 from app.view.robot import aim
-from lessons.kinds import ALL_SCENES
+from lessons.scenes.names import ALL_SCENES
 
 RATE = 30.0  # Hz, poses
 PLOTS_RATE = 12.0  # Hz

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
+from himpc.catalog import CONTROLLERS
 from himpc.controllers.controller import Controller
 from himpc.controllers.himpc import HIMPC
 from himpc.controllers.hiqp import HIQP
@@ -15,19 +16,6 @@ from himpc.controllers.tdeosf import TDEOSF
 from himpc.controllers.weighted import Weighted
 from robots import Robot
 from robots.errors import unknown_name
-
-CONTROLLERS: dict[str, str] = {
-    "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
-    "hiqp": "HIMPC with a horizon of one knot: the best next step, and nothing beyond it",
-    "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they agree",
-    "weighted": "HIMPC without priorities: all tasks in one cost, a level counts as much as its Q",
-    "osf": "operational-space control with null-space projection on the nominal model; no bounds, no damping",
-    "tdeosf": "OSF with time-delay estimation in place of the model; no bounds, no damping",
-    "osf_damped": "OSF with damped least squares near singularities; what the paper's OSF leaves out",
-    "tdeosf_damped": "TDEOSF with damped least squares near singularities",
-    "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
-}
-"""One line per controller."""
 
 _MAKERS: dict[str, Callable[[Robot, Settings], Controller]] = {
     "himpc": HIMPC,

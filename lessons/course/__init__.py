@@ -6,9 +6,12 @@ A file defines `LESSON`. Files are imported when their lesson is asked for.
 from __future__ import annotations
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-from lessons.teaching.lesson import Lesson
 from robots.errors import unknown_name
+
+if TYPE_CHECKING:
+    from lessons.teaching.lesson import Lesson
 
 COURSE: tuple[str, ...] = (
     "a-redundant-arm",

@@ -15,8 +15,7 @@ from typing import Any
 from lessons.course import COURSE
 from lessons.kinds import AnyScene, AnySettings, find_scene, prepared
 from lessons.recording.run import parse_assignment
-from lessons.scenes.catalog import SCENES
-from lessons.scenes.missions import MOBILE_SCENES
+from lessons.scenes.names import MOBILE_SCENES, SCENES
 from lessons.session.torque import Session
 from lessons.session.velocity import MobileSession
 from lessons.settings.assignments import differences

@@ -6,26 +6,12 @@ from collections.abc import Callable
 
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
 from lessons.scenes.hold import hold, hold_of
-from lessons.scenes.missions import MOBILE_SCENES
 from lessons.scenes.mobile_hold import ridgeback_hold
+from lessons.scenes.names import MOBILE_SCENES, SCENES
 from lessons.scenes.planar import planar3_circle, planar3_conflict, planar3_singular
 from lessons.scenes.torque_scene import Scene
 from robots import InputError
 from robots.errors import unknown_name
-
-SCENES: dict[str, str] = {
-    "iiwa14-hold": "KUKA iiwa 14: drag the target; position, then orientation, then posture",
-    "panda-hold": "Franka Panda: the same three levels",
-    "planar3-hold": "planar 3-joint arm: the same, in its plane",
-    "ridgeback-ur10-hold": "Ridgeback and UR10 at torque level: drag hand and base; the hand comes first",
-    "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
-    "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
-    "planar3-conflict": "the same arm on RT2: joint 1 is asked to go where the circle cannot be reached",
-    "planar3-singular": "the same arm on RT3: two circles through the straight, singular arm",
-    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, upright, while joint 1 swings",
-    "iiwa14-circle-paper": "the same circle as the paper most likely ran it: weightless, no velocity limits",
-}
-"""One line per scene."""
 
 _MAKERS: dict[str, Callable[[], Scene]] = {
     "iiwa14-hold": lambda: hold_of("iiwa14"),

@@ -11,6 +11,7 @@ from himpc.htmpc import HTMPCSettings
 from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition
 from lessons.events import MoveTarget
+from lessons.scenes.names import MOBILE_SCENES
 from lessons.scenes.velocity_scene import MobileScene
 from lessons.settings.missions import (
     CLUTTER,
@@ -25,18 +26,6 @@ from lessons.settings.missions import (
 from lessons.settings.velocity import STAGE_WEIGHT, MobileSettings
 from lessons.velocity_events import MobileEvent, Release
 from robots import Robot, load_robot
-
-MOBILE_SCENES: dict[str, str] = {
-    "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
-    "ridgeback-ur10-square": "the HTMPC paper's test: the hand stays, the base is sent out of reach and back",
-    "ridgeback-ur10-waypoints": "two places for the hand; the base finds its own way past the first (Fig. 8)",
-    "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
-    "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
-    "ridgeback-ur10-cluttered": "the base is sent past obstacles it must keep clear of",
-    "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
-    "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
-}
-"""One line per scene."""
 
 DELIVERY_SPEEDS = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0)
 """m/s and rad/s: a robot that works among people."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from himpc.controllers import CONTROLLERS
+from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
 from lessons.kinds import AnySettings
 from lessons.settings.torque import SceneSettings
-from lessons.settings.velocity import VELOCITY_CONTROLLERS
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
-from himpc.controllers import CONTROLLERS, Settings
+from himpc.catalog import CONTROLLERS
+from himpc.controllers import Settings
 from himpc.limits import Limits
 from himpc.references import Reference
 from himpc.stack import Level, Stack

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, get_type_hints
 
+from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import HTMPCSettings
 from himpc.stack import Level, Stack
 from lessons.settings.levels import ordered
@@ -14,14 +15,6 @@ from lessons.settings.values import fitting, typed, weight
 from robots import InputError, VelocityPlantSettings
 from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
-
-VELOCITY_CONTROLLERS: dict[str, str] = {
-    "htmpc": "hierarchical-task MPC: velocity level, lexicographic, previews its references",
-    "htmpc_wpt": "the same without preview: a trajectory arrives as separate waypoints",
-    "stmpc": "single-task MPC: the first task of the window, nothing else",
-    "htidkc": "hierarchical-task inverse differential kinematics: cascaded QPs, no prediction",
-}
-"""One line per controller."""
 
 STAGE_WEIGHT: dict[str, float] = {"proximal": 10.0, "paper": 1.0}
 """Q of (8) that each formulation was tuned with; choosing a formulation sets it."""

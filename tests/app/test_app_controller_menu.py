@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from app.client.learner import Learner
 from app.server.server import PageServer
 from browsing.hands import eventually, row, tab
-from himpc.controllers import CONTROLLERS
+from himpc.catalog import CONTROLLERS
 
 
 def runs(learner: Learner, name: str) -> bool:

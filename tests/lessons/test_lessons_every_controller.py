@@ -10,7 +10,8 @@ import pytest
 from himpc import CONTROLLERS
 from lessons.recording.run import run
 from lessons.recording.torque import Recording
-from lessons.scenes.catalog import SCENES, load_scene
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.names import SCENES
 from lessons.settings.torque import changed
 from robots import CATALOG, load_robot
 

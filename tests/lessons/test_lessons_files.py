@@ -12,7 +12,8 @@ import pytest
 from lessons.events import MoveTarget, Set, from_data
 from lessons.recording.run import run, with_assignments
 from lessons.recording.torque import arrays
-from lessons.scenes.catalog import SCENES, load_scene
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.names import SCENES
 from lessons.scenes.torque_scene import Scene
 from lessons.session.torque import Session
 from robots import InputError

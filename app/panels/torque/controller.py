@@ -10,7 +10,7 @@ from app.panels.torque.deadline import DeadlineFolder
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.sliders import add_slider
 from app.panels.widgets.snapshot import Snapshot
-from himpc.controllers import CONTROLLERS
+from himpc.catalog import CONTROLLERS
 from lessons.events import Set
 from lessons.session.bumpless import HANDOVER_SECONDS
 from lessons.settings.torque import SceneSettings

@@ -12,9 +12,10 @@ from app.html.text import block, esc, formula
 from app.panels.widgets.mirror import Bindings, scalar
 from app.panels.widgets.sliders import add_box, add_menu, add_slider, add_whole
 from app.panels.widgets.snapshot import Snapshot
+from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import FORMULATIONS, LEXICOGRAPHIC, base_joints
 from himpc.htmpc.settings import MAX_HORIZON, efforts
-from lessons.settings.velocity import VELOCITY_CONTROLLERS, MobileSettings
+from lessons.settings.velocity import MobileSettings
 from robots import Robot
 
 _GAINS = ("Gain of level 1 [1/s]", "Gain of level 2 [1/s]")

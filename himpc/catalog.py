@@ -1,0 +1,24 @@
+"""The controllers by name, one line each: for lists and menus, which need none of them loaded."""
+
+from __future__ import annotations
+
+CONTROLLERS: dict[str, str] = {
+    "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
+    "hiqp": "HIMPC with a horizon of one knot: the best next step, and nothing beyond it",
+    "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they agree",
+    "weighted": "HIMPC without priorities: all tasks in one cost, a level counts as much as its Q",
+    "osf": "operational-space control with null-space projection on the nominal model; no bounds, no damping",
+    "tdeosf": "OSF with time-delay estimation in place of the model; no bounds, no damping",
+    "osf_damped": "OSF with damped least squares near singularities; what the paper's OSF leaves out",
+    "tdeosf_damped": "TDEOSF with damped least squares near singularities",
+    "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
+}
+"""Torque level."""
+
+VELOCITY_CONTROLLERS: dict[str, str] = {
+    "htmpc": "hierarchical-task MPC: velocity level, lexicographic, previews its references",
+    "htmpc_wpt": "the same without preview: a trajectory arrives as separate waypoints",
+    "stmpc": "single-task MPC: the first task of the window, nothing else",
+    "htidkc": "hierarchical-task inverse differential kinematics: cascaded QPs, no prediction",
+}
+"""Velocity level."""

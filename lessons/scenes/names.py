@@ -1,0 +1,32 @@
+"""The scenes by name, one line each: for lists and menus, which need none of them loaded."""
+
+from __future__ import annotations
+
+SCENES: dict[str, str] = {
+    "iiwa14-hold": "KUKA iiwa 14: drag the target; position, then orientation, then posture",
+    "panda-hold": "Franka Panda: the same three levels",
+    "planar3-hold": "planar 3-joint arm: the same, in its plane",
+    "ridgeback-ur10-hold": "Ridgeback and UR10 at torque level: drag hand and base; the hand comes first",
+    "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
+    "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
+    "planar3-conflict": "the same arm on RT2: joint 1 is asked to go where the circle cannot be reached",
+    "planar3-singular": "the same arm on RT3: two circles through the straight, singular arm",
+    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, upright, while joint 1 swings",
+    "iiwa14-circle-paper": "the same circle as the paper most likely ran it: weightless, no velocity limits",
+}
+"""Torque level."""
+
+MOBILE_SCENES: dict[str, str] = {
+    "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
+    "ridgeback-ur10-square": "the HTMPC paper's test: the hand stays, the base is sent out of reach and back",
+    "ridgeback-ur10-waypoints": "two places for the hand; the base finds its own way past the first (Fig. 8)",
+    "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
+    "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
+    "ridgeback-ur10-cluttered": "the base is sent past obstacles it must keep clear of",
+    "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
+    "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
+}
+"""Velocity level."""
+
+ALL_SCENES: dict[str, str] = SCENES | MOBILE_SCENES
+"""Either."""
