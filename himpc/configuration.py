@@ -49,10 +49,12 @@ class Configuration:
             index = self.robot.frame_id(frame or self.robot.tip)
             compute, axes = pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
             found = np.empty((self.horizon, 6, self.q.size))
+            # Of a single joint Pinocchio hands out the column without its second axis.
+            columns = found if self.q.size > 1 else found[:, :, 0]
             # The measured state comes last: data.oMf then holds its placement.
             for j in range(self.horizon - 1, 0, -1):
-                found[j] = compute(model, data, self.knots[j - 1], index, axes)
-            found[0] = compute(model, data, self.q, index, axes)
+                columns[j] = compute(model, data, self.knots[j - 1], index, axes)
+            columns[0] = compute(model, data, self.q, index, axes)
             self._placements[frame] = data.oMf[index].copy()
             self._jacobians[frame] = found
         return found

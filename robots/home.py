@@ -54,7 +54,9 @@ def find_home(
     floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
 
     def score(q: np.ndarray) -> float:
-        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:, moving]
+        # Of a single joint Pinocchio hands out the column without its second axis.
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
+        jacobian = J[:, moving]
         jacobian[:3] /= reach
         pin.forwardKinematics(model, data, q)
         tip = pin.updateFramePlacement(model, data, frame)
