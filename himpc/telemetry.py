@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
-"""Bits of the field `at_bound`."""
+"""Bits of the field `at_bound`: which limits bind. A position limit does so through the velocity row, too."""
 
 _SCALARS = (
     "t",
@@ -187,6 +187,6 @@ _BITS = {"torque": AT_TORQUE, "velocity": AT_VELOCITY, "position": AT_POSITION}
 
 
 def _mark_bounds(marks: list[int], active: ActiveRows, rows: Rows) -> None:
-    N = rows.L.shape[1]
-    for row, joint in zip(active.row.tolist(), active.joint.tolist(), strict=True):
-        marks[joint] |= _BITS[rows.kinds[row // N]]
+    found = zip(active.row.tolist(), active.joint.tolist(), active.multiplier.tolist(), strict=True)
+    for row, joint, multiplier in found:
+        marks[joint] |= _BITS[rows.kind(row, joint, multiplier > 0)]

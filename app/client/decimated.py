@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from app.link.ring import Block
-from himpc.telemetry import AT_POSITION, AT_VELOCITY, Layout
+from himpc.telemetry import Layout
 
 WINDOW = 8.0  # s of simulated time in the plots
 BUCKETS = 160  # in a window
@@ -17,7 +17,6 @@ _SLOTS = round((KEPT + WINDOW) / _SPAN)
 _HELD = round(
     1.0 / _SPAN
 )  # buckets without a row of their own that show the one before: a slow rate's period
-_SLOW = 0.85  # of the velocity limit: the controller keeps a few per cent free of its own
 
 Take = Callable[[np.ndarray], None]
 
@@ -70,7 +69,6 @@ class History:
         self.latest = rows[-1]
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
-        bits = self._viable(bits, rows)
         for k in range(3):
             self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
         numbers = np.floor(rows[:, self._t] / _SPAN + 1e-6).astype(np.int64)
@@ -81,14 +79,6 @@ class History:
             self._bits[slot] |= np.bitwise_or.reduce(bits[of_bucket], axis=0)
         for take in self._takers:
             take(rows)
-
-    def _viable(self, bits: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """A joint held by its velocity row far below its velocity limit is really held by its position
-        limit: viability writes that one as a bound on the speed."""
-        fields = self.layout.fields
-        slow = np.abs(rows[:, fields["v"]]) < _SLOW * rows[:, fields["v_limit"]]
-        by_position = (bits & AT_VELOCITY != 0) & slow
-        return np.where(by_position, (bits & ~AT_VELOCITY) | AT_POSITION, bits)
 
     def _hold(self, until: int) -> None:
         """Fills the buckets since the newest one up to another one, which is left out."""

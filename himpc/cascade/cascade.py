@@ -149,7 +149,7 @@ def _climb_down(
 def _containing(rows: Rows, U: Array) -> Rows:
     """The rows widened as far as U needs: lower levels then start from a feasible point."""
     value = rows.L @ U
-    return Rows(rows.L, np.minimum(rows.lower, value), np.maximum(rows.upper, value), rows.kinds)
+    return rows._replace(lower=np.minimum(rows.lower, value), upper=np.maximum(rows.upper, value))
 
 
 def _leaks(upper: Sequence[Array], B: Array, increments: Sequence[Array]) -> list[float]:

@@ -86,7 +86,7 @@ class ActiveRows:
     def labelled(self, rows: Rows) -> list[tuple[Kind, int, int, float, float]]:
         """(kind, knot, joint index, multiplier, slack) of each active row."""
         return [
-            (*rows.label(int(r)), int(a), float(m), float(s))
+            (rows.kind(int(r), int(a), m > 0), rows.knot(int(r)), int(a), float(m), float(s))
             for r, a, m, s in zip(self.row, self.joint, self.multiplier, self.slack, strict=True)
         ]
 

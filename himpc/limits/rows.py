@@ -26,22 +26,30 @@ class Rows(NamedTuple):
         L: (r, N) lower-triangular Toeplitz blocks, one per kind.
         lower, upper: (r, n), ±inf where there is no bound.
         kinds: kind of each block of N rows.
+        stopping: (2, n) where the lower, upper velocity row is the position limit's: below the joint's own
+            limit, the velocity from which it can still stop. None where no row is.
     """
 
     L: Array
     lower: Array
     upper: Array
     kinds: tuple[Kind, ...]
+    stopping: NDArray[np.bool_] | None = None
 
-    def label(self, row: int) -> tuple[Kind, int]:
-        """Kind of a row and the knot (1 … N; torque: 0 … N−1) whose value it bounds."""
+    def kind(self, row: int, joint: int, upper: bool) -> Kind:
+        """Which limit a joint meets at the upper or lower end of a row."""
+        kind = self.kinds[row // self.L.shape[1]]
+        stops = kind == "velocity" and self.stopping is not None and self.stopping[int(upper), joint]
+        return "position" if stops else kind
+
+    def knot(self, row: int) -> int:
+        """The knot (1 … N; torque: 0 … N−1) whose value a row bounds."""
         N = self.L.shape[1]
-        kind = self.kinds[row // N]
-        return kind, row % N + (kind != "torque")
+        return row % N + (self.kinds[row // N] != "torque")
 
     def widened(self, slack: Array) -> Rows:
         """The rows with both bounds moved outward by `slack`, (r, n) ≥ 0."""
-        return Rows(self.L, self.lower - slack, self.upper + slack, self.kinds)
+        return self._replace(lower=self.lower - slack, upper=self.upper + slack)
 
     def torque_only(self) -> Rows:
         """The torque rows (32f) alone."""
@@ -95,9 +103,11 @@ def build_rows(
     bounds = np.empty((2, len(kinds) * N, n))
     bounds[:, :N] = (force.torque - tau_0)[:, None]
 
+    stopping = None
     if limits.position == "viability":
         reaction = T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
         v = viability_bounds(state.q, *force.stops, force.v_limit, force.a_max, reaction)
+        stopping = np.array((-v[0] < force.v_limit, v[1] < force.v_limit))
     else:
         v = np.array((-force.v_limit, force.v_limit))
     scale = M_bar / T_s
@@ -109,7 +119,7 @@ def build_rows(
     if paper:
         q = np.array((force.q_lower, force.q_upper))[:, None]
         bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)
-    return Rows(_toeplitz(N, kinds), bounds[0], bounds[1], kinds)
+    return Rows(_toeplitz(N, kinds), bounds[0], bounds[1], kinds, stopping)
 
 
 def least_slack(rows: Rows) -> Array:

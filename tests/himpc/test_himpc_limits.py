@@ -114,6 +114,30 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
             np.testing.assert_allclose(room, q - force.q_lower, atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("position", "q", "upper", "lower"),
+    [
+        ("viability", 0.0, "velocity", "velocity"),
+        ("viability", 0.98, "position", "velocity"),
+        ("viability", 1.2, "position", "velocity"),  # beyond: it must come back, no faster than it may
+        ("paper", 0.98, "velocity", "velocity"),  # has rows of its own for positions
+        ("off", 0.98, "velocity", "velocity"),
+    ],
+)
+def test_a_velocity_row_tells_which_limit_it_stands_for(
+    position: Any, q: float, upper: str, lower: str
+) -> None:
+    """Near its end a joint, however slow, is held by its position limit."""
+    one = np.ones(1)
+    force = LimitsInForce(-9 * one, 9 * one, 0.5 * one, -one, one, 10 * one)
+    state = JointState(q * one, 0 * one, 0 * one)
+    rows = build_rows(state, 0 * one, one, Limits(position=position), force, 3, 1e-3)
+    assert rows.kind(4, 0, upper=True) == upper and rows.kind(4, 0, upper=False) == lower
+    assert rows.kind(1, 0, upper=True) == "torque"
+    assert rows.widened(np.zeros_like(rows.upper)).kind(4, 0, upper=True) == upper
+    assert [rows.knot(row) for row in (0, 2, 3, 5)] == [0, 2, 1, 3]
+
+
 def random_force(rng: np.random.Generator, n: int) -> LimitsInForce:
     tau = 10 ** rng.uniform(0, 2, n)
     low, high = np.sort(rng.normal(0, 2, (2, n)), axis=0)
