@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from logging import getLogger
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -59,7 +57,3 @@ def orthogonal_bases(B: Array) -> tuple[Array, float]:
             for column in range(c, n):
                 _reflect(reflectors[c], Q[j, :, column], c)
     return Q, least / greatest if greatest > 0.0 else 0.0
-
-
-if orthogonal_bases.stats.cache_misses:
-    getLogger(__name__).warning("compiling the controller's inner loops: some ten seconds, this once")

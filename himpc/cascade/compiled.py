@@ -1,11 +1,22 @@
-"""The door to Numba: functions compiled when their module is first imported."""
+"""The door to Numba: functions compiled when their module is first imported, and kept on disk."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from logging import getLogger
+from pathlib import Path
 from typing import Any
 
 from numba import boolean, float64, intp, njit
+from numba.core import config, event
+
+try:
+    import fcntl
+except ImportError:  # a system without it: two processes may then compile the same
+    fcntl = None
 
 NUMBER, WHOLE, FLAG = float64, intp, boolean
 VECTOR, MATRIX, MATRICES, FRAMES = float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, :, ::1]
@@ -15,21 +26,105 @@ GIVEN, GIVEN_MATRIX, GIVEN_MATRICES = float64[:], float64[:, :], float64[:, :, :
 GIVEN_INDICES = intp[:]
 """What others hand over: it may be a slice."""
 
-inner = njit(cache=True)
+Function = Callable[..., Any]
+
+
+def cached(**options: Any) -> Callable[[Function], Any]:
+    """A decorator that compiles with Numba's `options` and keeps the code on disk: beside the source, else in
+    the user's cache, else in a temporary folder, else not at all."""
+
+    def decorate(function: Function) -> Any:
+        try:
+            return njit(cache=True, **options)(function)
+        except RuntimeError:  # neither the installation nor the user's home can be written to
+            folder = _temporary_folder()
+        if folder is None:
+            return njit(**options)(function)
+        os.environ["NUMBA_CACHE_DIR"] = folder  # for children too
+        setattr(config, "CACHE_DIR", folder)  # noqa: B010  (Numba defines it from a table, unseen by checkers)
+        return njit(cache=True, **options)(function)
+
+    return decorate
+
+
+inner = cached()
 """Compiles a function along with those `compiled` that call it; they stand below it."""
 
 
-def compiled(*arguments: Any) -> Callable[[Callable[..., Any]], Any]:
+def compiled(*arguments: Any) -> Callable[[Function], Any]:
     """Compiles a function for arguments of these types, and for no others.
 
     Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
     that its compilation takes.
     """
 
-    def compile_now(function: Callable[..., Any]) -> Any:
+    def compile_now(function: Function) -> Any:
         fast = inner(function)
-        fast.compile(arguments)
+        with _one_at_a_time(fast.stats.cache_path):
+            fast.compile(arguments)
         fast.disable_compile()
         return fast
 
     return compile_now
+
+
+def _temporary_folder() -> str | None:
+    """For compiled code, nobody else's to write: what is in it will be run. None if there can be none."""
+    try:
+        folder = Path(tempfile.gettempdir(), f"himpc-lab-compiled-{os.getuid() if fcntl else 'user'}")
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        ours = not fcntl or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
+        if ours and not folder.is_symlink() and os.access(folder, os.W_OK):
+            return str(folder)
+        return tempfile.mkdtemp(prefix="himpc-lab-compiled-")
+    except OSError:
+        return None
+
+
+@contextmanager
+def _one_at_a_time(folder: str | None) -> Iterator[None]:
+    """Processes that need the same code wait for the first one, and then find it on disk."""
+    if fcntl is None or folder is None:
+        yield
+        return
+    with open(Path(folder, "himpc-lab.lock"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+class _FirstWord(event.Listener):
+    """What takes so long, once: whoever looks at a terminal would think that nothing happens."""
+
+    def __init__(self) -> None:
+        self._said = False
+
+    def on_start(self, event: Any) -> None:
+        if not self._said:
+            self._said = True
+            getLogger(__name__).warning(
+                "compiling the controller's inner loops: up to half a minute, this once"
+            )
+
+    def on_end(self, event: Any) -> None:
+        """Nothing: it was said."""
+
+
+event.register("numba:compile", _FirstWord())
+
+
+class _Compiled(event.Listener):
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
+
+    def on_start(self, event: Any) -> None:
+        """Nothing: only what is done counts."""
+
+    def on_end(self, event: Any) -> None:
+        function = event.data["dispatcher"].py_func
+        self._tell(f"{function.__module__}.{function.__qualname__}")
+
+
+def told(tell: Callable[[str], None]) -> AbstractContextManager[Any]:
+    """While it is open, `tell` hears the dotted name of every function that had to be compiled."""
+    return event.install_listener("numba:compile", _Compiled(tell))

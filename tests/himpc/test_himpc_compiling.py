@@ -1,0 +1,162 @@
+"""Compiling: once, in one process, wherever the code can be kept, and never in the middle of a run."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import stat
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from himpc.cascade.compiled import told
+from himpc.cascade.compiling import compile_all, compiled_functions
+from himpc.catalog import CONTROLLERS
+from lessons.events import Set
+from lessons.scenes.catalog import load_scene
+from lessons.session.torque import Session
+
+ROOT = Path(__file__).parents[2]
+
+PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
+
+SMALL = """
+from himpc.cascade.compiled import NUMBER, compiled, inner
+
+@inner
+def _twice(x):
+    return 2.0 * x
+
+@compiled(NUMBER)
+def twice(x):
+    return _twice(x)
+"""
+
+LOAD = """
+import os, sys
+from himpc.catalog import CONTROLLERS
+from himpc.cascade.compiled import told
+found = []
+with told(found.append):
+    import small
+assert small.twice(2.0) == 4.0
+print(len(found), small.twice.stats.cache_path)
+"""
+
+
+def like_anybody() -> None:
+    """Root may write wherever it likes; from the next program on it may not."""
+    if os.getuid() == 0:
+        assert ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) == 0
+
+
+def start(folder: Path, script: str = LOAD, **environment: str) -> subprocess.Popen[str]:
+    """Somebody who may read everything and write nothing but to a temporary folder of the test."""
+    install, home, temporary = folder / "install", folder / "home", folder / "tmp"
+    if not install.exists():
+        for each in (install, home, temporary):
+            each.mkdir()
+        (install / "small.py").write_text(SMALL)
+        install.chmod(0o555)
+        home.chmod(0o555)
+    return subprocess.Popen(
+        [sys.executable, "-c", script],
+        cwd=folder,
+        env={
+            "PATH": os.environ["PATH"],
+            "PYTHONPATH": f"{install}:{ROOT}",
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "HOME": str(home),
+            "TMPDIR": str(temporary),
+            **environment,
+        },
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=like_anybody,
+    )
+
+
+def compiled_and_place(process: subprocess.Popen[str]) -> tuple[int, str]:
+    out, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    count, place = out.split()
+    return int(count), place
+
+
+def test_what_cannot_be_kept_here_goes_to_a_temporary_folder_of_ones_own(tmp_path: Path) -> None:
+    """Installation and home read-only: compiled once all the same, where nobody else can write."""
+    first, place = compiled_and_place(start(tmp_path))
+    assert first == 2
+    assert Path(place).is_relative_to(tmp_path / "tmp")
+    kept = Path(place).parent
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o700
+    assert compiled_and_place(start(tmp_path)) == (0, place)
+
+
+def test_a_folder_that_others_may_write_to_is_not_trusted(tmp_path: Path) -> None:
+    _, place = compiled_and_place(start(tmp_path))
+    kept = Path(place).parent
+    kept.chmod(0o777)
+    count, other = compiled_and_place(start(tmp_path))
+    assert count == 2
+    assert not Path(other).is_relative_to(kept)
+
+
+def test_without_any_folder_it_is_compiled_and_not_kept(tmp_path: Path) -> None:
+    script = LOAD.replace("import os, sys", "import os, sys, tempfile; tempfile.tempdir = '/nowhere'")
+    count, place = compiled_and_place(start(tmp_path, script))
+    assert (count, place) == (2, "None")
+
+
+def test_processes_that_start_together_compile_once(tmp_path: Path) -> None:
+    """The others wait, and find it on disk."""
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    together = [start(tmp_path, NUMBA_CACHE_DIR=str(shared)) for _ in range(3)]
+    assert sorted(compiled_and_place(each)[0] for each in together) == [0, 0, 2]
+
+
+def test_one_word_tells_of_it_once(tmp_path: Path) -> None:
+    process = start(tmp_path)
+    errors = process.communicate(timeout=120)[1]
+    assert errors.count("compiling") == 1 and len(errors.splitlines()) == 1
+    assert start(tmp_path).communicate(timeout=120)[1] == ""
+
+
+def test_everything_compiled_is_counted() -> None:
+    """Every function that Numba compiles is in the list that the progress counts."""
+    told_of: list[tuple[int, int]] = []
+    compile_all(lambda ready, total: told_of.append((ready, total)))
+    listed = compiled_functions()
+    for module in listed:
+        for name, value in vars(import_module(module)).items():
+            if hasattr(value, "py_func"):
+                function = value.py_func
+                assert f"{function.__module__}.{function.__qualname__}" in listed[function.__module__], name
+    assert all(ready <= total for ready, total in told_of)
+    again: list[Any] = []
+    compile_all(lambda *counts: again.append(counts))
+    assert not again
+
+
+def test_no_setting_compiles_in_the_middle_of_a_run() -> None:
+    """Other horizons, levels, weights and controllers find what they need compiled."""
+    compile_all(lambda *_: None)
+    session = Session(load_scene("iiwa14-hold"), seed=0)
+    late: list[str] = []
+    changes = [
+        *(Set("horizon", 8), Set("levels.1.Q", (100.0, 200.0, 300.0)), Set("R", 3.0)),
+        *(Set(f"levels.{level}.enabled", on) for level, on in ((2, False), (1, False), (2, True), (1, True))),
+        *(Set("controller", name) for name in CONTROLLERS),
+        *(Set("controller", "himpc"), Set("route", "explicit")),
+    ]
+    with told(late.append):
+        for change in changes:
+            session.post(change)
+            for _ in range(3):
+                session.tick()
+    assert not session.notices
+    assert not late
