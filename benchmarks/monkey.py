@@ -44,7 +44,25 @@ ANSWER = 60.0
 """s: a page that shows nothing new for so long, while its robot should move, is dead."""
 _PATIENCE = 1_500
 """ms for an element to take a click; what is covered or gone by then is not clicked."""
-_HOTKEYS = ("Space", "1", "2", "3", "?", "Escape", "ArrowLeft", "ArrowRight", "n", "b", "r", "s", "d", "l")
+_HOTKEYS = ("Space", "?", "Escape", "ArrowLeft", "ArrowRight", *"123nbrsdltjk")
+    "Space",
+    "1",
+    "2",
+    "3",
+    "?",
+    "Escape",
+    "ArrowLeft",
+    "ArrowRight",
+    "n",
+    "b",
+    "r",
+    "s",
+    "d",
+    "l",
+    "t",
+    "j",
+    "k",
+)
 _PANELS = ("Start", "Tasks", "Control", "Plant", "Robot", "Help", "Errors", "Joints", "Who binds")
 
 

@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from app.panels.run.playback import PlaybackPanel
 from app.panels.run.scene import RobotPanel
 from app.panels.run.share import SharePanel
 from app.panels.run.timeline import TimeLine
+from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import in_order
@@ -98,21 +100,17 @@ class Stage:
         with tabs.add_tab("Help"):
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS[: len(self._settings().levels)]):
-            self._level_hotkey(gui, place, key)
+            add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):
             self._binding = BindingPanel(gui, self._colours)
         plots.dock_left()
         plots.set_width(400)
 
-    def _level_hotkey(self, gui: viser.GuiApi, place: int, key: str) -> None:
-        command = gui.add_command(f"Level {place + 1} on or off", hotkey=key)  # pyright: ignore[reportArgumentType]
-
-        @command.on_trigger
-        async def _(_: object) -> None:
-            event = self._face.toggle(place)
-            if event is not None:
-                self._post(event)
+    def _toggle(self, place: int) -> None:
+        event = self._face.toggle(place)
+        if event is not None:
+            self._post(event)
 
     def _build_scene(self, scene: viser.SceneApi, dark: bool) -> None:
         # Shadows triple the cost of a frame, which decides on a laptop or a phone.

@@ -24,6 +24,7 @@ from lessons.events import Set
 from lessons.kinds import AnyEvent
 from lessons.scenes.catalog import load_scene
 from lessons.settings.torque import SceneSettings, changed
+from lessons.settings.values import choices_of
 
 
 @pytest.fixture(scope="module")
@@ -166,3 +167,18 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
     ControllerPanel(viser_server.gui, bindings, far, scene.robot)
     values = {handle.value for handle in viser_server.gui._gui_input_handle_from_uuid.values()}
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
+
+
+@pytest.mark.parametrize("path", ["solver", "route", "R_on", "limits.position"])
+def test_menus_offer_every_word_a_setting_may_hold(viser_server: viser.ViserServer, path: str) -> None:
+    """A code may bring any of them: a menu that does not know its own value is no page."""
+    scene, bindings = load_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
+    owner: Any = scene.settings.limits if path.startswith("limits.") else scene.settings
+    words = choices_of(type(owner), path.removeprefix("limits."))
+    assert len(words) > 1
+    for word in words:
+        viser_server.gui.reset()
+        ControllerPanel(viser_server.gui, bindings, changed(scene.settings, path, word), scene.robot)
+        handles = viser_server.gui._gui_input_handle_from_uuid.values()
+        menus = [each for each in handles if isinstance(each, viser.GuiDropdownHandle)]
+        assert any(menu.options == words and menu.value == word for menu in menus)

@@ -165,7 +165,7 @@ def test_pause_step_reset(page: Page, learner: Learner) -> None:
     ticks = learner.status.ticks
     press(page, "Step")
     assert eventually(page, lambda: learner.status is not None and learner.status.ticks == ticks + 1)
-    key(page, "s")
+    key(page, "t")
     assert eventually(page, lambda: learner.status is not None and learner.status.ticks == ticks + 2)
     key(page, "r")
     assert eventually(page, lambda: abs(position(page, "/actual")[1]) < 0.01)

@@ -16,6 +16,7 @@ from app.link.exercise import Exercise, Lecture, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
 from app.panels.lesson.claims import after, heading, idea, pictures, state
 from app.panels.lesson.prediction import Asking
+from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.path_control import add_control
 from lessons.kinds import AnyEvent, AnySettings
@@ -53,14 +54,7 @@ class LessonPanel:
             ("Lesson: next step", "N", self.next),
             ("Lesson: previous step", "B", self.back),
         ):
-            self._hotkey(label, key, does)
-
-    def _hotkey(self, label: str, key: str, does: Callable[[], None]) -> None:
-        command = self._gui.add_command(label, hotkey=key)  # pyright: ignore[reportArgumentType]
-
-        @command.on_trigger
-        async def _(_: object) -> None:
-            does()
+            add_command(gui, label, key, does)
 
     def _post(self, event: AnyEvent) -> None:
         self._send(Post(event))

@@ -10,15 +10,16 @@ from app.panels.widgets.window import Window
 
 _KEYS = (
     ("Space", "run or pause"),
-    ("S", "a single control tick (pauses first)"),
+    ("T", "a single control tick (pauses first)"),
     ("R", "robot back to its start, settings kept"),
-    ("J, L", "while paused: look back and forward, with Shift in larger steps"),
+    ("J, K", "while paused: look back and forward, with Shift in larger steps"),
     ("G", "pull by hand or not: drag any link, the red arrow is the force"),
     ("L", "all lessons"),
     ("P, N, B", "in a lesson: play the step's script, next step, step before"),
     ("?", "this help"),
     ("1 … 9", "switch the level at that place on or off"),
     ("Ctrl K", "every command, searchable"),
+    ("W A S D Q E", "the camera goes forward, left, back, right, down, up; the arrow keys turn it"),
     ("", "a field or a checkbox you just used keeps the keys: click beside it first"),
 )
 _MARKS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
+from functools import partial
 
 import viser
 
@@ -13,6 +14,7 @@ from app.client.wish import HOLD, Wish
 from app.html.palette import GOOD, LEVELS
 from app.html.text import badge, block, stopped
 from app.link.messages import Play, Post, Speed, Step
+from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import Reset
@@ -36,7 +38,7 @@ class PlaybackPanel:
         self._buttons = gui.add_button_group(
             "Playback",
             (_PAUSE, _STEP, _RESET, _RESET_ALL),
-            hint="Space: run or pause · S: one control tick · R: robot back to its start. "
+            hint="Space: run or pause · T: one control tick · R: robot back to its start. "
             "Reset all also brings every setting back.",
         )
         self._speed = gui.add_slider(
@@ -62,16 +64,9 @@ class PlaybackPanel:
         for label, key, choice in (
             ("Run or pause", "space", _RUN),
             ("Reset the robot", "R", _RESET),
-            ("Single control tick", "S", _STEP),
+            ("Single control tick", "T", _STEP),
         ):
-            self._hotkey(gui, label, key, choice)
-
-    def _hotkey(self, gui: viser.GuiApi, label: str, key: str, choice: str) -> None:
-        command = gui.add_command(label, hotkey=key)  # pyright: ignore[reportArgumentType]
-
-        @command.on_trigger
-        async def _(_: object) -> None:
-            self._click(choice)
+            add_command(gui, label, key, partial(self._click, choice))
 
     def _click(self, choice: str) -> None:
         learner = self._learner

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import asyncio
 import math
+from functools import partial
 
 import viser
 
 from app.client.learner import Learner
 from app.html.text import block
+from app.panels.widgets.command import add_command
 
 _STEP = 0.05  # s
 _SHORT, _LONG = 0.1, 1.0  # s per key press
@@ -33,7 +35,7 @@ class TimeLine:
             initial_value=0.0,
             visible=False,
             hint="Robot, targets, traces and plots as they were, up to a minute ago. "
-            f"J and L: {_SHORT:g} s, with Shift {_LONG:g} s; in the slider also ← and →.",
+            f"J and K: {_SHORT:g} s, with Shift {_LONG:g} s; in the slider also ← and →.",
         )
         self._live = gui.add_button("Back to now", visible=False)
         self._words = gui.add_html("", visible=False)
@@ -47,22 +49,17 @@ class TimeLine:
         async def _(_: object) -> None:
             self._set(0.0)
 
-        # The arrow keys turn viser's camera; these two are what video players have.
-        for words, key, modifier, seconds in (
-            ("Look back a little", "J", None, -_SHORT),
-            ("Look forward a little", "L", None, _SHORT),
-            ("Look back a second", "J", "shift", -_LONG),
-            ("Look forward a second", "L", "shift", _LONG),
+        for words, key, shift, seconds in (
+            ("Look back a little", "J", False, -_SHORT),
+            ("Look forward a little", "K", False, _SHORT),
+            ("Look back a second", "J", True, -_LONG),
+            ("Look forward a second", "K", True, _LONG),
         ):
-            self._hotkey(gui, words, key, modifier, seconds)
+            add_command(gui, words, key, partial(self._shift, seconds), shift)
 
-    def _hotkey(self, gui: viser.GuiApi, words: str, key: str, modifier: str | None, seconds: float) -> None:
-        command = gui.add_command(words, hotkey=key, modifier=modifier)  # pyright: ignore[reportArgumentType]
-
-        @command.on_trigger
-        async def _(_: object) -> None:
-            if self._paused_at is not None:
-                self._set(float(self._slider.value) + seconds)
+    def _shift(self, seconds: float) -> None:
+        if self._paused_at is not None:
+            self._set(float(self._slider.value) + seconds)
 
     def _set(self, ago: float) -> None:
         if not self._closed:

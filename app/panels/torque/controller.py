@@ -14,6 +14,7 @@ from himpc.catalog import CONTROLLERS
 from lessons.events import Set
 from lessons.session.bumpless import HANDOVER_SECONDS
 from lessons.settings.torque import SceneSettings
+from lessons.settings.values import choices_of
 from robots import Robot
 
 
@@ -101,7 +102,7 @@ class ControllerPanel:
             velocity = gui.add_checkbox("Velocity", limits.velocity)
             position = gui.add_dropdown(
                 "Position",
-                ("viability", "paper", "off"),
+                choices_of(type(limits), "position"),
                 initial_value=limits.position,
                 hint="viability: a speed from which the joint can still stop. paper: the rows as printed, "
                 "which a few milliseconds of horizon cannot keep: the list of rungs shows it.",
@@ -123,14 +124,17 @@ class ControllerPanel:
 
     def _solver(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
         with gui.add_folder("Solver", expand_by_default=False):
-            for label, path, options, hint in (
-                ("Route", "route", ("structured", "explicit"), "Two ways to the same torque"),
-                ("QP solver", "solver", ("daqp", "proxqp"), "For the QPs with active bounds"),
-                ("R weighs", "R_on", ("torque", "acceleration"), "Δτ as printed, or M̄⁻¹Δτ"),
+            for label, path, hint in (
+                ("Route", "route", "Two ways to the same torque"),
+                ("QP solver", "solver", "For the QPs with active bounds; qpoases needs the extra 'bench'"),
+                ("R weighs", "R_on", "Δτ as printed, or M̄⁻¹Δτ"),
             ):
                 with gui.add_folder(None):
                     choice = gui.add_dropdown(
-                        label, options, initial_value=str(getattr(settings, path)), hint=hint
+                        label,
+                        choices_of(type(settings), path),
+                        initial_value=str(getattr(settings, path)),
+                        hint=hint,
                     )
                 bindings.bind(
                     choice,

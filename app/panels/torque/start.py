@@ -10,6 +10,7 @@ import viser
 from app.client.wish import Send
 from app.html.palette import BAD, GOOD
 from app.html.text import block, esc, quantity
+from app.panels.widgets.command import add_command
 from app.panels.widgets.snapshot import Snapshot
 from app.view.reachability import Verdict
 from lessons.events import Push, Set
@@ -73,11 +74,7 @@ class StartPanel:
             vector = tuple(float(x) for x in force.value * direction)
             post(Push(str(body.value), vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
 
-        grab = gui.add_command("Pull at links by hand, or not", hotkey="G")
-
-        @grab.on_trigger
-        async def _(_: object) -> None:
-            self.pull.value = not self.pull.value
+        add_command(gui, "Pull at links by hand, or not", "G", self._grab)
 
         @self._load.on_click
         async def _(_: object) -> None:
@@ -91,6 +88,9 @@ class StartPanel:
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
             if event.client is not None:
                 self.on_theme(bool(self.dark.value))
+
+    def _grab(self) -> None:
+        self.pull.value = not self.pull.value
 
     def dragged(self) -> None:
         """The first drag happened: go on to what comes next."""

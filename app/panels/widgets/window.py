@@ -7,6 +7,8 @@ from typing import Any
 
 import viser
 
+from app.panels.widgets.command import add_command
+
 
 class Window:
     """Filled afresh each time it opens."""
@@ -17,18 +19,13 @@ class Window:
         """hotkey: opens and closes it; shift: together with Shift."""
         self._gui, self._title, self._fill = gui, title, fill
         self._modal: Any = None  # viser does not name the type
-        command = gui.add_command(
-            title,
-            hotkey=hotkey,  # pyright: ignore[reportArgumentType]
-            modifier="shift" if shift else None,
-        )
+        add_command(gui, title, hotkey, self._switch, shift)
 
-        @command.on_trigger
-        async def _(_: object) -> None:
-            if self._modal is None:
-                self.open()
-            else:
-                self.close()
+    def _switch(self) -> None:
+        if self._modal is None:
+            self.open()
+        else:
+            self.close()
 
     def open(self) -> None:
         if self._modal is not None:

@@ -1,0 +1,129 @@
+"""A page without a browser: speaks viser's protocol and keeps what the page shows, but draws nothing."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import zstandard
+from viser import __version__, _messages
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+_HEAD = 16  # bytes: sizes of the message part, raw and compressed
+
+
+def messages_of(raw: bytes) -> list[dict[str, Any]]:
+    """What one packet says; arrays stay behind as placeholders."""
+    size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
+    inner = zstandard.ZstdDecompressor().decompress(raw[_HEAD : _HEAD + packed], max_output_size=size)
+    return msgspec.msgpack.decode(inner)["messages"]
+
+
+class Wire:
+    """A connection that answers what a page is asked (camera, empty local storage).
+
+    Attributes:
+        controls: by identity, what the page shows, as the message that made it with the updates since.
+        commands: by identity, what the palette holds.
+        notices: (title, body) of every notification.
+    """
+
+    def __init__(self, url: str) -> None:
+        protocol: Any = [f"viser-v{__version__}"]
+        self.controls: dict[str, dict[str, Any]] = {}
+        self.commands: dict[str, dict[str, Any]] = {}
+        self.notices: list[tuple[str, str]] = []
+        self._socket = connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None)
+        self.say(_camera())
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Wire:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+        self._reader.join(5.0)
+
+    def say(self, message: _messages.Message) -> None:
+        """What a browser would send."""
+        self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
+
+    def write(self, uuid: str, **updates: Any) -> None:
+        """Writes attributes of a control, as its input does with `value`."""
+        self.say(_messages.GuiUpdateMessage(uuid, updates))
+
+    def find(self, label: str) -> str | None:
+        """The control with a label."""
+        shown = list(self.controls.items())
+        return next((uuid for uuid, each in shown if each["props"].get("label") == label), None)
+
+    def shows(self, text: str) -> bool:
+        """Whether a piece of text is among what the page shows."""
+        shown = [each for each in list(self.controls.values()) if each["props"].get("visible", True)]
+        return any(text in str(each["props"].get("content", "")) for each in shown)
+
+    def _read(self) -> None:
+        while True:
+            try:
+                raw = self._socket.recv()
+            except ConnectionClosed:
+                return
+            if isinstance(raw, bytes):
+                for message in messages_of(raw):
+                    self._take(message)
+
+    def _take(self, message: dict[str, Any]) -> None:
+        kind: str = message["type"]
+        match kind:
+            case "LocalStorageGetItemRequestMessage":
+                answer = _messages.LocalStorageGetItemResponseMessage
+                self.say(answer(None, None, message["request_uuid"]))
+            case "RegisterCommandMessage":
+                self.commands[message["uuid"]] = message["props"]
+            case "RemoveCommandMessage":
+                self.commands.pop(message["uuid"], None)
+            case "NotificationShowMessage" | "NotificationUpdateMessage":
+                props = message.get("props", message)
+                self.notices.append((str(props.get("title")), str(props.get("body"))))
+            case "GuiRemoveMessage":
+                self.controls.pop(message["uuid"], None)
+            case "GuiUpdateMessage" if message["uuid"] in self.controls:
+                self._update(self.controls[message["uuid"]], message["updates"])
+            case _ if kind.startswith("Gui") and "props" in message and "uuid" in message:
+                self.controls[message["uuid"]] = message
+            case _:
+                pass
+
+    @staticmethod
+    def _update(control: dict[str, Any], updates: dict[str, Any]) -> None:
+        for name, value in updates.items():
+            (control if name == "value" else control["props"])[name] = value
+
+
+def eventually(condition: Callable[[], bool], timeout: float = 40.0) -> bool:
+    """Whether a condition comes true."""
+    end = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def _camera() -> _messages.ViewerCameraMessage:
+    return _messages.ViewerCameraMessage(
+        wxyz=(1.0, 0.0, 0.0, 0.0),
+        position=(2.0, -2.0, 1.5),
+        fov=0.9,
+        near=0.01,
+        far=100.0,
+        image_height=900,
+        image_width=1440,
+        look_at=(0.0, 0.0, 0.5),
+        up_direction=(0.0, 0.0, 1.0),
+    )

@@ -1,0 +1,49 @@
+"""Keys: no two commands share one, none of them moves the camera, and the help names them all."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import viser
+
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
+from app.panels.widgets.command import CAMERA_KEYS
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+
+
+def test_the_cameras_keys_are_those_of_viser() -> None:
+    source = Path(viser.__file__).parent / "client" / "src" / "CameraControls.tsx"
+    listed = re.search(r"CAMERA_MOVEMENT_KEYS = new Set\(\[(.*?)\]\)", source.read_text(), re.DOTALL)
+    assert listed is not None
+    assert {name.removeprefix("Key") for name in re.findall(r'"(\w+)"', listed[1])} == CAMERA_KEYS
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [
+        SceneChoice("planar3-hold"),
+        SceneChoice("ridgeback-ur10-drag"),
+        SceneChoice.of_lesson(Exercise("deadlines")),
+    ],
+    ids=["torque", "velocity", "lesson"],
+)
+def test_every_command_has_a_key_of_its_own(choice: SceneChoice) -> None:
+    server = PageServer(choice, port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows("every command, searchable") and len(page.commands) >= 10)
+            commands = [each for each in page.commands.values() if each["hotkey"] is not None]
+            keys = [(each["hotkey"], each["modifier"]) for each in commands]
+            assert len(set(keys)) == len(keys), sorted(keys)
+            assert {key for key, _ in keys} & CAMERA_KEYS == set()
+            shown = " ".join(str(each["props"].get("content")) for each in page.controls.values())
+            table = shown[shown.index("run or pause") - 200 : shown.index("every command, searchable")]
+            for key, _ in keys:
+                names = {"space": "Space"} if not key.isdigit() else {key: "1 … 9"}
+                assert re.search(rf"<b>[^<]*{re.escape(names.get(key, key))}[^<]*</b>", table), key
+    finally:
+        server.close()
