@@ -45,24 +45,6 @@ ANSWER = 60.0
 _PATIENCE = 1_500
 """ms for an element to take a click; what is covered or gone by then is not clicked."""
 _HOTKEYS = ("Space", "?", "Escape", "ArrowLeft", "ArrowRight", *"123nbrsdltjk")
-    "Space",
-    "1",
-    "2",
-    "3",
-    "?",
-    "Escape",
-    "ArrowLeft",
-    "ArrowRight",
-    "n",
-    "b",
-    "r",
-    "s",
-    "d",
-    "l",
-    "t",
-    "j",
-    "k",
-)
 _PANELS = ("Start", "Tasks", "Control", "Plant", "Robot", "Help", "Errors", "Joints", "Who binds")
 
 

@@ -170,8 +170,11 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
 
 
 @pytest.mark.parametrize("path", ["solver", "route", "R_on", "limits.position"])
-def test_menus_offer_every_word_a_setting_may_hold(viser_server: viser.ViserServer, path: str) -> None:
+def test_menus_offer_every_word_a_setting_may_hold(
+    viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A code may bring any of them: a menu that does not know its own value is no page."""
+    monkeypatch.setattr("himpc.controllers.settings.is_installed", lambda _: True)  # CasADi is an extra
     scene, bindings = load_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
     owner: Any = scene.settings.limits if path.startswith("limits.") else scene.settings
     words = choices_of(type(owner), path.removeprefix("limits."))

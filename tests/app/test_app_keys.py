@@ -43,7 +43,7 @@ def test_every_command_has_a_key_of_its_own(choice: SceneChoice) -> None:
             shown = " ".join(str(each["props"].get("content")) for each in page.controls.values())
             table = shown[shown.index("run or pause") - 200 : shown.index("every command, searchable")]
             for key, _ in keys:
-                names = {"space": "Space"} if not key.isdigit() else {key: "1 … 9"}
-                assert re.search(rf"<b>[^<]*{re.escape(names.get(key, key))}[^<]*</b>", table), key
+                names = {"space": "Space"} if not str(key).isdigit() else {str(key): "1 … 9"}
+                assert re.search(rf"<b>[^<]*{re.escape(names.get(str(key), str(key)))}[^<]*</b>", table), key
     finally:
         server.close()
