@@ -86,7 +86,8 @@ class Monkey:
         self._random = random.Random(seed)
         self._complaints = complaints
         self._seen = 0
-        self._block = self._unbounded = ""
+        self._block: Block | None = None
+        self._unbounded: Block | None = None
         self._moved = (time.monotonic(), -1)
         page.on("pageerror", self._hear_error)
         page.on("dialog", lambda dialog: dialog.dismiss())
@@ -208,8 +209,8 @@ class Monkey:
         self._is_alive(learner)
 
     def _judge(self, block: Block, history: History) -> None:
-        if block.name != self._block:
-            self._block, self._seen = block.name, 0
+        if block is not self._block:
+            self._block, self._seen = block, 0
         start, rows = block.since(self._seen)
         self._seen = start + len(rows)
         self.found.rows += len(rows)
@@ -224,8 +225,8 @@ class Monkey:
             return
         # Null-space methods know no bounds: what motors that do not saturate are asked for, they give.
         if settings.controller in UNBOUNDED and not settings.plant.saturate:
-            self._unbounded = block.name
-        if self._unbounded != block.name:
+            self._unbounded = block
+        if self._unbounded is not block:
             self._judge_torque(rows, fields)
         if settings.controller in STRICT:
             leak = float(np.nanmax(rows[:, fields["priority_leak"]], initial=0.0))

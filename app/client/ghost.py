@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from app.client.simulation import Simulation
 from app.link.messages import Failed, Follow, Reached, Refused, Report, Script
-from app.link.process import Process, Spares
+from app.link.process import Process
+from app.link.spares import Spares
 
 LEAD = 0.2
 """s of simulated time that the robot may be ahead of its ghost. A ghost that cannot keep up slows both down,
@@ -16,6 +18,8 @@ and the page says so: one that lagged behind would look like one that follows it
 class Ghost(Simulation):
     """A process that follows. It begins where the first script says, and what it tells of the time it has
     come to keeps its leader on the leash."""
+
+    who = "The ghost"
 
     def __init__(
         self,
@@ -30,11 +34,19 @@ class Ghost(Simulation):
         on a thread of the process."""
         self.words, self.own = words, own
         self._reached, self._lost = reached, lost
+        self._told_at: float | None = None
         super().__init__(spares)
 
     def hear(self, script: Script) -> None:
         """Passes on what the leader told."""
+        if self._told_at is None:
+            self._told_at = time.monotonic()
         self.send(Follow(script, self.own))
+
+    @property
+    def quiet(self) -> float:
+        """As `Simulation.quiet`; before it was told anything it has nothing to say."""
+        return 0.0 if self._told_at is None else min(super().quiet, time.monotonic() - self._told_at)
 
     def _hear(self, process: Process, report: Report) -> None:
         super()._hear(process, report)

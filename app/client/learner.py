@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from dataclasses import replace
 from queue import Empty, Queue
 
 from app.client.ghost import Ghost
-from app.client.simulation import Simulation
+from app.client.simulation import Simulation, aside
+from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture
-from app.link.messages import Lead, Leash, Load, Ready, Report, ResetAll, Script, Status, Tell, Told
-from app.link.process import Process, Spares
+from app.link.messages import Failed, Lead, Leash, Load, Ready, Report, ResetAll, Script, Status, Tell, Told
+from app.link.process import Process
+from app.link.spares import Spares
 from lessons.teaching import lesson
 
 
@@ -25,31 +28,46 @@ class Learner(Simulation):
         self.left_at = time.monotonic()
         self.ghost: Ghost | None = None
         self.lecture: Lecture | None = None
-        self._asking: Queue[Told] | None = None
+        self._asking: deque[Queue[Told | None]] = deque()
         super().__init__(spares)
+        self.send(Load(choice))
 
-    def _start(self) -> None:
-        super()._start()
-        self.send(Load(self.choice))
-        if self.ghost is not None:
-            self.send(Lead(True))
+    def trouble(self) -> Trouble | None:
+        """What is the matter with the simulation or its ghost, if anything is."""
+        ghost = self.ghost
+        return super().trouble() or (None if ghost is None else ghost.trouble())
+
+    def load(self, choice: SceneChoice) -> None:
+        """Another scene, in a new process if this one is in trouble."""
+        if self.trouble() is None:
+            self.send(Load(choice))
+        else:
+            self.restart(choice)
 
     def reset_all(self) -> None:
-        """The scene from its beginning; after a crash in a new process."""
-        if self.failure is None:
+        """The scene from its beginning; in a new process if this one is in trouble."""
+        if self.trouble() is None:
             self.send(ResetAll())
         else:
             self.restart()
 
-    def restart(self) -> None:
-        """A new process for the same scene."""
+    def restart(self, choice: SceneChoice | None = None) -> None:
+        """A new process, for another scene or for the one that was last there. The one before ends, by force
+        if it does not answer. Waits for neither."""
         with self._lock:
             if self._closed:
                 return
-            before = self._process
+            before, ghost = self._process, self.ghost
+            mute = super().trouble() is not None
             self.failure = None
+            self._forget_questions()
             self._start()
-        before.close()
+            self.send(Load(choice or self.choice))
+            if ghost is not None:
+                self.send(Lead(True))
+        aside(lambda: before.close(0.0 if mute else 1.0))
+        if ghost is not None and ghost.trouble() is not None:
+            self._replace_ghost(ghost.words, ghost.own)
 
     def _enter(self, ready: Ready) -> None:
         super()._enter(ready)
@@ -62,25 +80,44 @@ class Learner(Simulation):
 
     def _hear(self, process: Process, report: Report) -> None:
         super()._hear(process, report)
-        if isinstance(report, Status) and report.lecture is not None and process is self._process:
-            self.lecture = report.lecture
-            self.choice = replace(SceneChoice.of_lesson(self.lecture.exercise), seed=self.choice.seed)
-        if isinstance(report, Told) and self._asking is not None:
-            self._asking.put(report)
-        ghost = self.ghost
-        if isinstance(report, Script) and ghost is not None and process is self._process:
-            ghost.hear(report)
+        if process is not self._process:
+            return
+        match report:
+            case Status(lecture=Lecture() as lecture):
+                self.lecture = lecture
+                self.choice = replace(SceneChoice.of_lesson(lecture.exercise), seed=self.choice.seed)
+            case Told():
+                with self._lock:
+                    if self._asking:
+                        self._asking.popleft().put(report)
+            case Failed():
+                with self._lock:
+                    self._forget_questions()
+            case Script():
+                ghost = self.ghost
+                if ghost is not None:
+                    ghost.hear(report)
+            case _:
+                pass
+
+    # ---------------------------------------------------------------- questions
 
     def ask(self, timeout: float = 10.0) -> Told | None:
         """What the run was; None if the simulation does not answer within so many seconds. Not to be called
         on the page's loop or viser's: it waits."""
-        answer: Queue[Told] = Queue()
-        self._asking = answer
-        self.send(Tell())
+        answer: Queue[Told | None] = Queue()
+        with self._lock:  # the answers come in the order of the questions
+            if not self._process.send(Tell()):
+                return None
+            self._asking.append(answer)
         try:
             return answer.get(timeout=timeout)
         except Empty:
             return None
+
+    def _forget_questions(self) -> None:
+        while self._asking:
+            self._asking.popleft().put(None)
 
     # ---------------------------------------------------------------- ghost
 
@@ -88,19 +125,18 @@ class Learner(Simulation):
         """A second robot, with `ghost.set` on top of whatever is set here, in the same scene: the scene
         starts again so that both begin together. A ghost that is there already becomes the new one. If
         `ghost.set` does not fit the scene, a notice says so and there is no ghost."""
+        self._replace_ghost(ghost.words, ghost.set)
+
+    def _replace_ghost(self, words: str, own: tuple[str, ...]) -> None:
         with self._lock:
             if self._closed:
                 return
             before = self.ghost
             self.ghost = Ghost(
-                ghost.words,
-                ghost.set,
-                self._spares,
-                lambda until: self.send(Leash(until)),
-                self._lost_ghost,
+                words, own, self._spares, lambda until: self.send(Leash(until)), self._lost_ghost
             )
         if before is not None:
-            before.close()
+            aside(before.close)
         self.send(Lead(True))
 
     def stop_ghost(self) -> None:
@@ -109,7 +145,7 @@ class Learner(Simulation):
             before, self.ghost = self.ghost, None
         self.send(Lead(False))
         if before is not None:
-            before.close()
+            aside(before.close)
 
     def _lost_ghost(self, ghost: Ghost, sentence: str) -> None:
         with self._lock:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
+import os
 import threading
+import time
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -11,17 +12,23 @@ from app.client.decimated import History
 from app.client.poses import Frame, Tape
 from app.client.rows import Record
 from app.client.score import Score
-from app.link.messages import Command, Failed, Ready, Refused, Report, Status
-from app.link.process import Process, Spares
+from app.client.trouble import Trouble, trouble_of
+from app.link.messages import Command, Failed, Loading, Ready, Refused, Report, Status
+from app.link.process import Process
 from app.link.ring import Block
+from app.link.spares import Spares
 from lessons.kinds import AnySettings
 
 T = TypeVar("T")
+_COMPLAIN = 2.0  # s between two notices that commands are lost
 
 
 class Simulation:
     """Owns a process and knows what it told. Reports arrive on the process' thread; the page reads the fields
     from its own loop. `changed` counts scenes and restarts: the page rebuilds itself when it differs."""
+
+    who = "The simulation"
+    """Begins the sentences about it."""
 
     def __init__(self, spares: Spares) -> None:
         self.ready: Ready | None = None
@@ -39,10 +46,13 @@ class Simulation:
         self._block: Block | None = None
         self._history: History | None = None
         self._closed = False
+        self._loading = False
+        self._next_complaint = 0.0
         self._start()
 
     def _start(self) -> None:
         process = self._process = self._spares.take()
+        self._loading = False
         process.listen(lambda report: self._hear(process, report))
 
     @property
@@ -50,7 +60,26 @@ class Simulation:
         return self._process.pid
 
     def send(self, command: Command) -> None:
-        self._process.send(command)
+        """Never waits. A command for which there is no room is dropped, and a notice says so."""
+        process = self._process
+        if process.send(command) or not process.alive or time.monotonic() < self._next_complaint:
+            return
+        self._next_complaint = time.monotonic() + _COMPLAIN
+        with self._lock:
+            self._notices.append("The simulation does not listen: what you just asked for is lost.")
+
+    # ---------------------------------------------------------------- silence
+
+    @property
+    def quiet(self) -> float:
+        """s since the process said anything."""
+        return time.monotonic() - self._process.heard_at
+
+    def trouble(self) -> Trouble | None:
+        """What is the matter, if anything is."""
+        if self.failure is not None:
+            return Trouble("STOPPED", self.failure)
+        return trouble_of(self._process, self._loading, self.quiet, self.who)
 
     # ---------------------------------------------------------------- reports
 
@@ -59,6 +88,7 @@ class Simulation:
             if self._closed or process is not self._process:
                 _discard(report)
                 return
+            self._loading = isinstance(report, Loading)
             match report:
                 case Ready():
                     self._enter(report)
@@ -85,7 +115,7 @@ class Simulation:
     def _free(self) -> None:
         block, self._block, self._history = self._block, None, None
         if block is not None:
-            block.close(unlink=True)
+            block.close()
 
     def take_messages(self) -> tuple[list[str], list[str]]:
         """(refusals, notices) since the last call."""
@@ -127,8 +157,12 @@ class Simulation:
             self._free()
 
 
+def aside(end: Callable[[], None]) -> None:
+    """Does on a thread of its own what may take a moment."""
+    threading.Thread(target=end, daemon=True).start()
+
+
 def _discard(report: Report) -> None:
     """Frees what came too late to be used."""
     if isinstance(report, Ready):
-        with contextlib.suppress(FileNotFoundError):
-            Block.for_robot(report.robot, report.layout.size, report.block).close(unlink=True)
+        os.close(report.block.number)

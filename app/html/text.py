@@ -62,10 +62,10 @@ PHONE = '<style>@media (max-width: 36em) { div[style*="width: 20em"] { width: 10
 It counts while an HTML element with it is shown."""
 
 
-def stopped(sentence: str) -> str:
-    """What a page shows instead of a simulation that died."""
+def in_trouble(state: str, sentence: str) -> str:
+    """What a page shows about a simulation that died, hangs or takes long."""
     return block(
-        f"{badge('STOPPED', BAD)} {esc(sentence)}<br><b>Press Reset to start again.</b>",
+        f"{badge(state, BAD)} {esc(sentence)}",
         f"border-left:3px solid {css(BAD)};margin:0.4em 0",
     )
 

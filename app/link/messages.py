@@ -9,6 +9,7 @@ import numpy as np
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
+from app.link.wire import Handle
 from himpc.telemetry import Layout
 from lessons.kinds import AnyEvent, AnySettings
 from robots import Robot
@@ -132,7 +133,7 @@ class Ready:
     besides the robot."""
 
     choice: SceneChoice
-    block: str  # name of the shared memory
+    block: Handle  # of the shared memory
     robot: Robot
     layout: Layout
     settings: AnySettings
@@ -219,6 +220,11 @@ class Status:
 
 
 @dataclass(frozen=True)
+class Loading:
+    """The command to load a scene was heard: the next word may take a while."""
+
+
+@dataclass(frozen=True)
 class Refused:
     """A scene or robot could not be loaded; the one before goes on."""
 
@@ -266,4 +272,4 @@ class Told:
     t: float
 
 
-Report = Ready | Status | Refused | Failed | Script | Reached | Told
+Report = Ready | Loading | Status | Refused | Failed | Script | Reached | Told

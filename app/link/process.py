@@ -1,121 +1,158 @@
-"""The page's handle of a simulation process, and the spare that waits warm for the next browser."""
+"""The page's handle of a simulation process. Nothing here waits for the process, but `close`."""
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing as mp
-import os
+import select
+import socket
 import threading
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
 
+from app.link.children import Child
 from app.link.messages import Command, Failed, Quit, Report
+from app.link.outbox import Outbox
+from app.link.wire import Wire
 
 _END = 1.0  # s a process gets to end by itself
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-# Children inherit these. Threads of linear algebra on 7 × 7 matrices only fight for the page's core; the
-# variables count when numpy is first imported, which in a spawned child is before any code of ours runs.
 
-
-Entry = Callable[[Connection], None]
-"""What a simulation process runs, with its end of the pipe; handed in, so that no page imports it."""
+Start = Callable[[socket.socket], Child]
+"""Starts a child with its end of the socket."""
 
 
 class Process:
-    """A spawned child. Reports arrive on a thread of this handle and go to the `listen`er."""
+    """A child. Reports arrive on a thread of this handle and go to the `listen`er."""
 
-    def __init__(self, entry: Entry) -> None:
-        for name in _THREADS:
-            os.environ[name] = "1"
-        context = mp.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._child: SpawnProcess = context.Process(target=entry, args=(theirs,), daemon=True)
-        self._child.start()
-        theirs.close()
-        self._sending = threading.Lock()
+    def __init__(self, start: Start, instead: Start) -> None:
+        """instead: another way, for a child of the first that was never born."""
+        ours, self._theirs = socket.socketpair()
+        self._wire = Wire(ours)
+        self._instead: Start | None = instead
+        self._child = start(self._theirs)
+        self._outbox = Outbox(self._wire)
+        self._lock = threading.Lock()
+        self._listener: Callable[[Report], None] | None = None
+        self._unheard: list[Report] = []
         self._closed = False
-        self._listening: threading.Thread | None = None
+        self._ended = threading.Event()
+        self.heard_at = time.monotonic()
+        """When it last said something, or was born."""
+        self._hearing = threading.Thread(target=self._hear, daemon=True)
+        self._hearing.start()
 
     @property
     def pid(self) -> int | None:
         return self._child.pid
 
     @property
+    def preparing(self) -> str | None:
+        """What it waits for before it is born; None afterwards."""
+        child = self._child
+        return child.doing if child.pid is None and not self._ended.is_set() else None
+
+    @property
     def alive(self) -> bool:
-        return not self._closed and self._child.is_alive()
+        return not self._closed and not self._ended.is_set()
 
     def listen(self, listener: Callable[[Report], None]) -> None:
         """Calls `listener` with every report, and with a last `Failed` if the child dies unasked."""
-        self._listening = threading.Thread(target=self._hear, args=(self._pipe, listener), daemon=True)
-        self._listening.start()
+        with self._lock:
+            unheard, self._unheard = self._unheard, []
+            for report in unheard:
+                listener(report)
+            self._listener = listener
 
-    def _hear(self, pipe: Connection, listener: Callable[[Report], None]) -> None:
-        failed = False
-        while True:
-            try:
-                report: Report = pipe.recv()
-            except (EOFError, OSError):
-                break
-            failed = isinstance(report, Failed)
-            listener(report)
-        if not self._closed and not failed:
-            self._child.join(_END)
-            listener(Failed(_obituary(self._child.exitcode)))
+    def send(self, command: Command) -> bool:
+        """Whether the command was taken: it waits to be read. False if too many wait already, or nobody will
+        ever read it."""
+        return not self._closed and self._outbox.put(command)
 
-    def send(self, command: Command) -> None:
-        """A command to a dead child is dropped: its death is reported by `listen`."""
-        with self._sending, contextlib.suppress(OSError):
-            self._pipe.send(command)
-
-    def close(self) -> None:
-        """Ends the child, by force if need be."""
-        self.send(Quit())
+    def kill(self) -> None:
+        """Ends the child by force, without waiting for that."""
         self._closed = True
-        self._child.join(_END)
-        if self._child.is_alive():
-            self._child.kill()
-            self._child.join()
-        # What the child said last is still heard: it may name memory that must be freed.
-        if self._listening is not None and self._listening is not threading.current_thread():
-            self._listening.join(_END)
-        self._pipe.close()
+        self._child.kill()
+        self._wire.hang_up()  # a child that is born later finds nobody
+
+    def close(self, patience: float = _END) -> None:
+        """Ends the child: by itself within `patience`, s, else by force."""
+        if self._child.pid is not None and patience and self.send(Quit()):
+            self._closed = True
+            self._ended.wait(patience)
+        self.kill()
+        # What the child said last is still heard: it may bring memory that must be freed.
+        if self._hearing is not threading.current_thread():
+            self._hearing.join(2 * _END)
+
+    # ---------------------------------------------------------------- the thread
+
+    def _hear(self) -> None:
+        failed = self._follow()
+        self._ended.set()
+        self._outbox.close()
+        if not self._closed and not failed:
+            self._pass_on(Failed(_obituary(self._child.exitcode)))
+        self._wire.hang_up()
+        self._outbox.join()
+        self._wire.close()
+        self._theirs.close()
+        self._child.close()
+
+    def _follow(self) -> bool:
+        """Until the child has ended; whether the last it said is that it failed."""
+        failed, over = False, 0.0
+        while True:
+            there, news = self._wait(None if not over else over - time.monotonic())
+            if there and not over:
+                try:
+                    report: Report = self._wire.recv()
+                except (EOFError, OSError):
+                    over = time.monotonic() + _END  # its exit code is on the way
+                else:
+                    failed = isinstance(report, Failed)
+                    self._pass_on(report)
+                continue
+            if news:
+                if self._look():
+                    return failed
+            elif over and time.monotonic() >= over:
+                self._child.kill()
+                return failed
+
+    def _wait(self, timeout: float | None) -> tuple[bool, bool]:
+        """(whether the wire, whether the child has news)."""
+        watched = select.poll()
+        if timeout is None:
+            watched.register(self._wire, select.POLLIN)
+        watched.register(self._child, select.POLLIN)
+        ready = {number for number, _ in watched.poll(None if timeout is None else max(0.0, 1e3 * timeout))}
+        return self._wire.fileno() in ready, self._child.fileno() in ready
+
+    def _look(self) -> bool:
+        ended = self._child.look()
+        if self._child.pid is not None:
+            self._theirs.close()  # from now on the child's death is the end of what it says
+        elif ended and self._instead is not None and not self._closed:
+            instead, self._instead = self._instead, None
+            self._child.close()
+            self._child = instead(self._theirs)
+            ended = False
+        self.heard_at = time.monotonic()
+        return ended
+
+    def _pass_on(self, report: Report) -> None:
+        self.heard_at = time.monotonic()
+        with self._lock:
+            if self._listener is None:
+                self._unheard.append(report)
+                return
+        self._listener(report)
 
 
 def _obituary(exitcode: int | None) -> str:
-    if exitcode is not None and exitcode < 0:
+    if exitcode is None:
+        return "The simulation process ended."
+    if exitcode < 0:
         return f"The simulation process was ended from outside (signal {-exitcode})."
     return f"The simulation process ended unexpectedly (exit code {exitcode})."
-
-
-class Spares:
-    """Keeps one child started ahead: importing everything takes it a second or two."""
-
-    def __init__(self, entry: Entry) -> None:
-        self._entry = entry
-        self._lock = threading.Lock()
-        self._spare: Process | None = None
-        self._closed = False
-
-    def refill(self) -> None:
-        """Starts a spare unless there is one."""
-        with self._lock:
-            if not self._closed and (self._spare is None or not self._spare.alive):
-                self._spare = Process(self._entry)
-
-    def take(self) -> Process:
-        """The spare, or a new child."""
-        with self._lock:
-            spare, self._spare = self._spare, None
-        return spare if spare is not None and spare.alive else Process(self._entry)
-
-    def close(self) -> None:
-        with self._lock:
-            self._closed = True
-            spare, self._spare = self._spare, None
-        if spare is not None:
-            spare.close()
 
 
 def wait_until(condition: Callable[[], bool], timeout: float, period: float = 0.01) -> bool:

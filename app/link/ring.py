@@ -6,42 +6,55 @@ rows behind the count and not so old that they might be overwritten meanwhile.
 
 from __future__ import annotations
 
-from multiprocessing import shared_memory
+import contextlib
+import errno
+import mmap
+import os
+import tempfile
 
 import numpy as np
 
-from robots import Robot
+from app.link.wire import Handle
+from robots import InputError, Robot
 
 MAX_ROWS = 8192
-_MAX_BYTES = 12_000_000  # containers often give /dev/shm 64 MB for all sessions together
+MIN_ROWS = 1024
+"""A second of ticks: with fewer, a page that is late for a moment would miss some."""
+_MAX_BYTES = 12_000_000  # of each session
 _MARGIN = 256  # rows the writer may add while a reader copies
 _HEAD = 64  # bytes
 
 
 class Block:
     """A ring of telemetry rows (width float64) and the poses of joints 1 … n and the tip, (n + 1, 7):
-    position, m, and quaternion wxyz."""
+    position, m, and quaternion wxyz. The memory has no name: it is gone with the last process that has it,
+    however that one ends."""
 
-    def __init__(self, width: int, bodies: int, name: str | None = None) -> None:
-        """Creates the memory, or attaches to the one called `name`."""
-        self.rows = min(MAX_ROWS, _MAX_BYTES // (8 * width))
-        size = _HEAD + 8 * (self.rows * width + bodies * 7)
-        self._memory = shared_memory.SharedMemory(name=name, create=name is None, size=size)
-        buffer = self._memory.buf
-        self._head = np.ndarray((8,), np.int64, buffer)
-        self._time = np.ndarray((1,), np.float64, buffer, 56)
-        self._ring = np.ndarray((self.rows, width), np.float64, buffer, _HEAD)
-        self._poses = np.ndarray((bodies, 7), np.float64, buffer, _HEAD + 8 * self.rows * width)
-        if name is None:
-            self._head[:] = 0
+    def __init__(self, width: int, bodies: int, handle: Handle | None = None) -> None:
+        """Creates the memory, as large as the machine allows, or attaches to what came with `handle`, which
+        is closed. Raises InputError if there is not enough memory even for MIN_ROWS."""
+        row, rest = 8 * width, _HEAD + 8 * 7 * bodies
+        if handle is None:
+            self._file = _allocated(row, rest)
+        else:
+            self._file = handle.number
+        self._memory = mmap.mmap(self._file, 0)
+        self.rows = (len(self._memory) - rest) // row
+        if handle is not None:
+            self._close_file()
+        self._head = np.ndarray((8,), np.int64, self._memory)
+        self._time = np.ndarray((1,), np.float64, self._memory, 56)
+        self._ring = np.ndarray((self.rows, width), np.float64, self._memory, _HEAD)
+        self._poses = np.ndarray((bodies, 7), np.float64, self._memory, _HEAD + row * self.rows)
 
     @classmethod
-    def for_robot(cls, robot: Robot, width: int, name: str | None = None) -> Block:
-        return cls(width, robot.n + 1, name)
+    def for_robot(cls, robot: Robot, width: int, handle: Handle | None = None) -> Block:
+        return cls(width, robot.n + 1, handle)
 
     @property
-    def name(self) -> str:
-        return self._memory.name
+    def handle(self) -> Handle:
+        """For the other process; of the one who created it."""
+        return Handle(self._file)
 
     @property
     def count(self) -> int:
@@ -81,9 +94,50 @@ class Block:
         first = max(count, end - self.rows + _MARGIN, 0)
         return first, self._ring[np.arange(first, end) % self.rows]
 
-    def close(self, unlink: bool = False) -> None:
-        """Detaches; `unlink` frees the memory once every process has detached."""
+    def close(self) -> None:
+        """Detaches."""
         del self._head, self._time, self._ring, self._poses
         self._memory.close()
-        if unlink:
-            self._memory.unlink()
+        self._close_file()
+
+    def _close_file(self) -> None:
+        file, self._file = self._file, -1
+        if file >= 0:
+            os.close(file)
+
+
+def _allocated(row: int, rest: int) -> int:
+    """An unnamed file in memory with room for as many rows as there is memory for, all of it set aside now:
+    memory that is missing only when it is written to would end the process."""
+    rows = max(MIN_ROWS, min(MAX_ROWS, _MAX_BYTES // row))
+    file = _unnamed()
+    while True:
+        try:
+            _set_aside(file, rest + rows * row)
+            return file
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.ENOMEM, errno.EFBIG, errno.EDQUOT) or rows == MIN_ROWS:
+                os.close(file)
+                size = (rest + rows * row) / 1e6
+                raise InputError(
+                    f"There is no memory for the telemetry of this robot ({size:.1f} MB; {error.strerror}): "
+                    "end other programs or sessions, or give the container more."
+                ) from None
+            with contextlib.suppress(OSError):
+                os.ftruncate(file, 0)
+            rows = max(MIN_ROWS, rows // 2)
+
+
+def _unnamed() -> int:
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("himpc-lab")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
+
+
+def _set_aside(file: int, size: int) -> None:
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(file, 0, size)
+        return
+    for start in range(0, size, 1 << 20):
+        os.pwrite(file, bytes(min(1 << 20, size - start)), start)

@@ -16,6 +16,7 @@ from app.client.ghost import Ghost
 from app.client.learner import Learner
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
+from app.client.trouble import Trouble
 from app.html.palette import level_colours
 from app.html.text import PHONE
 from app.link.choice import SceneChoice
@@ -143,8 +144,8 @@ class Stage:
     def refuse(self, sentence: str) -> None:
         self._robot_panel.refuse(sentence)
 
-    def show_failure(self, sentence: str | None) -> None:
-        self._playback.show_failure(sentence)
+    def show_trouble(self, trouble: Trouble | None) -> None:
+        self._playback.show_trouble(trouble)
 
     def follow(self, plots: bool, texts: bool) -> None:
         """Shows the newest poses, and now and then plots and texts."""

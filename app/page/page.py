@@ -12,9 +12,10 @@ import viser
 
 from app.client.learner import Learner
 from app.client.progress import Notebook
-from app.html.text import block, stopped
+from app.client.trouble import Trouble
+from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
-from app.link.messages import Load, Ready
+from app.link.messages import Ready
 from app.page.layout import Stage
 from app.view.robot import aim
 from lessons.scenes.names import ALL_SCENES
@@ -49,7 +50,7 @@ class Page:
         self._seen: tuple[SceneChoice, str] | None = None  # what the camera was last turned to
         self._stage: Stage | None = None
         self._built = -1
-        self._failure: str | None = None
+        self._trouble: Trouble | None = None
         self._next_plots = 0.0
         self._waiting: viser.GuiHtmlHandle | None = None
         self._again: viser.GuiButtonHandle | None = None
@@ -80,13 +81,6 @@ class Page:
         self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
         self.on_dark(dark)
 
-    def _choose(self, choice: SceneChoice) -> None:
-        if self.learner.failure is not None:
-            self.learner.choice = choice
-            self.learner.restart()
-        else:
-            self.learner.send(Load(choice))
-
     # ---------------------------------------------------------------- loop
 
     def _loop(self) -> None:
@@ -106,11 +100,12 @@ class Page:
         self._pass_on()
         stage = self._stage
         if stage is None:
-            self._show_early_failure()
+            self._show_early_trouble()
             return
-        if learner.failure != self._failure:
-            self._failure = learner.failure
-            stage.show_failure(self._failure)
+        trouble = learner.trouble()
+        if trouble != self._trouble:
+            self._trouble = trouble
+            stage.show_trouble(trouble)
         try:
             stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
         except Exception:
@@ -126,19 +121,21 @@ class Page:
         self._next_plots = max(self._next_plots, now - 1 / RATE) + 1 / PLOTS_RATE
         return True
 
-    def _show_early_failure(self) -> None:
-        """The simulation died before there was anything to show."""
-        failure = self.learner.failure
-        if failure == self._failure or self._waiting is None:
+    def _show_early_trouble(self) -> None:
+        """The simulation died or hangs before there was anything to show."""
+        trouble = self.learner.trouble()
+        if trouble == self._trouble or self._waiting is None:
             return
-        self._failure = failure
-        if failure is None:
-            self._waiting.content = block("<b>Starting the simulation …</b>")
-            return
-        self._waiting.content = stopped(failure)
+        self._trouble = trouble
+        self._waiting.content = (
+            block("<b>Starting the simulation …</b>")
+            if trouble is None
+            else in_trouble(trouble.state, trouble.sentence)
+        )
         if self._again is None:
-            self._again = self._client.gui.add_button("Reset")
+            self._again = self._client.gui.add_button("Start again")
             self._again.on_click(self._restart)
+        self._again.visible = trouble is not None and trouble.offer is not None
 
     def _restart(self, _: object) -> None:
         self.learner.restart()
@@ -157,7 +154,7 @@ class Page:
                 ready,
                 ALL_SCENES,
                 self._dark,
-                self._choose,
+                self.learner.load,
                 self._theme,
                 self._by_path,
                 self._event_loop,
@@ -167,7 +164,7 @@ class Page:
             if seen != self._seen:  # a restart leaves the learner's view as it was
                 aim(self._client.camera, ready.robot, self._phone, ready.room)
                 self._seen = seen
-        self._failure = None
+        self._trouble = None
 
     def _pass_on(self) -> None:
         """Sentences of the session go where they belong."""

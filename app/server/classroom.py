@@ -9,8 +9,8 @@ from typing import Any, cast
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Command
-from app.link.process import Spares
-from app.worker import main as worker
+from app.link.spares import Spares
+from app.server.sessions import WORKER
 from lessons.teaching import lesson
 
 STEERING = "The instructor steers: this page only watches."
@@ -39,7 +39,10 @@ class Watcher:
     def reset_all(self) -> None:
         self.on_refusal(STEERING)
 
-    def restart(self) -> None:
+    def restart(self, choice: SceneChoice | None = None) -> None:
+        self.on_refusal(STEERING)
+
+    def load(self, choice: SceneChoice) -> None:
         self.on_refusal(STEERING)
 
     def take_messages(self) -> tuple[list[str], list[str]]:
@@ -53,7 +56,8 @@ class Classroom:
     def __init__(self, choice: SceneChoice) -> None:
         self.token = secrets.token_hex(4)
         self.max_sessions = 1
-        self._learner = Learner(self.token, choice, Spares(worker.main))
+        self._spares = Spares(WORKER)
+        self._learner = Learner(self.token, choice, self._spares)
 
     @property
     def learners(self) -> tuple[Learner, ...]:
@@ -71,3 +75,4 @@ class Classroom:
     def close(self) -> None:
         """Ends the process."""
         self._learner.close()
+        self._spares.close()

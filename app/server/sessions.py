@@ -10,9 +10,10 @@ from collections.abc import Sequence
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
-from app.link.process import Spares
-from app.worker import main as worker
+from app.link.spares import Spares
 
+WORKER = "app.worker.main"
+"""What a simulation's process runs; by name, because the server never loads it."""
 GRACE = 10.0  # s a session outlives its tab: the time of a reload
 _PERIOD = 0.5  # s between looks at who has left
 
@@ -24,7 +25,7 @@ class Sessions:
         self.max_sessions = max_sessions
         self._choice = choice
         self._grace = grace
-        self._spares = Spares(worker.main)
+        self._spares = Spares(WORKER)
         self._lock = threading.Lock()
         self._learners: dict[str, Learner] = {}
         self._closed = threading.Event()
@@ -94,9 +95,9 @@ class Sessions:
         with self._lock:
             learners, self._learners = list(self._learners.values()), {}
         threads = [threading.Thread(target=learner.close) for learner in learners]
-        threads.append(threading.Thread(target=self._spares.close))
         for thread in threads:
             thread.start()
         for thread in threads:
             with contextlib.suppress(RuntimeError):
                 thread.join()
+        self._spares.close()

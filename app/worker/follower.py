@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from multiprocessing.connection import Connection
 
 from app.link.choice import SceneChoice
-from app.link.messages import Begin, Command, Follow, Quit, Reached, Refused
+from app.link.messages import Begin, Command, Follow, Loading, Quit, Reached, Refused
+from app.link.wire import Wire
 from app.worker.reports.start import Run
 from app.worker.simulation import Body
 from lessons.kinds import AnyScene
@@ -44,19 +44,19 @@ class Shadow(Body):
         return ran
 
 
-def follow(pipe: Connection, first: Follow) -> None:
+def follow(wire: Wire, first: Follow) -> None:
     """Follows until the page says Quit; `first` is what a process that waited for work was told."""
-    shadow = _hear(pipe, None, first)
+    shadow = _hear(wire, None, first)
     next_pose = next_reached = next_status = 0.0
     reached = -1.0
     try:
         while True:
-            while pipe.poll(None if shadow is None else 0.0):
-                command: Command = pipe.recv()
+            while wire.poll(None if shadow is None else 0.0):
+                command: Command = wire.recv()
                 if isinstance(command, Quit):
                     return
                 if isinstance(command, Follow):
-                    shadow = _hear(pipe, shadow, command)
+                    shadow = _hear(wire, shadow, command)
                     if command.script.begin is not None:
                         reached = -1.0  # the leader waits to hear that its follower is there
             if shadow is None:
@@ -68,29 +68,30 @@ def follow(pipe: Connection, first: Follow) -> None:
                 next_pose = now + _POSES
             t = shadow.session.t
             if t != reached and now >= next_reached:
-                pipe.send(Reached(t))
+                wire.send(Reached(t))
                 reached, next_reached = t, now + _REACHED
             if now >= next_status:
-                pipe.send(shadow.status())
+                wire.send(shadow.status())
                 next_status = now + _STATUS
             if not ran:
-                pipe.poll(_POSES)
+                wire.poll(_POSES)
     finally:
         if shadow is not None:
             shadow.block.close()
 
 
-def _hear(pipe: Connection, shadow: Shadow | None, command: Follow) -> Shadow | None:
+def _hear(wire: Wire, shadow: Shadow | None, command: Follow) -> Shadow | None:
     script = command.script
     if script.begin is not None:
+        wire.send(Loading())
         if shadow is not None:
             shadow.block.close()
         try:
             shadow = Shadow(script.begin, command.own)
         except InputError as error:
-            pipe.send(Refused(str(error)))
+            wire.send(Refused(str(error)))
             return None
-        pipe.send(shadow.ready())
+        wire.send(shadow.ready())
     if shadow is not None:
         shadow.follower.hear(script.events, script.t)
     return shadow

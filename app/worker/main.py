@@ -1,4 +1,4 @@
-"""The simulation process: one `Body`, driven in real time."""
+"""The simulation process: one `Body`, driven in real time. Also what its fork server loads beforehand."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import signal
 import sys
 import time
 import traceback
-from multiprocessing.connection import Connection
+from collections.abc import Callable
 
 from app.link.choice import SceneChoice
-from app.link.messages import Command, Failed, Follow, Load, Quit, Refused
+from app.link.messages import Command, Failed, Follow, Load, Loading, Quit, Refused
+from app.link.wire import Wire, packed
 from app.worker.follower import follow
 from app.worker.pacing import Pacer
 from app.worker.simulation import Body
@@ -22,67 +23,85 @@ SCRIPT_PERIOD = 0.02  # s
 _CHUNK = 0.01  # s: the longest run before commands are looked at again
 
 
-def main(pipe: Connection) -> None:
+_USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
+
+
+def warm(say: Callable[[str], None]) -> None:
+    """Loads what simulations need: both kinds of controllers run for a moment, so that their compiled code is
+    there. `say` is told what is being done, for a page that waits."""
+    for scene in _USUAL:
+        say(f"loading the controllers ({scene})")
+        body = Body(SceneChoice(scene))
+        body.tick(3)
+        packed(body.ready())
+        packed(body.status())
+        body.close()
+
+
+def main(wire: Wire) -> None:
     """Entry point of the process. Waits (warm, everything imported) for the first scene, then simulates it
     until the page says Quit or is gone."""
     # Ctrl-C in a terminal reaches the whole process group; the page ends its children itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        _serve(pipe)
+        _serve(wire)
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return  # the page is gone
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        pipe.send(Failed(_sentence(error)))
+        wire.send(Failed(_sentence(error)))
 
 
-def _serve(pipe: Connection) -> None:
-    body = _first(pipe)
+def _serve(wire: Wire) -> None:
+    body = _first(wire)
     if isinstance(body, Follow):
-        follow(pipe, body)
+        follow(wire, body)
         return
     if body is None:
         return
     try:
-        _simulate(pipe, body)
+        _simulate(wire, body)
     finally:
         body.block.close()
 
 
-def _first(pipe: Connection) -> Body | Follow | None:
+def _first(wire: Wire) -> Body | Follow | None:
     while True:
-        command: Command = pipe.recv()
+        command: Command = wire.recv()
         if isinstance(command, Quit):
             return None
         if isinstance(command, Follow):
             return command
         if isinstance(command, Load):
-            body = _try(pipe, command.choice)
+            body = _try(wire, command.choice)
             if body is not None:
                 return body
 
 
-def _try(pipe: Connection, choice: SceneChoice) -> Body | None:
+def _try(wire: Wire, choice: SceneChoice) -> Body | None:
+    wire.send(Loading())
     try:
         body = Body(choice)
     except InputError as error:
-        pipe.send(Refused(str(error)))
+        wire.send(Refused(str(error)))
         return None
-    pipe.send(body.ready())
+    wire.send(body.ready())
     return body
 
 
-def _simulate(pipe: Connection, body: Body) -> None:
+def _simulate(wire: Wire, body: Body) -> None:
     pacer = Pacer(time.perf_counter())
     next_pose = next_status = next_script = 0.0
     while True:
-        while pipe.poll():
-            command: Command = pipe.recv()
+        while wire.poll():
+            command: Command = wire.recv()
             if isinstance(command, Quit):
                 return
+            if isinstance(command, Load):
+                wire.send(Loading())
             answer = body.handle(command)
             if answer is not None:
-                pipe.send(answer)
+                wire.send(answer)
                 pacer.rest(time.perf_counter())
         pacer.speed = body.pace
         now = time.perf_counter()
@@ -101,15 +120,15 @@ def _simulate(pipe: Connection, body: Body) -> None:
         if now >= next_status:
             # A run as fast as it goes is no computer that cannot keep up.
             capped = pacer.capped(now) and body.pace == body.speed
-            pipe.send(body.status(pacer.real_time_factor(now), capped))
+            wire.send(body.status(pacer.real_time_factor(now), capped))
             next_status = now + STATUS_PERIOD
         if now >= next_script:
             script = body.leader.script(body.session)
             if script is not None:
-                pipe.send(script)
+                wire.send(script)
             next_script = now + SCRIPT_PERIOD
         if ran == 0:
-            pipe.poll(0.001 if body.busy else 0.02)
+            wire.poll(0.001 if body.busy else 0.02)
 
 
 def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:

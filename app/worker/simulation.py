@@ -258,7 +258,7 @@ class Body:
         session = self.session
         return Ready(
             choice=self.choice,
-            block=self.block.name,
+            block=self.block.handle,
             robot=session.robot,
             layout=session.layout,
             settings=session.settings,
@@ -295,5 +295,5 @@ class Body:
         )
 
     def close(self) -> None:
-        """Frees the memory; for use without a page, which otherwise does it."""
-        self.block.close(unlink=True)
+        """Frees the memory."""
+        self.block.close()

@@ -11,7 +11,6 @@ import pytest
 from app.client.decimated import BUCKETS, History
 from app.link.choice import SceneChoice
 from app.link.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
-from app.link.ring import Block
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
@@ -122,10 +121,9 @@ def test_another_scene_or_a_sentence(body: Body) -> None:
         answer = body.handle(Load(choice))
         assert isinstance(answer, Refused) and answer.sentence and "Traceback" not in answer.sentence
         assert body.session is kept
-    old = body.block.name
+    old = body.block
     answer = body.handle(Load(SceneChoice("planar3-hold")))
-    assert isinstance(answer, Ready) and answer.robot.n == 3 and answer.block != old
-    Block.for_robot(kept.robot, kept.layout.size, old).close(unlink=True)
+    assert isinstance(answer, Ready) and answer.robot.n == 3 and body.block is not old
     body.tick(10)
 
 

@@ -40,8 +40,9 @@ def test_watchers_change_nothing() -> None:
     watcher.reset_all()
     watcher.restart()
     watcher.stop_ghost()
+    watcher.load(SceneChoice("planar3-hold"))
     assert sent == []
-    assert refused == [STEERING] * 4
+    assert refused == [STEERING] * 5
     assert (watcher.choice, watcher.settings) == ("a scene", "settings")
     assert watcher.take_messages() == ([], [])
 

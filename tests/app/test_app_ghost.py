@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,15 +14,21 @@ import pytest
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Lead, Leash, Load, Play, Post, ResetAll, Script
-from app.link.process import Spares, wait_until
-from app.link.ring import Block
-from app.worker import main as worker
+from app.link.process import wait_until
+from app.link.spares import Spares
+from app.link.wire import Wire
+from app.server.sessions import WORKER
 from app.worker.follower import Shadow
 from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
 from lessons.teaching.lesson import Ghost
 
 LONG = 60.0  # s
+
+
+def rings() -> int:
+    """Rings of telemetry that this process looks at."""
+    return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
 
 
 @pytest.fixture
@@ -89,10 +97,7 @@ def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
     body.handle(ResetAll())
     begin = script_of(body).begin
     assert begin is not None and begin.settings.horizon == 5
-    kept = body.session
-    name = body.block.name
     body.handle(Load(SceneChoice("panda-hold")))
-    Block.for_robot(kept.robot, kept.layout.size, name).close(unlink=True)
     begin = script_of(body).begin
     assert begin is not None and begin.choice.name == "panda-hold"
     body.handle(Lead(False))
@@ -102,7 +107,7 @@ def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
 
 @pytest.fixture
 def start() -> Iterator[Callable[[str], Learner]]:
-    spares, started = Spares(worker.main), list[Learner]()
+    spares, started = Spares(WORKER), list[Learner]()
 
     def run(scene: str) -> Learner:
         learner = Learner("token", SceneChoice(scene), spares)
@@ -141,12 +146,11 @@ def test_a_ghost_begins_follows_and_ends(start: Callable[[str], Learner]) -> Non
     mine = learner.score.result() if learner.score else None
     its = ghost.score.result() if ghost.score else None
     assert mine is not None and its is not None and mine.seconds == pytest.approx(its.seconds, abs=1e-9)
-    pid, memory = ghost.pid, Path("/dev/shm", ghost.ready.block)
-    assert memory.exists()
+    pid, before = ghost.pid, rings()
     learner.stop_ghost()
     assert learner.ghost is None and pid is not None
     assert wait_until(lambda: not psutil.pid_exists(pid), LONG)
-    assert not memory.exists()
+    assert wait_until(lambda: rings() == before - 1, LONG)
     learner.send(Play(True))
     t = learner.look() or 0.0
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)  # no leash is left
@@ -163,15 +167,19 @@ def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Callable
 
 
 def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Learner]) -> None:
-    """Ready is on its way while the learner leaves: nobody else would free the block it names."""
+    """Ready is on its way while the learner leaves: nobody else would free the memory it brings."""
     learner = start("planar3-hold")
     learner.close()
     late = Body(SceneChoice("planar3-hold"))
-    memory = Path("/dev/shm", late.block.name)
-    assert memory.exists()
-    learner._hear(learner._process, late.ready())
-    assert not memory.exists()
-    late.block.close()
+    here, there = (Wire(end) for end in socket.socketpair())
+    there.send(late.ready())
+    ready = here.recv()
+    assert os.fstat(ready.block.number)
+    learner._hear(learner._process, ready)
+    with pytest.raises(OSError):
+        os.fstat(ready.block.number)
+    for each in (here, there, late):
+        each.close()
 
 
 def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], Learner]) -> None:

@@ -12,7 +12,6 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.exercise import Curve, Exercise, Lecture
 from app.link.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep
-from app.link.ring import Block
 from app.worker.lesson.rows import BUCKETS, Record, thinned
 from app.worker.simulation import Body
 from himpc.telemetry import Layout
@@ -141,8 +140,7 @@ def test_a_robot_that_is_lost_ends_the_run_as_headless(learn: Start) -> None:
 
 def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -> None:
     learner = learn("a-redundant-arm", 0)
-    block, session = learner.body.block, learner.body.session
-    name = block.name
+    block = learner.body.block
     assert learner.body.handle(Load(SceneChoice.of_lesson(Exercise("a-redundant-arm", 2)))) is None
     assert learner.body.block is block
     lecture = learner.look()
@@ -150,7 +148,6 @@ def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -
     assert not learner.body.session.settings.levels[1].enabled  # the step's own settings
     other = learner.body.handle(Load(SceneChoice.of_lesson(Exercise("one-task"))))
     assert isinstance(other, Ready)
-    Block.for_robot(session.robot, session.layout.size, name).close(unlink=True)
 
 
 def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:

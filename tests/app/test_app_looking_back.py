@@ -104,7 +104,7 @@ def test_plots_of_the_past_are_those_that_were_seen(layout: Layout) -> None:
         assert np.nanmax(history.window().columns(layout.fields["step_us"])) == 1.0  # a new run
         assert np.isfinite(history.window().columns(layout.fields["t"])).sum() == 2
     finally:
-        block.close(unlink=True)
+        block.close()
 
 
 def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
@@ -118,7 +118,7 @@ def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
             block.write(row)
         history.pull()
         found.append(history.window(1.9999).columns(layout.fields["step_us"]))
-        block.close(unlink=True)
+        block.close()
     assert np.array_equal(found[0], found[1], equal_nan=True)
 
 
@@ -132,7 +132,7 @@ def test_a_period_longer_than_a_bucket_leaves_no_gaps(layout: Layout) -> None:
     known = seen[np.isfinite(seen)]
     assert len(known) == 2 * (1 + round(19 * 0.12 / 0.05 - 0.1)) and (np.diff(known) >= 0).all()
     assert set(known) == set(1.0 + np.arange(20.0))
-    block.close(unlink=True)
+    block.close()
 
 
 # ---------------------------------------------------------------- figures and files

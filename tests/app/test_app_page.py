@@ -255,7 +255,7 @@ def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Learner
     view = camera(page)
     os.kill(pid, signal.SIGKILL)
     expect(page.get_by_text("ended from outside")).to_be_visible()
-    expect(page.get_by_text("Press Reset to start again")).to_be_visible()
+    expect(page.get_by_role("button", name="Start again")).to_be_visible()
     press(page, "Reset")
     expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     assert learner.pid != pid

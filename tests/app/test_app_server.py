@@ -75,7 +75,7 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
-    code = "from app.server import serve; import sys; sys.exit(serve(port=0, open_browser=False))"
+    code = "from app.server.server import serve; import sys; sys.exit(serve(port=0, open_browser=False))"
     process = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,

@@ -10,9 +10,10 @@ from functools import partial
 import viser
 
 from app.client.learner import Learner
+from app.client.trouble import Trouble
 from app.client.wish import HOLD, Wish
 from app.html.palette import GOOD, LEVELS
-from app.html.text import badge, block, stopped
+from app.html.text import badge, block, in_trouble
 from app.link.messages import Play, Post, Speed, Step
 from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import on_scale
@@ -33,7 +34,8 @@ class PlaybackPanel:
         self._learner, self._loop = learner, loop
         self._running: Wish[bool] = Wish()
         self._closed = False
-        self._failure = gui.add_html("", visible=False)
+        self._trouble = gui.add_html("", visible=False)
+        self._again = gui.add_button("Start again", visible=False)
         self._status = gui.add_html(block("Starting the simulation …"))
         self._buttons = gui.add_button_group(
             "Playback",
@@ -54,6 +56,10 @@ class PlaybackPanel:
         @self._buttons.on_click
         async def _(_: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             self._click(str(self._buttons.value))
+
+        @self._again.on_click
+        async def _(_: object) -> None:
+            learner.restart()
 
         @self._speed.on_update
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
@@ -76,17 +82,21 @@ class PlaybackPanel:
         elif choice == _STEP:
             self._running.ask(False)
             learner.send(Step())
-        elif choice == _RESET and learner.failure is None:
+        elif choice == _RESET and learner.trouble() is None:
             learner.send(Post(Reset()))
         else:
             self._running.ask(True)
             learner.reset_all()
 
-    def show_failure(self, sentence: str | None) -> None:
-        """A crash of the simulation, or None."""
-        self._failure.visible = sentence is not None
-        if sentence is not None:
-            self._failure.content = stopped(sentence)
+    def show_trouble(self, trouble: Trouble | None) -> None:
+        """A simulation that stopped, hangs or takes long, or None."""
+        self._trouble.visible = trouble is not None
+        self._again.visible = trouble is not None and trouble.offer is not None
+        if trouble is None:
+            return
+        self._trouble.content = in_trouble(trouble.state, trouble.sentence)
+        self._again.label = trouble.offer or ""
+        if trouble.state == "STOPPED":
             self._status.content = block("No simulation is running.")
 
     def close(self) -> None:

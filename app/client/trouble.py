@@ -1,0 +1,52 @@
+"""What a page says when its simulation does not run as it should, and what it offers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from app.link.forkserver import FIRST_PATIENCE
+from app.link.process import Process
+
+SILENCE = 3.0
+"""s without a word after which a page says so: a simulation reports ten times a second."""
+DEADLINE = 30.0
+"""s that loading may take."""
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """state: a word for the badge; sentence: what is the matter; offer: what the button says that starts the
+    scene again, None if waiting is all there is to do."""
+
+    state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING"]
+    sentence: str
+    offer: str | None = "Start again"
+
+
+def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The simulation") -> Trouble | None:
+    """What is the matter with a process that has not failed, if anything is.
+
+    Args:
+        process: which.
+        loading: whether the last it said was that it loads a scene.
+        quiet: s since it said anything.
+        who: begins the sentence.
+    """
+    if quiet < SILENCE:
+        return None
+    waited = f"{quiet:.0f} s"
+    doing = process.preparing
+    if doing is not None:
+        what = f": {doing}" if doing else ""
+        late = quiet > FIRST_PATIENCE
+        return Trouble(
+            "PREPARING", f"The simulations are being prepared{what}. {waited} …", *(() if late else (None,))
+        )
+    if not loading:
+        why = "this computer has no time for it, or it hangs"
+        return Trouble("SILENT", f"{who} has not said a word for {waited}: {why}.")
+    if quiet < DEADLINE:
+        return Trouble("LOADING", f"{who} is being loaded: {waited} of at most {DEADLINE:.0f} s.", "Cancel")
+    why = "this computer has no time for it, or it is too much"
+    return Trouble("SILENT", f"{who} was to be loaded within {DEADLINE:.0f} s: {why} ({waited}).")

@@ -1,0 +1,249 @@
+"""A process with everything imported that forks simulations: each starts at once and shares its memory.
+
+The page asks over a socket and never waits. Whatever happens to the page, the kernel ends this process and
+all its children with it: they are one process group, tied to a pipe that only the page can write to.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import NoReturn
+
+from app.link.children import Forked, one_thread_each
+from app.link.wire import Handle, Wire, packed
+from lessons.orphans import end_with
+
+PATIENCE = 10.0
+"""s after which a server that is ready but does not fork counts as stuck."""
+FIRST_PATIENCE = 120.0
+"""s it may take to get ready, compiling included, before it counts as stuck."""
+
+
+@dataclass(frozen=True)
+class Fork:
+    """A request. wire: the child's end of its socket; status: where its number and its exit code go."""
+
+    wire: Handle
+    status: Handle
+
+
+@dataclass(frozen=True)
+class Preparing:
+    """What the server is doing before it can fork, for the page."""
+
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """It can fork."""
+
+
+class ForkServer:
+    """The page's handle. Raises OSError where processes cannot be forked."""
+
+    def __init__(self, worker: str) -> None:
+        """worker: a module with `warm(say)`, which loads all that a simulation needs and may say what it is
+        doing, and `main(wire)`, which a child runs."""
+        if sys.platform != "linux":
+            raise OSError("libraries of other systems do not survive a fork")
+        ours, theirs = socket.socketpair()
+        life, self._life = os.pipe()
+        code = (
+            f"import sys; sys.path[:] = {sys.path!r}; from app.link.forkserver import serve; "
+            f"serve({theirs.fileno()}, {life}, {worker!r})"
+        )
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", code],
+                pass_fds=(theirs.fileno(), life),
+                stdin=subprocess.DEVNULL,
+                env={**os.environ, **one_thread_each()},
+                process_group=0,
+            )
+        except OSError:
+            ours.close()
+            os.close(self._life)
+            raise
+        finally:
+            theirs.close()
+            os.close(life)
+        self.ready = False
+        self.doing = ""
+        self._ended = False
+        self._asked: list[tuple[float, Forked]] = []
+        self._wire = Wire(ours)
+        self._lock = threading.Lock()
+        self._listening = threading.Thread(target=self._hear, daemon=True)
+        self._listening.start()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        return not self._ended
+
+    def _hear(self) -> None:
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                match self._wire.recv():
+                    case Preparing(sentence):
+                        self.doing = sentence
+                    case Prepared():
+                        self.ready, self.doing = True, ""
+        self._ended = True
+        self._process.wait()
+
+    @property
+    def stuck(self) -> bool:
+        """Whether it was asked for a child and gave none for too long."""
+        now = time.monotonic()
+        with self._lock:
+            self._asked = [each for each in self._asked if each[1].unborn]
+            patience = PATIENCE if self.ready else FIRST_PATIENCE
+            return any(now - since > patience for since, _ in self._asked)
+
+    def fork(self, theirs: socket.socket) -> Forked:
+        """A child with this end of its socket. Raises OSError if the server is gone or does not read."""
+        status, other = socket.socketpair()
+        child = Forked(status, self)
+        try:
+            with self._lock:
+                self._wire.post(packed(Fork(Handle(theirs.fileno()), Handle(other.fileno()))), wait=False)
+                self._asked.append((time.monotonic(), child))
+        except OSError:
+            child.close()
+            raise
+        finally:
+            other.close()
+        return child
+
+    def give_up(self) -> None:
+        """Ends the server alone: its children go on."""
+        self._process.kill()
+
+    def close(self) -> None:
+        """Ends the server and every child that is left."""
+        self._process.kill()
+        self._listening.join()
+        self._wire.close()
+        os.close(self._life)
+
+
+# ---------------------------------------------------------------- in the server's process
+
+
+def serve(control: int, life: int, worker: str) -> NoReturn:
+    """The server's process: gets everything ready, then forks when asked until the page is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's to answer
+    end_with(life, group=True)
+    wire = Wire(socket.socket(fileno=control))
+    module = import_module(worker)
+    module.warm(lambda sentence: wire.send(Preparing(sentence)))
+    # What is there now is shared by all children as long as nobody touches it: the collector must not.
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    wire.send(Prepared())
+    _Nest(wire, module.main).run()
+
+
+def threads() -> int:
+    """Threads of this process."""
+    return len(list(Path("/proc/self/task").iterdir()))
+
+
+class _Nest:
+    def __init__(self, wire: Wire, entry: Callable[[Wire], None]) -> None:
+        self._wire, self._entry = wire, entry
+        self._children: dict[int, socket.socket] = {}
+        self._woken, wake = socket.socketpair()
+        self._woken.setblocking(False)
+        wake.setblocking(False)
+        self._wake = wake
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        signal.set_wakeup_fd(wake.fileno(), warn_on_full_buffer=False)
+
+    def run(self) -> NoReturn:
+        watched = select.poll()
+        watched.register(self._wire, select.POLLIN)
+        watched.register(self._woken, select.POLLIN)
+        while True:
+            watched.poll()
+            with contextlib.suppress(BlockingIOError):
+                self._woken.recv(4096)
+            self._reap()
+            if self._wire.poll():
+                try:
+                    request: Fork = self._wire.recv()
+                except (EOFError, OSError):
+                    self._end()
+                self._fork(socket.socket(fileno=request.wire.number), request.status.number)
+
+    def _fork(self, theirs: socket.socket, status: int) -> None:
+        if threads() != 1:
+            # What another thread holds at this moment would stay locked in the child for ever.
+            print("himpc-lab: a second thread runs in the fork server; it ends", file=sys.stderr)
+            self._end()
+        report = socket.socket(fileno=status)
+        pid = os.fork()
+        if pid == 0:
+            self._be_a_child(theirs, report)
+        theirs.close()
+        self._children[pid] = report
+        _tell(report, pid)
+
+    def _be_a_child(self, theirs: socket.socket, report: socket.socket) -> NoReturn:
+        code = 1
+        try:
+            signal.set_wakeup_fd(-1)
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            for each in (self._woken, self._wake, report, *self._children.values()):
+                each.close()
+            self._wire.close()
+            gc.enable()
+            self._entry(Wire(theirs))
+            code = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            with contextlib.suppress(Exception):
+                sys.stdout.flush()
+                sys.stderr.flush()
+            os._exit(code)
+
+    def _reap(self) -> None:
+        while self._children:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+            if pid == 0:
+                return
+            report = self._children.pop(pid, None)
+            if report is not None:
+                _tell(report, os.waitstatus_to_exitcode(status))
+                report.close()
+
+    def _end(self) -> NoReturn:
+        for pid in self._children:
+            os.kill(pid, signal.SIGKILL)
+        os._exit(0)
+
+
+def _tell(report: socket.socket, number: int) -> None:
+    with contextlib.suppress(OSError):  # the page has forgotten this child
+        report.sendall(number.to_bytes(8, "big", signed=True))

@@ -1,0 +1,87 @@
+"""Where simulations come from: the fork server, and the spare that waits warm for the next browser."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+
+from app.link.children import Child, Spawned
+from app.link.forkserver import ForkServer
+from app.link.process import Process
+
+
+class Spares:
+    """Keeps one child started ahead."""
+
+    def __init__(self, worker: str) -> None:
+        """worker: the module that a child runs, see `ForkServer`."""
+        self._worker = worker
+        self._lock = threading.Lock()
+        self._server: ForkServer | None = None
+        self._given_up: list[ForkServer] = []
+        self._forks = True
+        self._spare: Process | None = None
+        self._closed = False
+
+    @property
+    def server(self) -> ForkServer | None:
+        """The fork server, if there is one."""
+        return self._server
+
+    def refill(self) -> None:
+        """Starts a spare unless there is one."""
+        with self._lock:
+            if not self._closed and (self._spare is None or not self._spare.alive):
+                self._spare = self._make()
+
+    def take(self) -> Process:
+        """The spare, or a new child."""
+        with self._lock:
+            spare, self._spare = self._spare, None
+            if spare is not None and spare.alive and not (self._server is not None and self._server.stuck):
+                return spare
+            made = self._make()
+        if spare is not None:
+            spare.kill()
+        return made
+
+    def _make(self) -> Process:
+        return Process(self._start, self._spawn)
+
+    def _start(self, theirs: socket.socket) -> Child:
+        self._mind_the_server()
+        if self._server is not None:
+            with contextlib.suppress(OSError):
+                return self._server.fork(theirs)
+        return self._spawn(theirs)
+
+    def _mind_the_server(self) -> None:
+        """A server that has died or hangs is replaced; one that never came to be ready is not tried again."""
+        server = self._server
+        if server is not None and (not server.alive or server.stuck):
+            self._forks = server.ready
+            server.give_up()
+            self._given_up.append(server)
+            self._server = None
+        if self._server is None and self._forks and not self._closed:
+            try:
+                self._server = ForkServer(self._worker)
+            except OSError:
+                self._forks = False
+
+    def _spawn(self, theirs: socket.socket) -> Child:
+        return Spawned(self._worker, theirs)
+
+    def close(self) -> None:
+        """Ends the spare, the fork server and every child of it that is left."""
+        with self._lock:
+            self._closed = True
+            spare, self._spare = self._spare, None
+            servers, self._given_up = [*self._given_up, self._server], []
+            self._server = None
+        if spare is not None:
+            spare.close()
+        for server in servers:
+            if server is not None:
+                server.close()
