@@ -12,7 +12,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.spares import Spares
 
-WORKER = "app.worker.main"
+WORKER = "app.worker.entry"
 """What a simulation's process runs; by name, because the server never loads it."""
 GRACE = 10.0  # s a session outlives its tab: the time of a reload
 _PERIOD = 0.5  # s between looks at who has left

@@ -7,7 +7,6 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
 
 from app.link.choice import SceneChoice
 from app.link.messages import Command, Failed, Follow, Load, Loading, Quit, Refused
@@ -26,11 +25,9 @@ _CHUNK = 0.01  # s: the longest run before commands are looked at again
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
 
 
-def warm(say: Callable[[str], None]) -> None:
-    """Loads what simulations need: both kinds of controllers run for a moment, so that their compiled code is
-    there. `say` is told what is being done, for a page that waits."""
+def rehearse() -> None:
+    """Both kinds of controllers run for a moment: what is loaded on first use is there afterwards."""
     for scene in _USUAL:
-        say(f"loading the controllers ({scene})")
         body = Body(SceneChoice(scene))
         body.tick(3)
         packed(body.ready())
