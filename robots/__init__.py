@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from robots.catalog import CATALOG
     from robots.errors import InputError
     from robots.inertia import convergence_gauge, suggest_M_bar
-    from robots.load import load_robot, load_urdf_text
+    from robots.load import check_urdf, load_robot, load_urdf_text
     from robots.nominal import NominalModel, NominalSettings
     from robots.plant import Plant
     from robots.report import Finding, ImportReport
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from robots.servo import VelocityPlant, VelocityPlantSettings
     from robots.settings import PlantSettings
     from robots.signals import PlantState
-    from robots.urdf import check_urdf
 
 __all__ = [
     "CATALOG",
@@ -53,7 +52,7 @@ __getattr__ = lazily(
         "Robot": "robot",
         "VelocityPlant": "servo",
         "VelocityPlantSettings": "servo",
-        "check_urdf": "urdf",
+        "check_urdf": "load",
         "convergence_gauge": "inertia",
         "load_robot": "load",
         "load_urdf_text": "load",

@@ -5,17 +5,40 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+_LISTED = 600  # characters of choices in a message: all of the catalog, not all frames of a stranger
+_COMPARED = 100  # characters of a name that are compared: the time grows with their square
+
 
 class InputError(ValueError):
     """What the user gave cannot be used; the message is one sentence that says what to do next."""
 
 
+def shortened(text: str, most: int = 60) -> str:
+    """A name or path as a message quotes it: printable, its middle left out where it is too long."""
+    if len(text) > most:
+        head = (most - 3) // 3
+        text = text[:head] + "..." + text[len(text) - (most - 3 - head) :]
+    return "".join(each if each.isprintable() else "?" for each in text)
+
+
+def nearest_name(name: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """The choice most like a name, if any is alike."""
+    folded = {choice.casefold(): choice for choice in reversed(list(choices))}
+    close = get_close_matches(name[:_COMPARED].casefold(), folded, n=1, cutoff=cutoff)
+    return folded[close[0]] if close else None
+
+
 def unknown_name(what: str, name: str, choices: Iterable[str], hint: str = "") -> InputError:
     """The error for a name that is not among `choices`: it names the nearest one and lists them all."""
     names = [str(choice) for choice in choices]
-    folded = {choice.casefold(): choice for choice in reversed(names)}
-    close = get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.4)
-    nearest = f"did you mean '{folded[close[0]]}'? " if close else ""
-    listed = ", ".join(names[:40]) + (f", … ({len(names)} in all)" if len(names) > 40 else "")
+    close = nearest_name(str(name), names, cutoff=0.4)
+    nearest = f"did you mean '{shortened(close)}'? " if close else ""
+    listed: list[str] = []
+    for each in names[:40]:
+        if sum(map(len, listed)) + len(each) > _LISTED:
+            break
+        listed.append(shortened(each))
+    more = f", … ({len(names)} in all)" if len(names) > len(listed) else ""
     tail = f"; {hint}" if hint else ""
-    return InputError(f"There is no {what} '{name}': {nearest}Choose one of {listed or '(none)'}{tail}.")
+    choose = f"Choose one of {', '.join(listed) or '(none)'}{more}{tail}"
+    return InputError(f"There is no {what} '{shortened(str(name), 100)}': {nearest}{choose}.")

@@ -12,16 +12,17 @@ from urllib.parse import unquote, urlparse
 
 from lxml.etree import _Element as Element
 
+from robots.errors import shortened
 from robots.report import Finding
 
 # rtb-data keeps packages under other folder names than their `package://` name.
 _RENAMED = {"kuka_lbr_iiwa_support": "kuka_description/kuka_lbr_iiwa"}
 
 
-def absolutise(root: Element, folder: Path | None) -> Iterator[Finding]:
-    """Rewrites every mesh path of a URDF tree as an absolute one; yields a note per mesh not found.
+def localise(root: Element, folder: Path | None) -> Iterator[Finding]:
+    """Removes every shape whose mesh is not found; the link is then drawn as capsules. Yields a note on it.
 
-    A mesh that is not found is removed together with its visual: the link is then drawn as capsules.
+    A mesh of an installed package keeps its `package://` name, any other gets its absolute path.
     """
     missing: dict[str, int] = {}
     for link in root.findall("link"):
@@ -30,7 +31,9 @@ def absolutise(root: Element, folder: Path | None) -> Iterator[Finding]:
             if mesh is None:
                 continue
             uri = mesh.get("filename", "")
-            path = find_mesh(uri, folder)
+            if installed_mesh(uri) is not None:
+                continue
+            path = None if folder is None else find_mesh(uri, folder)
             if path is not None:
                 mesh.set("filename", str(path))
                 continue
@@ -38,13 +41,22 @@ def absolutise(root: Element, folder: Path | None) -> Iterator[Finding]:
             if shape.tag == "visual":
                 missing[uri] = missing.get(uri, 0) + 1
     if missing:
-        names = ", ".join(f"'{uri}'" for uri in list(missing)[:3]) + (", …" if len(missing) > 3 else "")
-        text = f"{len(missing)} mesh file(s) not found ({names}); capsules are drawn instead"
+        names = ", ".join(f"'{shortened(uri)}'" for uri in list(missing)[:3])
+        more = ", …" if len(missing) > 3 else ""
+        text = f"{len(missing)} mesh file(s) not found ({names}{more}); capsules are drawn instead"
         yield Finding("note", "meshes", f"{text}. `pip install himpc-lab[meshes]` brings many robots' meshes")
 
 
-def find_mesh(uri: str, folder: Path | None) -> Path | None:
-    """The file a mesh URI of a URDF names, or None.
+def installed_mesh(uri: str) -> Path | None:
+    """The file of an installed package that a `package://` URI names, or None: all a stranger may name."""
+    parts = _package_parts(uri)
+    if parts is None:
+        return None
+    return next(filter(None, (_existing(place / parts[1]) for place in _installed(parts[0]))), None)
+
+
+def find_mesh(uri: str, folder: Path) -> Path | None:
+    """The file a mesh URI names in a URDF of the machine's owner, or None.
 
     Plain paths and `file://` count from `folder`. `package://pkg/rest` is looked up in the ancestors of
     `folder`, the ROS package path and the installed packages; nothing is ever fetched.
@@ -52,30 +64,42 @@ def find_mesh(uri: str, folder: Path | None) -> Path | None:
     if not uri.strip() or "\0" in uri:
         return None
     if "://" not in uri:
-        return _existing(Path(uri) if folder is None else folder / uri)
-    parsed = urlparse(uri)
-    if parsed.scheme == "file":
-        return _existing(Path(unquote(parsed.path)))
-    if parsed.scheme not in ("package", "model"):
+        return _existing(folder / uri)
+    if uri.startswith("file://"):
+        return _existing(Path(unquote(urlparse(uri).path)))
+    parts = _package_parts(uri)
+    if parts is None:
         return None
-    package, rest = parsed.netloc, parsed.path.lstrip("/")
-    if not package or ".." in PurePosixPath(rest).parts:
-        return None
-    return next(filter(None, (_existing(place / rest) for place in _package_folders(package, folder))), None)
+    places = _package_folders(parts[0], folder)
+    return next(filter(None, (_existing(place / parts[1]) for place in places)), None)
 
 
-def _package_folders(package: str, folder: Path | None) -> Iterator[Path]:
-    if folder is not None:
-        for ancestor in (folder, *folder.parents):
-            if ancestor.name == package:
-                yield ancestor
-            yield ancestor / package
+def _package_parts(uri: str) -> tuple[str, str] | None:
+    """(package, path inside it) of a `package://` URI that stays inside its package."""
+    scheme, separator, rest = uri.partition("://")
+    package, _, path = rest.partition("/")
+    if scheme not in ("package", "model") or not separator or "\0" in rest or "\\" in rest:
+        return None
+    if not package or not path.strip("/") or ".." in (package, *PurePosixPath(path).parts) or package == ".":
+        return None
+    return package, path.lstrip("/")
+
+
+def _package_folders(package: str, folder: Path) -> Iterator[Path]:
+    for ancestor in (folder, *folder.parents):
+        if ancestor.name == package:
+            yield ancestor
+        yield ancestor / package
     for entry in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep):
         if entry:
             yield Path(entry) if Path(entry).name == package else Path(entry) / package
     for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
         if entry:
             yield Path(entry) / "share" / package
+    yield from _installed(package)
+
+
+def _installed(package: str) -> Iterator[Path]:
     for share in installed_shares():
         yield share / package
         yield share / _RENAMED.get(package, package)

@@ -1,6 +1,7 @@
-"""URDF import: `canonicalise` for use, `check_urdf` for the report alone."""
+"""URDF import: a description read, checked, repaired and reported."""
 
-from robots.urdf.canonical import Canonical, canonicalise, check_bytes, check_urdf, load_bytes
+from robots.urdf.canonical import Canonical, canonicalise
 from robots.urdf.joints import UNBOUNDED
+from robots.urdf.read import load_bytes
 
-__all__ = ["UNBOUNDED", "Canonical", "canonicalise", "check_bytes", "check_urdf", "load_bytes"]
+__all__ = ["UNBOUNDED", "Canonical", "canonicalise", "load_bytes"]

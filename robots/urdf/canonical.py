@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +11,18 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.errors import InputError
-from robots.meshes import absolutise
+from robots.errors import shortened
+from robots.meshes import localise
 from robots.report import Finding, ImportReport
 from robots.urdf.inertials import repair_inertials
 from robots.urdf.joints import normalise_joints
 from robots.urdf.limits import fill_efforts, fill_speeds
-from robots.urdf.read import Refusal, parse, read_file
+from robots.urdf.read import Refusal, parse
 from robots.urdf.structure import check_structure, movable_joints
 
-MAX_JOINTS = 100
+MAX_JOINTS = 20
+"""Moving joints a controller can serve every millisecond: a tick takes 0.4 ms then, with three levels."""
+MAX_FINDINGS = 200
 
 
 @dataclass(frozen=True)
@@ -33,72 +35,49 @@ class Canonical:
     report: ImportReport
 
 
-def canonicalise(data: bytes, source: str, folder: Path | None = None) -> Canonical:
-    """The canonical form of a URDF document.
+def canonicalise(
+    data: bytes, source: str, folder: Path | None = None
+) -> tuple[Canonical | None, ImportReport]:
+    """The canonical form of a URDF document, None when it cannot be used, and the report of the import.
 
-    source: how messages name it; folder: where relative and `package://` mesh paths start from.
-    Raises InputError with the first reason when the document cannot be used.
+    source: how messages name it; folder: where relative and `package://` mesh paths start from, None for a
+    description that may see installed packages only.
     """
-    canonical, findings = _import(data, source, folder)
-    if canonical is None:
-        refused = [finding for finding in findings if finding.kind == "refused"]
-        more = f" (and {len(refused) - 1} more; see `himpc-lab robots --check`)" if len(refused) > 1 else ""
-        where = "" if refused[0].where == source else f"{refused[0].where}: "
-        raise InputError(f"{source} cannot be used: {where}{refused[0].text}{more}.")
-    return canonical
-
-
-def check_bytes(data: bytes, source: str, folder: Path | None = None) -> ImportReport:
-    """The import report of a URDF document; never raises for what the document contains."""
-    canonical, findings = _import(data, source, folder)
-    return ImportReport(source, findings) if canonical is None else canonical.report
-
-
-def check_urdf(path: str | Path) -> ImportReport:
-    """The import report of a URDF file: what would be repaired, filled, fixed or refused.
-
-    Never raises for bad content; raises InputError when there is no such file.
-    """
-    file = Path(path)
-    return check_bytes(load_bytes(file), str(path), file.resolve().parent)
-
-
-def load_bytes(path: Path) -> bytes:
-    """The content of a URDF file. Raises InputError when it cannot be read."""
-    try:
-        return read_file(path)
-    except OSError as error:
-        reason = "it is a folder" if path.is_dir() else error.strerror or str(error)
-        raise InputError(f"Cannot read the URDF '{path}': {reason}; give the path of a URDF file.") from None
-
-
-def _import(data: bytes, source: str, folder: Path | None) -> tuple[Canonical | None, tuple[Finding, ...]]:
     try:
         root = parse(data, source)
     except Refusal as refusal:
-        return None, (refusal.finding,)
+        return None, _report(source, [refusal.finding])
     findings: list[Finding] = []
     passes: tuple[Callable[[Element], Iterator[Finding]], ...] = (
         lambda tree: check_structure(tree, source),
         normalise_joints,
+        lambda tree: _check_freedom(tree, source),
         repair_inertials,
         fill_speeds,
-        lambda tree: _check_freedom(tree, source),
     )
     for each in passes:
         findings.extend(each(root))
         if any(finding.kind == "refused" for finding in findings):
-            return None, tuple(findings)
-    findings.extend(absolutise(root, folder))
+            return None, _report(source, findings)
+    findings.extend(localise(root, folder))
     try:
-        findings.extend(fill_efforts(root, _model(root)))
         model = _model(root)
+        findings.extend(fill_efforts(root, model))
     except Refusal as refusal:
-        return None, (*findings, refusal.finding)
-    name = root.get("name", "").strip() or "robot"
-    report = ImportReport(source, tuple(findings), name, tuple(model.names)[1:])
+        return None, _report(source, [*findings, refusal.finding])
+    name = shortened(root.get("name", "").strip()) or "robot"
+    report = replace(_report(source, findings), name=name, joints=tuple(model.names)[1:])
     text = etree.tostring(root, encoding="unicode", pretty_print=True)
-    return Canonical(name, text, model, report), tuple(findings)
+    return Canonical(name, text, model, report), report
+
+
+def _report(source: str, findings: list[Finding]) -> ImportReport:
+    """What was refused comes first where not all findings fit."""
+    if len(findings) > MAX_FINDINGS:
+        kept = sorted(findings, key=lambda finding: finding.kind != "refused")[:MAX_FINDINGS]
+        more = f"{len(findings) - MAX_FINDINGS} more findings are not listed"
+        findings = [*kept, Finding("note", source, more)]
+    return ImportReport(source, tuple(findings))
 
 
 def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
@@ -106,7 +85,8 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
     if count == 0:
         yield Finding("refused", source, "no joint of it moves; give a robot with at least one movable joint")
     elif count > MAX_JOINTS:
-        yield Finding("refused", source, f"it has {count} joints; at most {MAX_JOINTS} are supported")
+        text = f"it has {count} moving joints; at most {MAX_JOINTS} can be controlled every millisecond"
+        yield Finding("refused", source, f"{text}: make the others fixed")
 
 
 def _model(root: Element) -> pin.Model:
@@ -114,7 +94,8 @@ def _model(root: Element) -> pin.Model:
     try:
         model = pin.buildModelFromXML(etree.tostring(root, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
-        raise Refusal("robot", f"Pinocchio cannot build it ({str(error).strip().splitlines()[0]})") from None
+        reason = shortened(next(iter(str(error).strip().splitlines()), type(error).__name__), 100)
+        raise Refusal("robot", f"Pinocchio cannot build it ({reason})") from None
     if model.nq != model.nv or model.nv != model.njoints - 1:
         raise Refusal("robot", "a joint has more than one coordinate; only one-axis joints are supported")
     for joint in range(1, model.njoints):

@@ -10,7 +10,7 @@ from lxml.etree import _Element as Element
 
 from robots.report import Finding
 from robots.urdf.read import Refusal, child, end_of, label, named, numbers
-from robots.urdf.structure import movable_joints
+from robots.urdf.structure import body_of, movable_joints
 
 _DENSITY = 1000.0  # kg/m³: the solid sphere that stands in for a missing inertia
 _LEAST_MASS = 1e-6  # kg
@@ -32,9 +32,12 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
             masses[name] = 1.0
             yield refusal.finding
     links = named(root, "link")
+    total: dict[str, float] = {}
+    for name, first in body_of(root).items():
+        total[first] = total.get(first, 0.0) + masses[name]
     for joint in movable_joints(root):
         carried = end_of(joint, "child")
-        if sum(masses[name] for name in _rigid_with(root, carried)) <= 0.0:
+        if total[carried] <= 0.0:
             _write(links[carried], _FILL_MASS, np.eye(3) * _sphere(_FILL_MASS))
             text = f"the body moved by {label(joint)} has no mass; a sphere of {_FILL_MASS} kg was put there"
             yield Finding("filled", label(links[carried]), text)
@@ -106,20 +109,6 @@ def _read_inertia(inertial: Element) -> np.ndarray | None:
         return None
     xx, xy, xz, yy, yz, zz = (float(numbers(element, key, 1, (0.0,))[0]) for key in _KEYS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _rigid_with(root: Element, link: str) -> list[str]:
-    """The link and everything fixed to it further out."""
-    body, frontier = [link], [link]
-    fixed: dict[str, list[str]] = {}
-    for joint in root.findall("joint"):
-        if joint.get("type") == "fixed":
-            fixed.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))
-    while frontier:
-        further = fixed.get(frontier.pop(), [])
-        body.extend(further)
-        frontier.extend(further)
-    return body
 
 
 def _sphere(mass: float) -> float:

@@ -11,9 +11,10 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
+from robots.errors import shortened
 from robots.report import Finding
 from robots.urdf.read import Refusal, child, end_of, label, named, numbers
-from robots.urdf.structure import ancestors, movable_joints
+from robots.urdf.structure import movable_joints, parent_joints
 
 UNBOUNDED = 1e6  # rad or m: written for a joint without limits, so that nq = nv; read back as ±inf
 _GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
@@ -22,7 +23,11 @@ _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" 
 
 def normalise_joints(root: Element) -> Iterator[Finding]:
     """Rewrites every joint so that Pinocchio gives it exactly one coordinate; yields what was changed."""
-    frozen = _to_freeze(root)
+    try:
+        frozen = _to_freeze(root)
+    except Refusal as refusal:
+        yield refusal.finding
+        return
     for joint in root.findall("joint"):
         try:
             _origin(joint)
@@ -66,15 +71,15 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
 def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
     """Name → (value, reason) of the joints an arm controller does not move."""
     frozen: dict[str, tuple[float, str]] = {}
-    joints = named(root, "joint")
+    joints, carriers = named(root, "joint"), parent_joints(root)
     for joint in movable_joints(root):
         name = joint.get("name", "")
         mimic = child(joint, "mimic")
         if mimic is not None:
             offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
             leader = mimic.get("joint", "")
-            frozen[name] = (offset, f"it mimics '{leader}'")
-            if leader in joints and not _same_chain(root, joint, joints[leader]):
+            frozen[name] = (offset, f"it mimics '{shortened(leader)}'")
+            if leader in joints and not _same_chain(carriers, joint, joints[leader]):
                 frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
         elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
             frozen.setdefault(name, (0.0, "its name says it belongs to a gripper"))
@@ -84,8 +89,17 @@ def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
     return frozen
 
 
-def _same_chain(root: Element, one: Element, other: Element) -> bool:
-    return one in ancestors(root, end_of(other, "child")) or other in ancestors(root, end_of(one, "child"))
+def _same_chain(carriers: dict[str, Element], one: Element, other: Element) -> bool:
+    """Whether one of two joints carries the other."""
+    pairs = ((one, other), (other, one))
+    return any(first in _ancestors(carriers, end_of(second, "child")) for first, second in pairs)
+
+
+def _ancestors(carriers: dict[str, Element], link: str) -> Iterator[Element]:
+    """The joints from a link down to the root, nearest first."""
+    while link in carriers:
+        yield carriers[link]
+        link = end_of(carriers[link], "parent")
 
 
 def _origin(joint: Element) -> None:

@@ -39,7 +39,8 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
 
 
 def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
-    """Fills the effort limits that are 0: three times the largest gravity load, and enough to accelerate.
+    """Fills the effort limits that are 0, in the tree and in its model: three times the largest gravity load,
+    and enough to accelerate.
 
     τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, to two digits.
     """
@@ -48,14 +49,18 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
     if not missing:
         return
     needed = _needed_effort(model)
+    limits = model.effortLimit.copy()
     for name in missing:
-        effort = float(f"{needed[model.getJointId(name) - 1]:.1e}")
+        place = model.getJointId(name) - 1
+        effort = float(f"{needed[place]:.1e}")
+        limits[place] = effort
         limit = child(joints[name], "limit")
         if limit is not None:
             limit.set("effort", repr(effort))
         unit = "N" if joints[name].get("type") == "prismatic" else "N·m"
         text = f"no effort limit; {effort:g} {unit} was estimated from the weight it carries"
         yield Finding("filled", label(joints[name]), text)
+    model.effortLimit = limits
 
 
 def _effort(joint: Element) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from lxml import etree
 from lxml.etree import _Element as Element
 
+from robots.errors import InputError, shortened
 from robots.report import Finding
 
 MAX_BYTES = 10_000_000
@@ -48,22 +49,35 @@ def parse(data: bytes, source: str) -> Element:
     if any("xacro" in str(element.tag) for element in root.iter()):
         raise Refusal(source, "this is a xacro template; run `xacro FILE > robot.urdf` and give the result")
     if root.tag != "robot":
-        raise Refusal(source, f"the root element is <{_short(str(root.tag))}>, a URDF starts with <robot>")
+        raise Refusal(source, f"the root element is <{shortened(str(root.tag))}>, a URDF starts with <robot>")
     for child in list(root):
         if child.tag not in ("link", "joint", "material"):
             root.remove(child)
     return root
 
 
-def read_file(path: Path) -> bytes:
-    """The bytes of a file, at most one more than the parser accepts. Raises OSError."""
-    with path.open("rb") as file:
-        return file.read(MAX_BYTES + 1)
+def load_bytes(path: Path) -> bytes:
+    """The content of a URDF file, at most one byte more than the parser accepts.
+
+    Raises InputError when it cannot be read, or is no plain file: a pipe could keep its reader waiting.
+    """
+    try:
+        if path.is_dir():
+            reason = "it is a folder"
+        elif path.exists() and not path.is_file():
+            reason = "it is no plain file"
+        else:
+            with path.open("rb") as file:
+                return file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "this is no path"
+    name = shortened(str(path), 100)
+    raise InputError(f"Cannot read the URDF '{name}': {reason}; give the path of a URDF file.")
 
 
 def label(element: Element) -> str:
     """How a finding names an element: ``joint 'elbow'``."""
-    return f"{element.tag} '{_short(element.get('name', ''))}'"
+    return f"{element.tag} '{shortened(element.get('name', ''))}'"
 
 
 def numbers(
@@ -81,11 +95,11 @@ def numbers(
         values = [float(word) for word in text.split()]
     except ValueError:
         hint = _XACRO_HINT if "${" in text else ""
-        raise Refusal(where, f"{name} is '{_short(text)}', not {_count(count)}{hint}") from None
+        raise Refusal(where, f"{name} is '{shortened(text)}', not {_count(count)}{hint}") from None
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise Refusal(where, f"{name} is '{_short(text)}', not {_count(count)}")
+        raise Refusal(where, f"{name} is '{shortened(text)}', not {_count(count)}")
     if max(abs(value) for value in values) > _LARGEST.get(attribute, 1e9):
-        raise Refusal(where, f"{name} is '{_short(text)}', beyond anything physical; check its unit")
+        raise Refusal(where, f"{name} is '{shortened(text)}', beyond anything physical; check its unit")
     return np.array(values)
 
 
@@ -116,9 +130,5 @@ def _count(count: int) -> str:
     return "a finite number" if count == 1 else f"{count} finite numbers"
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    return shortened(str(error).strip().splitlines()[0], 150) if str(error).strip() else type(error).__name__

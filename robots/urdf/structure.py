@@ -4,23 +4,31 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from difflib import get_close_matches
 
 from lxml.etree import _Element as Element
 
+from robots.errors import nearest_name, shortened
 from robots.report import Finding
-from robots.urdf.read import Refusal, end_of, label, named
+from robots.urdf.read import end_of, label, named
 
+MAX_LINKS = 1_000
+MAX_SHAPES = 5_000
+MAX_DEPTH = 200
+"""Joints one after the other: readers of URDF descend by recursion."""
+MAX_NAME = 100
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
+_GUESSES = 5
+"""Findings that come with a suggestion: the first tell how the rest is meant."""
 
 
 def check_structure(root: Element, source: str) -> Iterator[Finding]:
     """Yields a `refused` finding for everything that keeps the description from being one tree of links."""
-    faults = [*_names(root), *_joint_ends(root), *_types(root)]
-    yield from faults
-    if not faults:
-        yield from _single_tree(root, source)
+    for checks in ((_sizes,), (_names,), (_joint_ends, _types), (_single_tree,)):
+        faults = [fault for check in checks for fault in check(root, source)]
+        yield from faults
+        if faults:
+            return
 
 
 def movable_joints(root: Element) -> list[Element]:
@@ -33,59 +41,82 @@ def parent_joints(root: Element) -> dict[str, Element]:
     return {end_of(joint, "child"): joint for joint in root.findall("joint")}
 
 
-def ancestors(root: Element, link: str) -> Iterator[Element]:
-    """The joints from a link down to the root, nearest first."""
+def body_of(root: Element) -> dict[str, str]:
+    """For every link: the first link of the rigid body it belongs to, the one a moving joint carries."""
     carriers = parent_joints(root)
-    while link in carriers:
-        yield carriers[link]
-        link = end_of(carriers[link], "parent")
+    found: dict[str, str] = {}
+    for link in named(root, "link"):
+        passed, at = [link], link
+        while at not in found and at in carriers and carriers[at].get("type") == "fixed":
+            at = end_of(carriers[at], "parent")
+            passed.append(at)
+        first = found.get(at, at)
+        found.update((each, first) for each in passed)
+    return found
 
 
-def _names(root: Element) -> Iterator[Finding]:
+def _sizes(root: Element, source: str) -> Iterator[Finding]:
+    links, joints = len(root.findall("link")), len(root.findall("joint"))
+    if max(links, joints) > MAX_LINKS:
+        text = f"it has {links} links and {joints} joints; at most {MAX_LINKS} of each can be used"
+        yield Finding("refused", source, text)
+    shapes = sum(len(link.findall(tag)) for link in root.findall("link") for tag in ("visual", "collision"))
+    if shapes > MAX_SHAPES:
+        text = f"it has {shapes} visual and collision shapes; at most {MAX_SHAPES} can be used"
+        yield Finding("refused", source, text)
+
+
+def _names(root: Element, _source: str) -> Iterator[Finding]:
     for tag in ("link", "joint"):
         counts = Counter(element.get("name", "") for element in root.findall(tag))
         for name, count in counts.items():
+            where = f"{tag} '{shortened(name)}'"
             if not name.strip():
                 yield Finding("refused", tag, f"{count} {tag}(s) have no name; name every {tag}")
             elif count > 1:
-                yield Finding(
-                    "refused", f"{tag} '{name}'", f"the name is used {count} times; make names unique"
-                )
+                yield Finding("refused", where, f"the name is used {count} times; make names unique")
+            elif len(name) > MAX_NAME:
+                yield Finding("refused", where, f"its name has {len(name)} characters; {MAX_NAME} will do")
+            elif not name.isprintable():
+                yield Finding("refused", where, "the name has characters that cannot be printed; rename it")
     if "universe" in named(root, "link"):
         yield Finding("refused", "link 'universe'", "the name is reserved for the world; rename the link")
     if not root.findall("link"):
         yield Finding("refused", "robot", "it has no link; a robot needs at least two links and a joint")
 
 
-def _joint_ends(root: Element) -> Iterator[Finding]:
+def _joint_ends(root: Element, _source: str) -> Iterator[Finding]:
     links = named(root, "link")
+    guesses = 0
     for joint in root.findall("joint"):
         for side in ("parent", "child"):
             name = end_of(joint, side)
             if name not in links:
-                close = get_close_matches(name, links, n=1)
-                guess = f"; did you mean '{close[0]}'?" if close else "; add that link or correct the name"
-                yield Finding("refused", label(joint), f"its {side} link '{name}' does not exist{guess}")
+                guesses += 1
+                close = nearest_name(name, links) if guesses <= _GUESSES else None
+                guess = f"; did you mean '{close}'?" if close else "; add that link or correct the name"
+                text = f"its {side} link '{shortened(name)}' does not exist{guess}"
+                yield Finding("refused", label(joint), text)
     children = Counter(end_of(joint, "child") for joint in root.findall("joint"))
     for name, count in children.items():
         if count > 1:
-            yield Finding(
-                "refused", f"link '{name}'", f"{count} joints carry it; closed chains are not supported"
-            )
+            text = f"{count} joints carry it; closed chains are not supported"
+            yield Finding("refused", f"link '{shortened(name)}'", text)
 
 
-def _types(root: Element) -> Iterator[Finding]:
+def _types(root: Element, _source: str) -> Iterator[Finding]:
+    guesses = 0
     for joint in root.findall("joint"):
         kind = joint.get("type", "")
         if kind in ("floating", "planar"):
             text = f"a {kind} joint has several axes; only fixed-base robots with one-axis joints work"
             yield Finding("refused", label(joint), text)
         elif kind not in _KNOWN:
-            close = get_close_matches(kind, _KNOWN, n=1)
-            guess = f"did you mean '{close[0]}'? " if close else ""
-            yield Finding(
-                "refused", label(joint), f"unknown type '{kind}'; {guess}Use one of {', '.join(_KNOWN[:4])}"
-            )
+            guesses += 1
+            close = nearest_name(kind, _KNOWN) if guesses <= _GUESSES else None
+            guess = f"did you mean '{close}'? " if close else ""
+            text = f"unknown type '{shortened(kind)}'; {guess}Use one of {', '.join(_KNOWN[:4])}"
+            yield Finding("refused", label(joint), text)
 
 
 def _single_tree(root: Element, source: str) -> Iterator[Finding]:
@@ -94,24 +125,30 @@ def _single_tree(root: Element, source: str) -> Iterator[Finding]:
     roots = [name for name in links if name not in carried]
     if not roots:
         yield Finding("refused", source, "no link is the root: the joints form a loop; open it")
-    elif len(roots) > 1:
-        names = ", ".join(f"'{name}'" for name in roots[:6]) + (", …" if len(roots) > 6 else "")
-        yield Finding(
-            "refused", source, f"it has {len(roots)} root links ({names}); join them with fixed joints"
-        )
-    elif len(_below(root, roots[0])) != len(links):
+        return
+    if len(roots) > 1:
+        names = ", ".join(f"'{shortened(name, 30)}'" for name in roots[:6])
+        more = ", …" if len(roots) > 6 else ""
+        text = f"it has {len(roots)} root links ({names}{more}); join them with fixed joints"
+        yield Finding("refused", source, text)
+        return
+    depths = _depths(root, roots[0])
+    if len(depths) != len(links):
         yield Finding("refused", source, "some joints form a loop apart from the root link; open it")
+    elif max(depths.values()) > MAX_DEPTH:
+        text = f"its longest chain has {max(depths.values())} joints; at most {MAX_DEPTH} can be used"
+        yield Finding("refused", source, text)
 
 
-def _below(root: Element, start: str) -> set[str]:
+def _depths(root: Element, start: str) -> dict[str, int]:
+    """The number of joints between the root link and each link that hangs on it."""
     children: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
         children.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))
-    seen, open_links = {start}, [start]
+    depths, open_links = {start: 0}, [start]
     while open_links:
-        for name in children.get(open_links.pop(), []):
-            if name in seen:
-                raise Refusal(f"link '{name}'", "it is reached twice; closed chains are not supported")
-            seen.add(name)
+        link = open_links.pop()
+        for name in children.get(link, []):
+            depths[name] = depths[link] + 1
             open_links.append(name)
-    return seen
+    return depths

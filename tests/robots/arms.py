@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from robots import Robot
+from robots.importing import import_robot
+
 INERTIAL = (
     '<inertial><origin xyz="0.1 0 0"/><mass value="1"/>'
     '<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -39,3 +42,8 @@ def two_joint_arm(extra: str = "", j2: str | None = None, l2: str | None = None)
 def full_mass_matrix(model: pin.Model, q: np.ndarray) -> np.ndarray:
     upper = np.triu(pin.crba(model, model.createData(), q))
     return upper + np.triu(upper, 1).T
+
+
+def load(text: str) -> Robot:
+    """`load_urdf_text` without the process of its own."""
+    return import_robot(text.encode(), "the URDF text").used()

@@ -7,12 +7,14 @@ import re
 
 import numpy as np
 import pytest
-from arms import two_joint_arm
+from arms import INERTIAL, link, load, two_joint_arm
 
-from robots import CATALOG, Robot, load_robot, load_urdf_text
-from robots.meshes import find_mesh
-from robots.shapes import MAX_FACES, Shape, link_shapes
+from robots import CATALOG, Robot, load_robot
+from robots.importing import import_robot
+from robots.meshes import find_mesh, installed_mesh, installed_shares
+from robots.shapes import MAX_TOTAL, Shape, link_shapes
 from robots.simplify import simplify
+from robots.surfaces import MAX_FACES, mesh_pieces
 
 
 def check(robot: Robot, shapes: list[Shape]) -> None:
@@ -51,7 +53,8 @@ def test_a_broken_mesh_falls_back_to_capsules(tmp_path) -> None:
         mesh = tmp_path / f"broken{suffix}"
         mesh.write_bytes(b"\x00not a mesh")
         visual = f'<link name="l2"><visual><geometry><mesh filename="{mesh}"/></geometry></visual></link>'
-        robot = load_urdf_text(two_joint_arm(l2=visual))
+        robot = import_robot(two_joint_arm(l2=visual).encode(), "arm.urdf", tmp_path).used()
+        assert str(mesh) in robot.urdf_text
         check(robot, link_shapes(robot))
 
 
@@ -60,7 +63,7 @@ def test_primitives_and_colours() -> None:
         '<link name="l2"><visual><origin xyz="0 0 1"/><geometry><box size="0.1 0.2 0.4"/></geometry>'
         '<material name="m"><color rgba="1 0 0.5 1"/></material></visual></link>'
     )
-    robot = load_urdf_text(two_joint_arm(l2=visual))
+    robot = load(two_joint_arm(l2=visual))
     (box,) = (shape for shape in link_shapes(robot) if shape.name.startswith("l2"))
     assert box.colour == (238, 0, 128)
     np.testing.assert_allclose(np.ptp(box.vertices, axis=0), [0.1, 0.2, 0.4], atol=1e-6)
@@ -87,6 +90,7 @@ def test_meshes_are_light_enough() -> None:
             link = shape.name.split("/")[0]
             counts[link] = counts.get(link, 0) + len(shape.faces)
         assert max(counts.values()) <= 1.2 * MAX_FACES
+        assert sum(counts.values()) < MAX_TOTAL
 
 
 def test_meshes_are_found_beside_the_urdf_and_in_its_packages(tmp_path) -> None:
@@ -98,7 +102,7 @@ def test_meshes_are_found_beside_the_urdf_and_in_its_packages(tmp_path) -> None:
     folder = package / "urdf"
     assert find_mesh("package://my_robot/meshes/a.stl", folder) == mesh
     assert find_mesh("../meshes/a.stl", folder) == mesh
-    assert find_mesh(f"file://{mesh}", None) == mesh
+    assert find_mesh(f"file://{mesh}", folder) == mesh
     for nothing in (
         "",
         "package://other/meshes/a.stl",
@@ -106,3 +110,62 @@ def test_meshes_are_found_beside_the_urdf_and_in_its_packages(tmp_path) -> None:
         "http://x/a.stl",
     ):
         assert find_mesh(nothing, folder) is None
+
+
+def mesh_visual(uri: str) -> str:
+    return link("l2", f'{INERTIAL}<visual><geometry><mesh filename="{uri}"/></geometry></visual>')
+
+
+def a_ball(path) -> None:
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=1).export(path)
+
+
+def test_the_owner_of_the_machine_uses_meshes_beside_a_urdf(tmp_path) -> None:
+    a_ball(tmp_path / "ball.stl")
+    arm = two_joint_arm(l2=mesh_visual("ball.stl")).encode()
+    robot = import_robot(arm, "arm.urdf", tmp_path).used()
+    assert {len(shape.faces) for shape in link_shapes(robot) if shape.name == "l2/0"} == {80}
+
+
+def test_an_uploaded_urdf_sees_no_file_of_the_server(tmp_path, monkeypatch) -> None:
+    """A relative, absolute or file:// mesh counts as missing, whether it exists or not."""
+    package = tmp_path / "my_robot"
+    package.mkdir()
+    a_ball(package / "ball.stl")
+    monkeypatch.chdir(package)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    for there, absent in (
+        ("ball.stl", "none.stl"),
+        (f"{package}/ball.stl", f"{package}/none.stl"),
+        (f"file://{package}/ball.stl", f"file://{package}/none.stl"),
+        ("package://my_robot/ball.stl", "package://my_robot/none.stl"),
+    ):
+        texts = []
+        for uri in (there, absent):
+            robot = load(two_joint_arm(l2=mesh_visual(uri)))
+            assert "mesh" not in robot.urdf_text
+            texts.append(str(robot.report.findings).replace("none.stl", "ball.stl"))
+            check(robot, link_shapes(robot))
+        assert texts[0] == texts[1]
+        assert "not found" in texts[0]
+
+
+def test_a_package_name_does_not_lead_out_of_the_installed_packages() -> None:
+    for share in installed_shares():
+        for uri in ("package://../x", "package://./x", "package://a/../../x", "package:///etc/passwd"):
+            assert installed_mesh(uri) is None, share
+
+
+def test_an_uploaded_urdf_sees_the_meshes_of_installed_packages() -> None:
+    files = [(s, f) for s in installed_shares() for f in s.glob("*_description/meshes/**/*.stl")]
+    if not files:
+        pytest.skip("no mesh package is installed: pip install himpc-lab[meshes]")
+    share, file = files[0]
+    uri = f"package://{file.relative_to(share)}"
+    robot = load(two_joint_arm(l2=mesh_visual(uri)))
+    assert uri in robot.urdf_text
+    assert str(share) not in robot.urdf_text
+    assert mesh_pieces([uri])
+    assert any(shape.name == "l2/0" for shape in link_shapes(robot))

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import INERTIAL, LIMIT, joint, link, robot, two_joint_arm
+from arms import INERTIAL, LIMIT, joint, link, load, robot, two_joint_arm
 
-from robots import InputError, Robot, check_urdf, load_robot, load_urdf_text
+from robots import InputError, Robot, check_urdf, load_robot
+from robots.importing import import_robot
 from robots.meshes import installed_shares
 from robots.report import Kind
-from robots.urdf import check_bytes
 
 
 def texts(loaded: Robot, kind: Kind) -> str:
@@ -26,7 +26,7 @@ def inertial(mass: str, moments: str) -> str:
 
 
 def test_a_clean_urdf_has_nothing_to_report() -> None:
-    loaded = load_urdf_text(two_joint_arm())
+    loaded = load(two_joint_arm())
     assert loaded.report.findings == ()
     assert loaded.report.usable
     np.testing.assert_array_equal(loaded.q_upper, [2, 2])
@@ -37,7 +37,7 @@ def test_a_clean_urdf_has_nothing_to_report() -> None:
 
 def test_continuous_becomes_unbounded_with_one_coordinate() -> None:
     text = two_joint_arm(j2=joint("j2", "l1", "l2", "continuous", '<limit velocity="3" effort="5"/>'))
-    loaded = load_urdf_text(text)
+    loaded = load(text)
     assert loaded.model.nq == loaded.model.nv == 2
     assert loaded.q_upper[1] == np.inf
     assert loaded.q_lower[1] == -np.inf
@@ -45,7 +45,7 @@ def test_continuous_becomes_unbounded_with_one_coordinate() -> None:
 
 
 def test_missing_speed_and_effort_are_filled() -> None:
-    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside='<limit lower="-1" upper="1"/>')))
+    loaded = load(two_joint_arm(j2=joint("j2", "l1", "l2", inside='<limit lower="-1" upper="1"/>')))
     assert loaded.v_limit[1] == pytest.approx(np.pi)
     assert loaded.tau_limit[1] > 3 * 9.81 * 0.1
     assert "velocity limit" in texts(loaded, "filled")
@@ -53,30 +53,28 @@ def test_missing_speed_and_effort_are_filled() -> None:
 
 
 def test_missing_position_limits_mean_unbounded() -> None:
-    loaded = load_urdf_text(
-        two_joint_arm(j2=joint("j2", "l1", "l2", inside='<limit velocity="1" effort="1"/>'))
-    )
+    loaded = load(two_joint_arm(j2=joint("j2", "l1", "l2", inside='<limit velocity="1" effort="1"/>')))
     assert loaded.q_upper[1] == np.inf
     assert "no position limits" in texts(loaded, "filled")
 
 
 def test_limits_an_exporter_left_at_zero_mean_unbounded() -> None:
     inside = '<limit lower="0" upper="0" velocity="0" effort="0"/>'
-    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside)))
+    loaded = load(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside)))
     assert loaded.q_upper[1] == np.inf
     assert "exporters" in texts(loaded, "filled")
 
 
 def test_one_sided_limits() -> None:
     inside = '<limit lower="0.5" upper="1e9" velocity="1" effort="1"/>'
-    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside)))
+    loaded = load(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside)))
     assert (loaded.q_lower[1], loaded.q_upper[1]) == (0.5, np.inf)
     assert loaded.home[1] > 0.5
 
 
 def test_swapped_limits_and_long_axes_are_repaired() -> None:
     inside = '<limit lower="1" upper="-2" velocity="1" effort="1"/>'
-    loaded = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside, axis="0 2 0")))
+    loaded = load(two_joint_arm(j2=joint("j2", "l1", "l2", inside=inside, axis="0 2 0")))
     assert (loaded.q_lower[1], loaded.q_upper[1]) == (-2, 1)
     assert "swapped" in texts(loaded, "repaired")
     assert "normalised" in texts(loaded, "repaired")
@@ -92,7 +90,7 @@ def test_mimic_and_finger_joints_are_fixed() -> None:
         LIMIT + '<mimic joint="left_finger_joint" offset="0.02"/>',
         "0 1 0",
     )
-    loaded = load_urdf_text(two_joint_arm(link("f1") + link("f2") + finger + follower))
+    loaded = load(two_joint_arm(link("f1") + link("f2") + finger + follower))
     assert loaded.joint_names == ("j1", "j2")
     assert "mimics" in texts(loaded, "fixed")
     assert "left_finger_joint" in texts(loaded, "fixed")
@@ -102,14 +100,14 @@ def test_mimic_and_finger_joints_are_fixed() -> None:
 
 def test_the_driver_of_a_mimic_gripper_is_fixed_but_a_parallel_arm_is_not() -> None:
     gripper = joint("drive", "l2", "f1") + joint("other", "l2", "f2", inside=LIMIT + '<mimic joint="drive"/>')
-    assert load_urdf_text(two_joint_arm(link("f1") + link("f2") + gripper)).joint_names == ("j1", "j2")
+    assert load(two_joint_arm(link("f1") + link("f2") + gripper)).joint_names == ("j1", "j2")
     parallel = joint("j3", "l2", "l3", inside=LIMIT + '<mimic joint="j2" multiplier="-1"/>')
-    assert load_urdf_text(two_joint_arm(link("l3") + parallel)).joint_names == ("j1", "j2")
+    assert load(two_joint_arm(link("l3") + parallel)).joint_names == ("j1", "j2")
 
 
 def test_a_joint_without_room_is_fixed_where_it_stands() -> None:
     inside = '<limit lower="0.5" upper="0.5" velocity="1" effort="1"/>'
-    loaded = load_urdf_text(two_joint_arm(link("l3") + joint("j3", "l2", "l3", inside=inside)))
+    loaded = load(two_joint_arm(link("l3") + joint("j3", "l2", "l3", inside=inside)))
     assert loaded.joint_names == ("j1", "j2")
     rotation = loaded.model.frames[loaded.frame_id("l3")].placement.rotation
     assert np.arccos(0.5 * (np.trace(rotation) - 1)) == pytest.approx(0.5)
@@ -127,7 +125,7 @@ def test_a_joint_without_room_is_fixed_where_it_stands() -> None:
     ],
 )
 def test_unphysical_inertias_become_physical(inside: str, kind: Kind, words: str) -> None:
-    loaded = load_urdf_text(two_joint_arm(l2=link("l2", inside)))
+    loaded = load(two_joint_arm(l2=link("l2", inside)))
     assert words in texts(loaded, kind)
     for body in list(loaded.model.inertias)[1:]:
         moments = np.linalg.eigvalsh(body.inertia)
@@ -137,7 +135,7 @@ def test_unphysical_inertias_become_physical(inside: str, kind: Kind, words: str
 
 
 def test_massless_links_fixed_to_heavy_ones_are_fine() -> None:
-    loaded = load_urdf_text(two_joint_arm(link("tool0", "") + joint("t", "l2", "tool0", "fixed", "")))
+    loaded = load(two_joint_arm(link("tool0", "") + joint("t", "l2", "tool0", "fixed", "")))
     assert loaded.report.findings == ()
     assert loaded.tip == "tool0"
 
@@ -184,11 +182,11 @@ REFUSED = {
 def test_what_cannot_be_used_is_refused_in_one_sentence(case: str) -> None:
     text, words = REFUSED[case]
     with pytest.raises(InputError) as caught:
-        load_urdf_text(text)
+        load(text)
     message = str(caught.value)
     assert words in message
     assert "\n" not in message
-    report = check_bytes(text.encode(), "my.urdf")
+    report = import_robot(text.encode(), "my.urdf").report
     assert not report.usable
     assert words in " ".join(finding.text for finding in report.of_kind("refused"))
     json.dumps(report.as_dict())
@@ -198,7 +196,7 @@ def test_no_entity_is_expanded_and_no_file_is_read(tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("12345")
     text = f'<!DOCTYPE r [<!ENTITY x SYSTEM "file://{secret}">]><robot name="a">{link("l", "&x;")}</robot>'
-    report = check_bytes(text.encode(), "evil.urdf")
+    report = import_robot(text.encode(), "evil.urdf").report
     assert not report.usable
     assert "12345" not in str(report.as_dict())
 
@@ -217,14 +215,14 @@ def test_check_urdf_reads_files(tmp_path: Path) -> None:
 
 def test_a_missing_mesh_is_a_note() -> None:
     visual = '<visual><geometry><mesh filename="package://nowhere/a.dae"/></geometry></visual>'
-    loaded = load_urdf_text(two_joint_arm(l2=link("l2", INERTIAL + visual)))
+    loaded = load(two_joint_arm(l2=link("l2", INERTIAL + visual)))
     assert "nowhere" in texts(loaded, "note")
     assert "nowhere" not in loaded.urdf_text
 
 
 def test_canonical_text_is_a_fixed_point() -> None:
-    first = load_urdf_text(two_joint_arm(j2=joint("j2", "l1", "l2", "continuous", "")))
-    second = load_urdf_text(first.urdf_text)
+    first = load(two_joint_arm(j2=joint("j2", "l1", "l2", "continuous", "")))
+    second = load(first.urdf_text)
     assert second.urdf_text == first.urdf_text
     assert not second.report.of_kind("repaired")
     np.testing.assert_array_equal(first.q_upper, second.q_upper)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from arms import LIMIT, joint, link, two_joint_arm
+from arms import LIMIT, joint, link, load, two_joint_arm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots import InputError, Plant, load_urdf_text
-from robots.urdf import check_bytes
+from robots import InputError, Plant
+from robots.importing import import_robot
 from robots.urdf.inertials import nearest_physical
 
 
@@ -60,9 +60,9 @@ def test_no_mutation_of_a_urdf_raises_anything_but_an_input_error(data: st.DataO
         place = data.draw(st.integers(0, len(pieces) - 1))
         pieces[place] = data.draw(st.sampled_from([*WORDS, pieces[place][: len(pieces[place]) // 2], ""]))
     mutated = '"'.join(pieces)
-    report = check_bytes(mutated.encode(), "mutated.urdf")
+    report = import_robot(mutated.encode(), "mutated.urdf").report
     try:
-        loaded = load_urdf_text(mutated)
+        loaded = load(mutated)
     except InputError as error:
         assert "\n" not in str(error)
     else:
@@ -77,4 +77,4 @@ def test_no_mutation_of_a_urdf_raises_anything_but_an_input_error(data: st.DataO
 @settings(max_examples=100, deadline=None)
 @given(st.binary(max_size=300))
 def test_no_bytes_raise_from_the_check(junk: bytes) -> None:
-    assert not check_bytes(junk, "junk").usable
+    assert not import_robot(junk, "junk").report.usable

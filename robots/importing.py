@@ -1,0 +1,108 @@
+"""A URDF document as a robot, with everything nobody described. In the calling process, without limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from robots.errors import InputError, unknown_name
+from robots.home import choose_tip, find_home, sensible_a_max
+from robots.inertia import suggest_M_bar
+from robots.plant import Plant
+from robots.report import Finding, ImportReport
+from robots.robot import Robot
+from robots.urdf import UNBOUNDED, Canonical, canonicalise
+
+_TRIAL = 5  # periods of 1 ms
+
+
+@dataclass(frozen=True)
+class Import:
+    """What became of a description: the report, and the robot unless something was refused."""
+
+    report: ImportReport
+    robot: Robot | None = None
+
+    def used(self) -> Robot:
+        """The robot. Raises InputError with the first reason when the description cannot be used."""
+        if self.robot is not None:
+            return self.robot
+        source, refused = self.report.source, [*self.report.of_kind("refused")]
+        more = f" (and {len(refused) - 1} more; see `himpc-lab robots --check`)" if len(refused) > 1 else ""
+        where = "" if refused[0].where == source else f"{refused[0].where}: "
+        raise InputError(f"{source} cannot be used: {where}{refused[0].text}{more}.")
+
+
+def import_robot(data: bytes, source: str, folder: Path | None = None, tip: str | None = None) -> Import:
+    """The robot of a URDF document, after a first few milliseconds in the plant.
+
+    Args:
+        data: the document.
+        source: how messages name it.
+        folder: where its mesh paths start from; None: it may see the meshes of installed packages only.
+        tip: its default end-effector frame; None takes the end of the longest chain.
+
+    Raises:
+        InputError: the tip is no frame of it. What else is wrong is in the report.
+    """
+    canonical, report = canonicalise(data, source, folder)
+    if canonical is None:
+        return Import(report)
+    robot = _robot(canonical, tip)
+    fault = "its mass matrix is singular; check its inertias" if robot is None else _trial(robot)
+    if robot is None or fault is not None:
+        refused = Finding("refused", source, fault or "")
+        return Import(replace(report, findings=(*report.findings, refused)))
+    return Import(robot.report, robot)
+
+
+def bounds(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Position limits of a canonical model, ±inf where a joint is unbounded."""
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    return np.where(lower <= -UNBOUNDED, -np.inf, lower), np.where(upper >= UNBOUNDED, np.inf, upper)
+
+
+def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
+    """None if the mass matrix is singular."""
+    model = canonical.model
+    lower, upper = bounds(model)
+    frames = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
+    if tip is not None and tip not in frames:
+        raise unknown_name(f"frame of robot '{canonical.name}' called", tip, frames)
+    chosen = choose_tip(model, frames) if tip is None else tip
+    try:
+        M_bar = suggest_M_bar(model, lower, upper)
+    except np.linalg.LinAlgError:
+        return None
+    if not np.all(np.isfinite(M_bar) & (M_bar > 0.0)):
+        return None
+    return Robot(
+        name=canonical.name,
+        model=model,
+        joint_names=tuple(model.names)[1:],
+        tip=chosen,
+        home=find_home(model, frames[chosen], lower, upper),
+        q_lower=lower,
+        q_upper=upper,
+        v_limit=model.velocityLimit,
+        tau_limit=model.effortLimit,
+        a_max=sensible_a_max(model, lower, upper, model.effortLimit),
+        M_bar=M_bar,
+        urdf_text=canonical.text,
+        report=replace(canonical.report, tip=chosen),
+    )
+
+
+def _trial(robot: Robot) -> str | None:
+    """Why the robot cannot be simulated, or None."""
+    try:
+        plant = Plant(robot)
+        for _ in range(_TRIAL):
+            plant.step(plant.holding_torque(), 1e-3)
+    except (ValueError, RuntimeError):
+        return "MuJoCo cannot simulate it; check its inertias and origins"
+    finite = all(np.isfinite(each).all() for each in (plant.q, plant.v, plant.mass_matrix(), robot.a_max))
+    return None if finite and not plant.broken else "its motion is not finite; check its inertias and limits"
