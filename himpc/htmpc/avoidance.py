@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.clearance import Clearances, CollisionModel
+from himpc.htmpc.geometry import Placed
 from himpc.htmpc.prediction import integrator
 from himpc.htmpc.rows import Rows
 
@@ -31,9 +32,9 @@ class Avoidance:
     model: CollisionModel
     margin: float
 
-    def near(self, q: Array, gradients: bool = True) -> Clearances:
-        """Pairs near enough to matter at configurations q (K, n)."""
-        return self.model.clearances(q, self.margin + _LOOK, gradients)
+    def near(self, joints: Placed, gradients: bool = True) -> Clearances:
+        """Pairs near enough to matter at some configurations."""
+        return self.model.between(joints, self.margin + _LOOK, gradients)
 
     def rows(self, near: Clearances, N: int, dt: float) -> Rows:
         """The linearised constraint on the change d of the inputs, one row per pair and knot."""

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration, joint_indices
+from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import Avoidance, clearance
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.cost import Effort
 from himpc.htmpc.evidence import evidence
-from himpc.htmpc.kinematics import Knots, desired_values, task_frames
+from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
 from himpc.htmpc.problem import Problem, Tick
@@ -44,6 +45,7 @@ class HTMPC:
         """Raises InputError if the settings do not fit the robot."""
         self.robot = robot
         self._data = robot.model.createData()
+        self._method = ActiveSet()
         self.configure(settings)
         self.reset()
 
@@ -75,7 +77,7 @@ class HTMPC:
         self._bounds = limits
         self._effort = Effort(weights, settings.horizon, settings.dt)
         self._avoidance = None if collision.empty else Avoidance(collision, settings.margin_m)
-        self._tasks, self._frames = tasks, task_frames(tasks)
+        self._tasks = tasks
         self._settings = settings
 
     def _chosen(self, enabled: Stack) -> Stack:
@@ -150,13 +152,13 @@ class HTMPC:
             data=self._data,
             settings=settings,
             start=start,
-            frames=self._frames,
             desired={task.name: desired_values(task, previews[task.name], N) for task in self._tasks},
             effort=self._effort,
             rows=rows,
             bounds=limits,
             plan=plan,
             avoidance=self._avoidance,
+            method=self._method,
         )
 
     def _solve(self, tick: Tick) -> list[Solved]:
@@ -178,12 +180,12 @@ class HTMPC:
     ) -> VelocityPlan:
         settings, start, U = self._settings, tick.start, motion.U
         q = np.vstack([start.q, positions(start, U, settings.dt)])
-        now = Knots(self.robot, self._data, q[:1], self._frames)
+        now = Knots(self.robot, self._data, q[:1])
         values = {task.name: now.value(task) for task in self._tasks}
         errors = {
             task.name: task.error(values[task.name], tick.desired[task.name][0]) for task in self._tasks
         }
-        here = None if self._avoidance is None else self._avoidance.near(q[:1], gradients=False)
+        here = None if self._avoidance is None else self._avoidance.near(now.joints, gradients=False)
         return VelocityPlan(
             command=motion.velocity(settings.period),
             motion=motion,

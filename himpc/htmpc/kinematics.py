@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Literal
 
@@ -10,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
+from himpc.htmpc.geometry import Frames, Placed, frame_at, geometry, placed
 from himpc.references import Preview
 from himpc.rotation import exp3
 from himpc.tasks import FramePosition, Task
@@ -54,16 +56,20 @@ def base_joints(robot: Robot) -> tuple[int, ...]:
 class Knots:
     """Frames and Jacobians at all knots of a prediction, knot 1 first."""
 
-    def __init__(self, robot: Robot, data: pin.Data, q: Array, frames: tuple[str, ...]) -> None:
-        """q: (K, n) configurations. frames: names of the frames that tasks will ask for."""
-        self._robot, self._data, self._q, self._frames = robot, data, q, frames
-        self._path = Path(robot, data, q)
+    def __init__(self, robot: Robot, data: pin.Data, q: Array) -> None:
+        """q: (K, n) configurations; data is for tasks that ask for more than frames."""
+        self._robot, self._data, self._q = robot, data, q
+        self._frames: dict[str, Frames] = {}
+
+    @cached_property
+    def joints(self) -> Placed:
+        """Where all joints are."""
+        return placed(geometry(self._robot), self._q)
 
     def errors(self, task: Task, desired: list[Array]) -> Array:
         """e = x − r of (6) at every knot, (K, m)."""
         if isinstance(task, FramePosition):
-            at = np.array([placed.translation for placed in self._placements[task.frame]])
-            return at[:, task.components] - np.array(desired)
+            return self._frame(task.frame).p[:, task.components] - np.array(desired)
         pairs = zip(self._knots, desired, strict=True)
         return np.array([task.error(task.value(knot), goal) for knot, goal in pairs])
 
@@ -75,45 +81,44 @@ class Knots:
         """J of a task at every knot, (K, m, n)."""
         return task.jacobian(self._path)
 
+    def _frame(self, name: str) -> Frames:
+        if name not in self._frames:
+            self._frames[name] = frame_at(self._robot, self.joints, name)
+        return self._frames[name]
+
     @cached_property
-    def _placements(self) -> dict[str, list[pin.SE3]]:
-        model, data = self._robot.model, self._data
-        frames = [(name, self._robot.frame_id(name or self._robot.tip)) for name in self._frames]
-        found: dict[str, list[pin.SE3]] = {name: [] for name in self._frames}
-        for q in self._q:
-            pin.forwardKinematics(model, data, q)
-            for name, index in frames:
-                found[name].append(pin.updateFramePlacement(model, data, index).copy())
-        return found
+    def _path(self) -> Path:
+        return Path(self._robot, self._data, self._q, self._frame)
 
     @cached_property
     def _knots(self) -> list[Knot]:
-        names, placements = self._placements.keys(), zip(*self._placements.values(), strict=True)
-        each = placements if names else ((),) * len(self._q)
-        pairs = zip(self._q, each, strict=True)
-        return [
-            Knot(self._robot, self._data, q, dict(zip(names, placed, strict=True))) for q, placed in pairs
-        ]
+        every = enumerate(self._q)
+        return [Knot(self._robot, self._data, q, self._frame, k) for k, q in every]
 
 
 class Path(Configuration):
     """All knots as one configuration; only Jacobians are asked of it."""
 
-    def __init__(self, robot: Robot, data: pin.Data, q: Array) -> None:
+    def __init__(self, robot: Robot, data: pin.Data, q: Array, frame: Callable[[str], Frames]) -> None:
         super().__init__(robot, data, q[0], q[0], q[1:])
+        self._frame = frame
+
+    def frame_jacobians(self, frame: str = "") -> Array:
+        return self._frame(frame).J
 
 
 class Knot(Configuration):
     """One knot; only positions are asked of it."""
 
-    def __init__(self, robot: Robot, data: pin.Data, q: Array, placements: dict[str, pin.SE3]) -> None:
+    def __init__(
+        self, robot: Robot, data: pin.Data, q: Array, frame: Callable[[str], Frames], place: int
+    ) -> None:
         super().__init__(robot, data, q, q)
-        self._placements = placements
+        self._frame, self._place = frame, place
 
-
-def task_frames(tasks: tuple[Task, ...]) -> tuple[str, ...]:
-    """Names of the frames that the tasks look at, each once."""
-    return tuple(dict.fromkeys(task.frame for task in tasks if isinstance(task, FrameTask)))
+    def placement(self, frame: str = "") -> pin.SE3:
+        found = self._frame(frame)
+        return pin.SE3(found.R[self._place], found.p[self._place])
 
 
 def desired_values(task: Task, preview: Preview, N: int) -> list[Array]:

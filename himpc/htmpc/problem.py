@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import PENALTY, Avoidance
 from himpc.htmpc.clearance import Clearances
 from himpc.htmpc.cost import Effort, barrier, barrier_value
@@ -36,26 +37,26 @@ class Tick:
         robot, data: for kinematics.
         settings: in use.
         start: where the prediction begins.
-        frames: names of the frames that tasks look at.
         desired: r per task name at knots 0 … N.
         effort: J_eff.
         rows: (7d) on the inputs.
         bounds: in force.
         plan: the shifted previous plan, (N, n).
         avoidance: (7c), None if there is nothing to avoid.
+        method: solves the QPs; it remembers the last one of a level.
     """
 
     robot: Robot
     data: pin.Data
     settings: HTMPCSettings
     start: Start
-    frames: tuple[str, ...]
     desired: dict[str, list[Array]]
     effort: Effort
     rows: Rows
     bounds: Bounds
     plan: Array
     avoidance: Avoidance | None
+    method: ActiveSet = field(default_factory=ActiveSet)
 
     @cached_property
     def brake(self) -> Array:
@@ -75,7 +76,7 @@ class Iterate:
         self.tick = tick
         self.U = U
         self.q = positions(tick.start, U, tick.settings.dt)
-        self.knots = Knots(tick.robot, tick.data, self.q, tick.frames)
+        self.knots = Knots(tick.robot, tick.data, self.q)
         self._errors: dict[str, Array] = {}
         self._jacobians: dict[str, Array] = {}
 
@@ -95,7 +96,7 @@ class Iterate:
     def near(self) -> Clearances | None:
         """Distances with gradients; None if there is nothing to avoid."""
         avoidance = self.tick.avoidance
-        return avoidance.near(self.q) if avoidance is not None else None
+        return avoidance.near(self.knots.joints) if avoidance is not None else None
 
     @cached_property
     def distances(self) -> Clearances | None:
@@ -103,7 +104,7 @@ class Iterate:
         avoidance = self.tick.avoidance
         if avoidance is None or "near" in self.__dict__:
             return self.near
-        return avoidance.near(self.q, gradients=False)
+        return avoidance.near(self.knots.joints, gradients=False)
 
     @cached_property
     def depths(self) -> Array:
@@ -184,6 +185,14 @@ class Problem:
                 rows = self._avoidance_rows(at)
                 parts.append(rows.widened(np.zeros(at.U.size)))
         return joined(*parts) if parts else self.tick.rows.take(np.zeros(len(self.tick.rows.A), bool))
+
+    @property
+    def unchanging(self) -> int:
+        """How many of the first `rows` are the same, but for their bounds, when a step is led back."""
+        guarded = 0
+        if self.tick.settings.lexicographic == "per_coordinate":
+            guarded = sum(guard.best.size for guard in self.guards)
+        return guarded + (0 if self.softened else len(self.tick.rows.A))
 
     def slack_rows(self, at: Iterate) -> Rows | None:
         """(7c) for the first level, whose violation it buys; None if nothing is near."""

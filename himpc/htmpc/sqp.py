@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.avoidance import PENALTY
 from himpc.htmpc.problem import Iterate, Problem
 from himpc.htmpc.rows import KINDS, Rows, joined
@@ -62,6 +63,8 @@ class _Direction(NamedTuple):
     rung: str
     H: Array
     g: Array
+    own: bool
+    """Whether the compiled method holds H."""
 
 
 def solve_level(problem: Problem, at: Iterate) -> Solved:
@@ -104,29 +107,44 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     tick = problem.tick
     H, g = problem.model(at)
     rows, slack = problem.rows(at), problem.slack_rows(at)
-    solution = _solve(problem, H, g, rows, slack)
+    own = tick.settings.solver == "daqp" and tick.method.begin(H)
+    solution = _solve(problem, H, g, rows, slack, own)
     rung = "solve"
     if not solution.solved:
         # Below the first level d = 0, on it full braking: these satisfy everything that is left.
         safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
         rung = "widened"
-        solution = _solve(problem, H, g, rows.widened(safe), slack)
+        solution = _solve(problem, H, g, rows.widened(safe), slack, own)
     every = rows if slack is None else joined(rows, slack)
     if not solution.solved:
-        return _Direction(np.zeros_like(at.U), 0.0, solution, every, "keep", H, g)
+        return _Direction(np.zeros_like(at.U), 0.0, solution, every, "keep", H, g, own)
     size = at.U.size
     slope = float(g @ solution.x[:size])
     if slack is not None:
         slope += PENALTY * (float(solution.x[size:].sum()) - float(at.depths.sum()))
-    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, every, rung, H, g)
+    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, every, rung, H, g, own)
 
 
-def _solve(problem: Problem, H: Array, g: Array, rows: Rows, slack: Rows | None) -> QPSolution:
-    """min ½dᵀHd + gᵀd under the rows; with slack rows, plus the price of one slack per knot."""
+def _solve(problem: Problem, H: Array, g: Array, rows: Rows, slack: Rows | None, own: bool) -> QPSolution:
+    """min ½dᵀHd + gᵀd under the rows; with slack rows, plus the price of one slack per knot.
+
+    Args:
+        problem, H, g, rows, slack: of the level.
+        own: whether the compiled method holds H; else, and where it finds no verified point, the QP solver.
+    """
     solver = problem.tick.settings.solver
     if slack is None:
+        if own:
+            solution = problem.tick.method.solve(g, rows, problem.unchanging)
+            if solution.solved or solution.status == CONTRADICTION:
+                return solution
         first = rows.kind == _LEXICOGRAPHIC
         return solve_by_working_set(H, g, rows.A, rows.lower, rows.upper, first, solver)
+    if own:
+        # No slack is bought where the rows can be met and cost less than its price.
+        solution = problem.tick.method.solve(g, joined(rows, slack), 0)
+        if solution.solved and _price(solution, slack) <= PENALTY:
+            return solution
     k, N = len(g), problem.tick.settings.horizon
     bought = np.zeros((len(slack.A), N))
     bought[np.arange(len(slack.A)), slack.knot - 1] = 1.0
@@ -143,6 +161,12 @@ def _solve(problem: Problem, H: Array, g: Array, rows: Rows, slack: Rows | None)
     price = np.concatenate([g, np.full(N, PENALTY)])
     first = np.arange(len(A)) >= len(A) - N
     return solve_by_working_set(extended, price, A, lower, upper, first, solver)
+
+
+def _price(solution: QPSolution, slack: Rows) -> float:
+    """What one metre would be worth at the dearest knot."""
+    paid = np.bincount(slack.knot, np.abs(solution.multipliers[-len(slack.A) :]))
+    return float(paid.max())
 
 
 def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[float, Iterate]:
@@ -171,5 +195,5 @@ def _led_back(problem: Problem, at: Iterate, found: _Direction, trial: Iterate) 
     The levels' errors are curved: a step along their linear rows leaves (13) by the square of its length, and
     without this second-order correction only short steps are accepted.
     """
-    solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), None)
+    solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), None, found.own)
     return problem.tick.iterate(trial.U + solution.x.reshape(trial.U.shape)) if solution.solved else trial

@@ -13,7 +13,7 @@ from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
 from himpc.htmpc.avoidance import Avoidance
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
-from himpc.htmpc.kinematics import Knots, desired_values, task_frames
+from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
 from himpc.htmpc.problem import Problem, Tick
 from himpc.htmpc.rows import KINDS, Rows, limit_rows
@@ -54,7 +54,6 @@ def tick_of(robot: Robot, **changes: object) -> Tick:
         data=robot.model.createData(),
         settings=settings,
         start=start,
-        frames=task_frames(tasks),
         desired={task.name: desired_values(task, goals[task.name], settings.horizon) for task in tasks},
         effort=Effort(efforts(robot, settings), settings.horizon, settings.dt),
         rows=limit_rows(start, settings.horizon, settings.dt, settings.period, limits),
@@ -243,7 +242,7 @@ def test_previews_of_positions_and_rotations_become_goals() -> None:
     np.testing.assert_allclose(log3(goals[1] @ R.T), [0.2, 0.0, 0.1], atol=1e-12)
     with pytest.raises(ValueError, match=r"'p' has 2 knots, not 6"):
         desired_values(position, Preview(np.ones(3), displacement, displacement, displacement), 5)
-    knots = Knots(arm, arm.model.createData(), arm.home[None], task_frames((orientation,)))
+    knots = Knots(arm, arm.model.createData(), arm.home[None])
     assert knots.errors(orientation, [R]).shape == (1, 2)
 
 
