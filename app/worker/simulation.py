@@ -3,7 +3,7 @@ tests drive it by hand."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,17 @@ from lessons.replay.state import settings_now
 from robots import InputError
 
 
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A scene at its beginning, once nothing of it can be refused any more. mine: a learner's changes."""
+
+    choice: SceneChoice
+    scene: AnyScene
+    run: Run
+    lecturer: Lecturer | None
+    mine: tuple[Post, ...]
+
+
 class Body:
     """A session, whether it plays and how fast, and the memory its telemetry goes to."""
 
@@ -51,20 +62,21 @@ class Body:
         self.resets = 0
         self._sent: AnySettings | None = None
         self.leader = Leader()
-        self._enter(choice)
-        self._make_mine(choice)
+        self._enter(self._loaded(choice, self._load_scene(choice)))
 
-    def _enter(self, choice: SceneChoice) -> None:
-        scene = self._load_scene(choice)
-        self._take(choice, scene, start(scene, choice.seed))
-        robot = self.session.robot
-        self._poses = LinkPoses(robot)
-        fields = self.session.layout.fields
+    def _loaded(self, choice: SceneChoice, scene: AnyScene) -> Loaded:
+        run = start(scene, choice.seed)
+        mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
+        return Loaded(choice, scene, run, self._lecturer(choice, run), mine)
+
+    def _enter(self, loaded: Loaded) -> None:
+        session = loaded.run.session
+        poses, block = LinkPoses(session.robot), Block.for_robot(session.robot, session.layout.size)
+        self._poses, self.block = poses, block
+        fields = session.layout.fields
         self._step_us = fields["step_us"].start
         self._late = fields["late"].start if "late" in fields else None
-        self.block = Block.for_robot(robot, self.session.layout.size)
-        self._fresh_start()
-        self.write_poses()
+        self._begin_anew(loaded)
 
     def _load_scene(self, choice: SceneChoice) -> AnyScene:
         return choice.scene()
@@ -72,11 +84,16 @@ class Body:
     def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
         return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.seed)
 
-    def _take(self, choice: SceneChoice, scene: AnyScene, run: Run) -> None:
-        """A run at its beginning. A lesson's robot stands still until its script begins."""
-        self.choice, self.scene, self.run = choice, scene, run
-        self.lecturer = self._lecturer(choice, run)
+    def _begin_anew(self, loaded: Loaded) -> None:
+        """A lesson's robot stands still until its script begins."""
+        self.choice, self.scene, self.run = loaded.choice, loaded.scene, loaded.run
+        self.lecturer = loaded.lecturer
         self.running, self.speed = self.lecturer is None, 1.0
+        self._fresh_start()
+        self.write_poses()
+        for post in loaded.mine:
+            self.handle(post)
+        self.session.drain()
 
     def _fresh_start(self) -> None:
         self.ticks = self.over_budget = self.late = self._steps = 0
@@ -126,7 +143,7 @@ class Body:
             case Speed(factor):
                 self.speed = factor
             case ResetAll():
-                self._restart(self.choice, self.scene, start(self.scene, self.choice.seed))
+                self._begin_anew(self._loaded(replace(self.choice, mine=()), self.scene))
             case Load(choice):
                 return self._load(choice)
             case Tell():
@@ -151,11 +168,6 @@ class Body:
         self.write_poses()
         self.leader.begin(self.choice, self.session)
 
-    def _restart(self, choice: SceneChoice, scene: AnyScene, run: Run) -> None:
-        self._take(choice, scene, run)
-        self._fresh_start()
-        self.write_poses()
-
     def _begin(self, own: bool, fast: bool) -> None:
         """The run of an exercise from its start."""
         if self.lecturer is None:
@@ -166,35 +178,24 @@ class Body:
         self.running = self.lecturer.begin(self.session, fast)
         self.write_poses()
 
-    def _turn_to(self, choice: SceneChoice) -> bool:
+    def _looks_the_same(self, loaded: Loaded) -> bool:
         """Another step of the same lesson: as long as it looks the same, nothing needs to be built anew."""
-        then, now = self.choice.exercise, choice.exercise
+        then, now = self.choice.exercise, loaded.choice.exercise
         if then is None or now is None or then.lesson != now.lesson:
             return False
-        scene = choice.scene()
-        run = start(scene, choice.seed)
-        if run.session.layout != self.session.layout:
-            return False
-        self._restart(choice, scene, run)
-        return True
+        return loaded.run.session.layout == self.session.layout
 
     def _load(self, choice: SceneChoice) -> Report | None:
-        before = self.block
         try:
-            if not self._turn_to(choice):
-                self._enter(choice)
-            self._make_mine(choice)
+            loaded, before = self._loaded(choice, self._load_scene(choice)), self.block
+            if self._looks_the_same(loaded):
+                self._begin_anew(loaded)
+                return None
+            self._enter(loaded)
         except InputError as error:
             return Refused(str(error))
-        if self.block is before:
-            return None
         before.close()
         return self.ready()
-
-    def _make_mine(self, choice: SceneChoice) -> None:
-        for each in choice.mine:
-            self.handle(Post(Set(*parse_assignment(each))))
-        self.session.drain()
 
     # ---------------------------------------------------------------- simulation
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Curve, Exercise, Lecture
-from app.link.messages import Command, Load, Play, Post, Predict, Ready, ResetAll, RunStep
+from app.link.messages import Command, Load, Play, Post, Predict, Ready, Refused, ResetAll, RunStep
 from app.worker.lesson.rows import BUCKETS, Record, thinned
 from app.worker.simulation import Body
 from himpc.telemetry import Layout
@@ -129,13 +130,39 @@ def test_a_run_of_ones_own_is_called_that_and_leaves_the_prediction_alone(learn:
 
 
 def test_a_robot_that_is_lost_ends_the_run_as_headless(learn: Start) -> None:
-    learner = learn("stretched-out", 0)
-    step = load_lesson("stretched-out").steps[0]
+    learner, lesson = learn("when-tasks-fight", 0), load_lesson("when-tasks-fight")
+    step = lesson.steps[0]
     lecture = learner.runs(Predict(0), RunStep(fast=True))
-    values = measured((load_lesson("stretched-out").run_of(step), (step.claims[0].measure,))).values
-    assert lecture.values == tuple(values.values())
-    if lecture.lost_at is not None:
-        assert not learner.body.running and lecture.t < step.duration
+    measures = tuple(claim.measure for claim in step.claims)
+    values = measured((lesson.run_of(step), measures)).values
+    assert lecture.values == tuple(values[each] for each in measures)
+    assert lecture.lost_at is not None and 1.0 < lecture.lost_at < step.duration
+    assert lecture.phase == "done" and lecture.t < step.duration
+    assert not learner.body.running  # what is out of control only gets worse
+
+
+def test_what_is_refused_leaves_everything_as_it_was(learn: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever refuses, and however late: scene, run, lecturer and what is shown go on."""
+    learner = learn("deadlines", 1)
+    body = learner.body
+    learner.does(Predict(2.0))
+    before = (body.choice, body.scene, body.run, body.lecturer, body.block, body.running, body.speed)
+    for name, place in (("deadlines", 2), ("one-task", 0)):
+        choice = SceneChoice.of_lesson(Exercise(name, place))
+        with monkeypatch.context() as patch:
+            patch.setattr("app.worker.simulation.Lecturer", refuse)
+            answer = body.handle(Load(choice))
+        assert isinstance(answer, Refused) and answer.sentence == "no lecturer here"
+        mine = body.handle(Load(replace(choice, mine=("horizon",))))
+        assert isinstance(mine, Refused) and "horizon" in mine.sentence
+        after = (body.choice, body.scene, body.run, body.lecturer, body.block, body.running, body.speed)
+        assert all(a is b for a, b in zip(after, before, strict=True))
+    assert learner.look().answer == 2.0
+    assert learner.runs(RunStep(fast=True)).phase == "done"
+
+
+def refuse(*_: object) -> None:
+    raise InputError("no lecturer here")
 
 
 def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -> None:
