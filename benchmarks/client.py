@@ -1,6 +1,6 @@
 """A client that speaks the page's protocol and draws nothing: it receives and decodes every message.
 
-    python benchmarks/client.py URL
+    python -m benchmarks.client URL
 
 Answers what the page waits for (camera, empty local storage). Prints a line of JSON every second: messages,
 megabytes, and how often the busiest plot and the busiest node of the scene were renewed.
@@ -15,21 +15,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-import msgspec
-import zstandard
-from viser import __version__, _messages
+from viser import __version__
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
-_HEAD = 16  # bytes: sizes of the message part, raw and compressed
-
-
-def messages_of(raw: bytes) -> list[dict[str, Any]]:
-    """What one packet says; arrays stay behind as placeholders."""
-    size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
-    inner = zstandard.ZstdDecompressor().decompress(raw[_HEAD : _HEAD + packed], max_output_size=size)
-    return msgspec.msgpack.decode(inner)["messages"]
+from browsing.wire import camera, messages_of, nothing_kept, pack
 
 
 @dataclass
@@ -55,7 +46,7 @@ def watch(url: str) -> None:
     """Stays connected until it is ended, and prints a line of JSON every second."""
     protocol: Any = [f"viser-v{__version__}"]
     with connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None) as socket:
-        _say(socket, _camera())
+        socket.send(pack(camera()))
         began, second = time.monotonic(), Second()
         while True:
             try:
@@ -82,27 +73,9 @@ def _take(socket: Connection, message: dict[str, Any], second: Second) -> None:
         case "SceneNodeUpdateMessage" | "SetPositionMessage" | "SetOrientationMessage":
             second.links[f"{message['type']} {message.get('name')}"] += 1
         case "LocalStorageGetItemRequestMessage":
-            _say(socket, _messages.LocalStorageGetItemResponseMessage(None, None, message["request_uuid"]))
+            socket.send(pack(nothing_kept(message["request_uuid"])))
         case _:
             pass
-
-
-def _say(socket: Connection, message: _messages.Message) -> None:
-    socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
-
-
-def _camera() -> _messages.ViewerCameraMessage:
-    return _messages.ViewerCameraMessage(
-        wxyz=(1.0, 0.0, 0.0, 0.0),
-        position=(2.0, -2.0, 1.5),
-        fov=0.9,
-        near=0.01,
-        far=100.0,
-        image_height=900,
-        image_width=1440,
-        look_at=(0.0, 0.0, 0.5),
-        up_direction=(0.0, 0.0, 1.0),
-    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Two robots on one page: does the simulation hold real time, and how often are the plots renewed?
 
-    python benchmarks/ghost.py [--scene S] [--set PATH=VALUE]… [--seconds S] [--alone]
+    python -m benchmarks.ghost [--scene S] [--set PATH=VALUE]… [--seconds S] [--alone]
 
 Starts the real server and, in a process of its own, a client that speaks the page's protocol and draws
 nothing (benchmarks/client.py); starts a ghost, waits until everything runs, and measures. Prints JSON; exit 0
@@ -15,7 +15,6 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import psutil
@@ -55,7 +54,7 @@ def main() -> int:
 def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[str, float]:
     """Simulated over real time while a client watches, what it got, and how busy each process was."""
     client = subprocess.Popen(
-        [sys.executable, str(Path(__file__).with_name("client.py")), server.url],
+        [sys.executable, "-m", "benchmarks.client", server.url],
         stdout=subprocess.PIPE,
         text=True,
     )

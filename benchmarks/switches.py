@@ -1,6 +1,6 @@
 """Does the server's memory stay where it is over many changes of scene, with and without a ghost?
 
-    python benchmarks/switches.py [--switches K] [--warm-up K]
+    python -m benchmarks.switches [--switches K] [--warm-up K]
 
 Starts the real server with a client that draws nothing (benchmarks/client.py) and changes the scene again and
 again; every fourth scene gets a ghost, which the next change takes along. Prints JSON: the server's memory
@@ -16,7 +16,6 @@ import json
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import psutil
 
@@ -41,7 +40,7 @@ def main() -> int:
     options = parser.parse_args()
     server = PageServer(SceneChoice(SCENES[-1]), port=0, max_sessions=1)
     client = subprocess.Popen(
-        [sys.executable, str(Path(__file__).with_name("client.py")), server.url], stdout=subprocess.DEVNULL
+        [sys.executable, "-m", "benchmarks.client", server.url], stdout=subprocess.DEVNULL
     )
     try:
         assert wait_until(lambda: bool(server.sessions.learners), LONG), "the client was not let in"

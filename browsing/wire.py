@@ -23,6 +23,16 @@ def messages_of(raw: bytes) -> list[dict[str, Any]]:
     return msgspec.msgpack.decode(inner)["messages"]
 
 
+def pack(message: _messages.Message) -> bytes:
+    """As the server reads it."""
+    return msgspec.msgpack.encode(message.as_serializable_dict())
+
+
+def nothing_kept(request: str) -> _messages.LocalStorageGetItemResponseMessage:
+    """A new browser's answer to what it keeps."""
+    return _messages.LocalStorageGetItemResponseMessage(None, None, request)
+
+
 class Wire:
     """A connection that answers what a page is asked (camera, empty local storage).
 
@@ -38,7 +48,7 @@ class Wire:
         self.commands: dict[str, dict[str, Any]] = {}
         self.notices: list[tuple[str, str]] = []
         self._socket = connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None)
-        self.say(_camera())
+        self.say(camera())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -51,7 +61,7 @@ class Wire:
 
     def say(self, message: _messages.Message) -> None:
         """What a browser would send."""
-        self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
+        self._socket.send(pack(message))
 
     def write(self, uuid: str, **updates: Any) -> None:
         """Writes attributes of a control, as its input does with `value`."""
@@ -81,8 +91,7 @@ class Wire:
         kind: str = message["type"]
         match kind:
             case "LocalStorageGetItemRequestMessage":
-                answer = _messages.LocalStorageGetItemResponseMessage
-                self.say(answer(None, None, message["request_uuid"]))
+                self.say(nothing_kept(message["request_uuid"]))
             case "RegisterCommandMessage":
                 self.commands[message["uuid"]] = message["props"]
             case "RemoveCommandMessage":
@@ -115,7 +124,8 @@ def eventually(condition: Callable[[], bool], timeout: float = 40.0) -> bool:
     return True
 
 
-def _camera() -> _messages.ViewerCameraMessage:
+def camera() -> _messages.ViewerCameraMessage:
+    """The first word of every page: with it the server takes it for one."""
     return _messages.ViewerCameraMessage(
         wxyz=(1.0, 0.0, 0.0, 0.0),
         position=(2.0, -2.0, 1.5),

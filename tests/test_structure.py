@@ -73,14 +73,15 @@ def test_imports_go_one_way(package: str) -> None:
 
 APP = {
     "commands": ("server", "html", "link"),
-    "server": ("page", "panels", "client", "html", "link", "worker"),
-    "page": ("panels", "view", "client", "html", "link"),
-    "panels": ("view", "client", "html", "link"),
-    "view": ("client", "html", "link"),
+    "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
+    "page": ("panels", "view", "client", "html", "link", "adapter"),
+    "panels": ("view", "client", "html", "link", "adapter"),
+    "view": ("client", "html", "link", "adapter"),
     "client": ("html", "link"),
     "worker": ("link",),
     "link": (),
     "html": (),
+    "adapter": (),
 }
 """What each folder of app/ may import beside itself: two houses that meet in `link`. Only the server
 knows both: it hands the simulation's entry point in."""
@@ -107,10 +108,45 @@ def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
     assert not wrong
 
 
-@pytest.mark.parametrize("folder", ["worker", "link", "client", "html"])
+NO_PICTURE = ("worker", "link", "client", "html")
+
+
+@pytest.mark.parametrize("folder", NO_PICTURE)
 def test_what_needs_no_picture_knows_no_viser(folder: str) -> None:
     """A simulation loads nothing of the page's, and what the page was told is plain data."""
     assert not {name for path in sources(f"app/{folder}") for name in imports(path) if within(name, "viser")}
+
+
+PRIVATE = "app/adapter/private.py"
+
+
+def test_one_file_touches_private_names_of_viser() -> None:
+    """What begins with one underscore belongs to the class it is used in, or stands in the one file that
+    tests it before anything is served."""
+    files = sources(*(f"app/{folder}" for folder in APP if folder not in NO_PICTURE))
+    touching: dict[str, set[str]] = {}
+    ours: set[str] = set()
+    for path in files:
+        name = str(path.relative_to(ROOT))
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Attribute) and is_private(node.attr):
+                of = node.value
+                inside = isinstance(of, ast.Name) and of.id in ("self", "cls")
+                if inside or (isinstance(of, ast.Call) and getattr(of.func, "id", "") == "super"):
+                    ours.add(node.attr)
+                else:
+                    touching.setdefault(node.attr, set()).add(name)
+            elif isinstance(node, ast.FunctionDef) and is_private(node.name):
+                ours.add(node.name)
+        if any(within(module, "viser") and "._" in module for module in imports(path)):
+            touching.setdefault("import", set()).add(name)
+    assert "_websock_server" in touching, "the test sees nothing any more"
+    foreign = {attribute: names for attribute, names in touching.items() if attribute not in ours}
+    assert {name for names in foreign.values() for name in names} == {PRIVATE}
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__")
 
 
 @pytest.mark.parametrize("library", DOORS)

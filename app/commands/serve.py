@@ -16,6 +16,8 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     no_browser: bool = False,
+    trusted_origin: tuple[str, ...] = (),
+    no_token: bool = False,
 ) -> int:
     """Open the page: a robot under HIMPC whose target you can drag.
 
@@ -27,9 +29,13 @@ def serve(
         state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
         max_sessions: how many people may use it at once, each with a robot of their own.
         classroom: one robot for all pages; who has the printed token steers it.
-        host: address to listen on; only this machine can reach the default.
+        host: address to listen on; only this machine can reach the default. Beyond it the page asks for
+            the token of the address that is printed.
         port: port to listen on.
         no_browser: do not open a browser.
+        trusted_origin: where a reverse proxy shows the page, e.g. https://lab.example.org; docs/serving.md
+            has one with TLS.
+        no_token: let everybody in who reaches the page.
     """
     from app.link.choice import SceneChoice
     from app.link.exercise import Exercise
@@ -55,4 +61,6 @@ def serve(
         max_sessions=max_sessions,
         classroom=classroom,
         open_browser=not no_browser,
+        trusted_origins=trusted_origin,
+        ask_token=not no_token,
     )

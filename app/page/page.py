@@ -36,11 +36,14 @@ class Page:
         by_path: bool,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
+        on_dark: Callable[[bool], None],
+        greet: Callable[[viser.GuiApi], None],
     ) -> None:
-        """by_path: whether this page may name files of the machine; loop: viser's event loop."""
+        """by_path: whether this page may name files of the machine; loop: viser's event loop; on_dark: hears
+        which theme is shown; greet: writes at the panel's top whenever it is built."""
         self.learner = learner
-        self.on_dark: Callable[[bool], None] = lambda _: None
-        self.greet: Callable[[viser.GuiApi], None] = lambda _: None  # whenever the panel is built
+        self._on_dark = on_dark
+        self._greet = greet
         self._client = client
         self._dark = dark
         self._by_path = by_path
@@ -79,7 +82,7 @@ class Page:
     def _theme(self, dark: bool) -> None:
         self._dark = dark
         self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
-        self.on_dark(dark)
+        self._on_dark(dark)
 
     # ---------------------------------------------------------------- loop
 
@@ -147,7 +150,7 @@ class Page:
         with self._client.atomic():
             self._client.scene.reset()
             self._client.gui.reset()
-            self.greet(self._client.gui)
+            self._greet(self._client.gui)
             self._stage = Stage(
                 self._client,
                 self.learner,

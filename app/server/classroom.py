@@ -4,57 +4,138 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import TypeVar, cast
 
+from app.client.decimated import History
+from app.client.ghost import Ghost
 from app.client.learner import Learner
+from app.client.poses import Tape
+from app.client.rows import Record
+from app.client.score import Score
+from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
-from app.link.messages import Command
+from app.link.exercise import Lecture
+from app.link.messages import Command, Ready, Status, Told
+from app.link.ring import Block
 from app.link.spares import Spares
-from app.server.sessions import WORKER
+from app.server.sessions import WORKER, Refuse
+from lessons.kinds import AnySettings
 from lessons.teaching import lesson
 
 STEERING = "The instructor steers: this page only watches."
+T = TypeVar("T")
 
 
 class Watcher:
-    """A learner as a page sees it that only watches: everything can be looked at, nothing changes it."""
+    """A learner as a page sees it that only watches: everything can be looked at, nothing changes it. It has
+    all that pages use of a `Learner`, and nothing of it can be set."""
 
-    def __init__(self, shown: Learner) -> None:
-        self.token = ""
-        self.on_refusal: Callable[[str], object] = lambda _: None
+    token = ""
+    attached = True
+
+    def __init__(self, shown: Learner, refuse: Refuse) -> None:
+        """refuse: says on the page why nothing happens."""
         self._shown = shown
+        self._refuse = refuse
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._shown, name)
+    @property
+    def ready(self) -> Ready | None:
+        return self._shown.ready
 
-    def send(self, command: Command) -> None:
-        self.on_refusal(STEERING)
+    @property
+    def status(self) -> Status | None:
+        return self._shown.status
 
-    def start_ghost(self, ghost: lesson.Ghost) -> None:
-        self.on_refusal(STEERING)
+    @property
+    def settings(self) -> AnySettings | None:
+        return self._shown.settings
 
-    def stop_ghost(self) -> None:
-        self.on_refusal(STEERING)
+    @property
+    def failure(self) -> str | None:
+        return self._shown.failure
 
-    def reset_all(self) -> None:
-        self.on_refusal(STEERING)
+    @property
+    def changed(self) -> int:
+        return self._shown.changed
 
-    def restart(self, choice: SceneChoice | None = None) -> None:
-        self.on_refusal(STEERING)
+    @property
+    def tape(self) -> Tape:
+        return self._shown.tape
 
-    def load(self, choice: SceneChoice) -> None:
-        self.on_refusal(STEERING)
+    @property
+    def score(self) -> Score | None:
+        return self._shown.score
+
+    @property
+    def record(self) -> Record | None:
+        return self._shown.record
+
+    @property
+    def choice(self) -> SceneChoice:
+        return self._shown.choice
+
+    @property
+    def lecture(self) -> Lecture | None:
+        return self._shown.lecture
+
+    @property
+    def ghost(self) -> Ghost | None:
+        return self._shown.ghost
+
+    @property
+    def pid(self) -> int | None:
+        return self._shown.pid
+
+    @property
+    def quiet(self) -> float:
+        return self._shown.quiet
+
+    def trouble(self) -> Trouble | None:
+        return self._shown.trouble()
+
+    def settings_of(self, ready: Ready) -> AnySettings:
+        return self._shown.settings_of(ready)
+
+    def choice_of(self, ready: Ready) -> SceneChoice:
+        return self._shown.choice_of(ready)
+
+    def read(self, look: Callable[[Block, History], T]) -> T | None:
+        return self._shown.read(look)
+
+    def look(self) -> float | None:
+        return self._shown.look()
+
+    def ask(self, timeout: float = 10.0) -> Told | None:
+        return self._shown.ask(timeout)
 
     def take_messages(self) -> tuple[list[str], list[str]]:
         """None: they answer what the instructor did."""
         return [], []
+
+    def send(self, command: Command) -> None:
+        self._refuse(STEERING)
+
+    def start_ghost(self, ghost: lesson.Ghost) -> None:
+        self._refuse(STEERING)
+
+    def stop_ghost(self) -> None:
+        self._refuse(STEERING)
+
+    def reset_all(self) -> None:
+        self._refuse(STEERING)
+
+    def load(self, choice: SceneChoice) -> None:
+        self._refuse(STEERING)
+
+    def restart(self, choice: SceneChoice | None = None) -> None:
+        self._refuse(STEERING)
 
 
 class Classroom:
     """In place of `Sessions`: nobody is turned away, and the session lasts as long as the server."""
 
     def __init__(self, choice: SceneChoice) -> None:
-        self.token = secrets.token_hex(4)
+        self.token = secrets.token_urlsafe(16)
         self.max_sessions = 1
         self._spares = Spares(WORKER)
         self._learner = Learner(self.token, choice, self._spares)
@@ -63,11 +144,15 @@ class Classroom:
     def learners(self) -> tuple[Learner, ...]:
         return (self._learner,)
 
-    def enter(self, tokens: Sequence[str]) -> Learner:
+    def is_right(self, token: str) -> bool:
+        """Whether this is the instructor's; takes as long for every wrong one."""
+        return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())
+
+    def enter(self, tokens: Sequence[str], refuse: Refuse) -> Learner:
         """The session itself for who has the token, else a view of it."""
-        if self.token in tokens:
+        if any(map(self.is_right, tokens)):
             return self._learner
-        return cast(Learner, Watcher(self._learner))
+        return cast(Learner, Watcher(self._learner, refuse))
 
     def leave(self, learner: Learner) -> None:
         """A page was closed: nothing changes."""

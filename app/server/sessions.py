@@ -6,7 +6,7 @@ import contextlib
 import secrets
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
@@ -14,6 +14,9 @@ from app.link.spares import Spares
 
 WORKER = "app.worker.entry"
 """What a simulation's process runs; by name, because the server never loads it."""
+Refuse = Callable[[str], object]
+"""Says a sentence on the page that asked for what it may not."""
+
 GRACE = 10.0  # s a session outlives its tab: the time of a reload
 _PERIOD = 0.5  # s between looks at who has left
 
@@ -38,9 +41,9 @@ class Sessions:
         with self._lock:
             return tuple(self._learners.values())
 
-    def enter(self, tokens: Sequence[str]) -> Learner | None:
+    def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> Learner | None:
         """The learner this browser left behind (its tokens, latest last) or a new one; None if all places
-        are taken."""
+        are taken. A place is kept for who left it a moment ago: only its token gets it."""
         with self._lock:
             if self._closed.is_set():
                 return None
@@ -49,22 +52,12 @@ class Sessions:
                 if known is not None and not known.attached:
                     known.attached = True
                     return known
-            gone = None
             if len(self._learners) >= self.max_sessions:
-                gone = self._longest_gone()
-                if gone is None:
-                    return None
-                del self._learners[gone.token]
-            learner = Learner(secrets.token_urlsafe(12), self._choice, self._spares)
+                return None
+            learner = Learner(secrets.token_urlsafe(16), self._choice, self._spares)
             learner.attached = True
             self._learners[learner.token] = learner
-        if gone is not None:
-            gone.close()
         return learner
-
-    def _longest_gone(self) -> Learner | None:
-        left = [learner for learner in self._learners.values() if not learner.attached]
-        return min(left, key=lambda learner: learner.left_at, default=None)
 
     def leave(self, learner: Learner) -> None:
         """The tab was closed or reloaded."""

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import re
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any, cast
 
 import pytest
@@ -12,9 +16,13 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Play
 from app.link.process import wait_until
+from app.panels.run.classroom import Guesses
 from app.server.classroom import STEERING, Classroom, Watcher
+from app.server.door import new_token
 from app.server.server import PageServer
 from browsing.hands import SELDOM, open_page, press, write
+
+ROOT = Path(__file__).parents[2] / "app"
 
 
 @pytest.fixture(scope="module")
@@ -33,18 +41,62 @@ def test_watchers_change_nothing() -> None:
         def send(self, command: object) -> None:
             sent.append(command)
 
-    watcher = Watcher(cast(Learner, Shown()))
     refused: list[str] = []
-    watcher.on_refusal = refused.append
+    watcher = Watcher(cast(Learner, Shown()), refused.append)
     watcher.send(Play(False))
     watcher.reset_all()
-    watcher.restart()
+    watcher.restart(cast(SceneChoice, "another scene"))
     watcher.stop_ghost()
     watcher.load(SceneChoice("planar3-hold"))
     assert sent == []
     assert refused == [STEERING] * 5
     assert (watcher.choice, watcher.settings) == ("a scene", "settings")
     assert watcher.take_messages() == ([], [])
+    with pytest.raises(AttributeError):
+        watcher.choice = cast(Any, "shadowed for good")  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_watchers_have_what_pages_use() -> None:
+    """Everything a page's code takes from its learner is there for one who only watches."""
+    used = {
+        found
+        for folder in ("page", "panels", "view", "client/moment.py")
+        for path in ([ROOT / folder] if folder.endswith(".py") else (ROOT / folder).rglob("*.py"))
+        for found in re.findall(r"\blearner\.([a-z]\w*)", path.read_text())
+    }
+    assert {"send", "settings_of", "tape"} <= used
+    assert {name for name in used if not hasattr(Watcher, name)} <= {"import"}
+
+
+def test_guesses_of_one_page_wait_for_each_other_only() -> None:
+    """A thousand wrong ones are one that is looked at; another page's right one is not kept waiting."""
+    looked_at: list[str] = []
+
+    def give(token: str) -> bool:
+        looked_at.append(token)
+        return token == "right"
+
+    async def attack() -> bool | None:
+        hostile, instructor = Guesses(give), Guesses(give)
+        assert await hostile.offer("first") is False
+        flood = [asyncio.ensure_future(hostile.offer(str(k))) for k in range(1000)]
+        await asyncio.sleep(0)
+        right = await instructor.offer("right")
+        assert looked_at == ["first", "right"]
+        for guess in flood:
+            guess.cancel()
+        return right
+
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+        assert elsewhere.submit(lambda: asyncio.run(attack())).result()
+
+
+def test_the_token_is_long_and_only_itself() -> None:
+    token = Classroom.__new__(Classroom)
+    token.token = new_token()
+    assert len(token.token) == 22  # 128 bits
+    assert token.is_right(token.token)
+    assert not any(map(token.is_right, ("", token.token[:-1], token.token + "a", "\ud800é")))
 
 
 def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:

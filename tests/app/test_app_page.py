@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from app.adapter import private
+from app.adapter.wake import WakeUp
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Load
 from app.link.process import wait_until
 from app.server.server import PageServer
-from app.server.wake import WakeUp
 from browsing.hands import (
     camera,
     drag_target,
@@ -209,11 +210,9 @@ def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: Learner) ->
 
 
 def test_no_thread_can_hold_up_what_is_sent(page: Page, server: PageServer) -> None:
-    websockets = server._viser._websock_server
-    senders = [each.message_buffer for each in websockets._client_state_from_id.values()]
-    assert senders
-    for sender in (*senders, websockets._broadcast_buffer):
-        assert isinstance(sender.message_event, WakeUp)
+    everybody, *each = private.senders(server._viser)
+    assert each
+    assert all(isinstance(event, WakeUp) for event in (everybody, *each))
 
 
 def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> None:

@@ -156,6 +156,7 @@ def test_sessions_resume_end_and_are_limited() -> None:
         assert sessions.enter([]) is None  # full
         assert sessions.enter([one.token]) is None  # attached elsewhere: two tabs never share a robot
         sessions.leave(one)
+        assert sessions.enter([]) is None  # its place is kept for who reloads
         assert sessions.enter(["stranger", one.token]) is one  # a reload
         sessions.leave(two)
         assert wait_until(lambda: two not in sessions.learners, LONG)

@@ -8,7 +8,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from app.server.wake import WakeUp
+from app.adapter.wake import WakeUp
 
 
 class Meeting(deque[Any]):

@@ -2,11 +2,40 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 import viser
 
 from app.html.text import block
+
+BETWEEN = 1.0
+"""s between two guesses of one page. It is the page that waits; other pages and the server do not."""
+
+
+class Guesses:
+    """One page's tries: at most one in BETWEEN s, and of all that come meanwhile the last."""
+
+    def __init__(self, give: Callable[[str], bool]) -> None:
+        self._give = give
+        self._next = -float("inf")
+        self._latest: str | None = None
+        self._waiting = False
+
+    async def offer(self, token: str) -> bool | None:
+        """Whether it was the right one; None if it was not looked at, because a later one came or an earlier
+        one waits and looks at it in its place."""
+        self._latest = token
+        if self._waiting:
+            return None
+        self._waiting = True
+        clock = asyncio.get_running_loop().time
+        try:
+            await asyncio.sleep(max(0.0, self._next - clock()))
+        finally:
+            self._waiting = False
+        self._next = clock() + BETWEEN
+        return self._give(self._latest)
 
 
 def add_watching(gui: viser.GuiApi, give: Callable[[str], bool]) -> None:
@@ -24,11 +53,12 @@ def add_watching(gui: viser.GuiApi, give: Callable[[str], bool]) -> None:
     )
     token = gui.add_text("Instructor's token", "", hint="Printed where himpc-lab was started.")
     wrong = gui.add_html("", visible=False)
+    guesses = Guesses(give)
 
     @token.on_update
-    def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
+    async def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
         given = token.value.strip()
-        if event.client is None or not given or give(given):
+        if event.client is None or not given or await guesses.offer(given) is not False:
             return
         wrong.content = block("That is not the token.")
         wrong.visible = True

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import viser
-from viser import _messages
 
+from app.adapter.private import send_again
 from app.client.wish import HOLD, Send
 from lessons.kinds import AnyEvent, AnySettings
 
@@ -84,7 +84,7 @@ class Bindings(Generic[S]):
                 if value != mirror.handle.value:
                     mirror.handle.value = value
                 elif remind:
-                    _send(mirror.handle)
+                    send_again(mirror.handle)
 
 
 def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
@@ -94,13 +94,6 @@ def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
         return value
     # What is not a number compares false with both ends.
     return value if low <= value <= high else high if value > high else low
-
-
-def _send(handle: viser.GuiInputHandle[Any]) -> None:
-    """The control's value once more; assigning it would send nothing, since viser knows it already."""
-    control = handle._impl
-    update = _messages.GuiUpdateMessage(control.uuid, {"value": control.value})
-    control.gui_api._websock_interface.queue_message(update)
 
 
 def scalar(value: object) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 
 import viser
 
+from app.adapter.private import dom_id
 from app.html.text import figure
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
@@ -30,7 +31,7 @@ def value_at(place: float, low: float, high: float) -> float:
 
 def only_track(slider: viser.GuiSliderHandle[Any]) -> str:
     """A style that hides the numbers of a slider where they would be a mere place."""
-    here = f'[id="{slider._impl.uuid}"]'
+    here = f'[id="{dom_id(slider)}"]'
     return f"<style>{here} + .mantine-NumberInput-root,{here} .mantine-Slider-label{{display:none}}</style>"
 
 

@@ -1,0 +1,1 @@
+"""What viser does not offer: its private parts behind functions of ours."""

@@ -1,0 +1,229 @@
+"""viser's private names: no other file touches them. `self_test` looks at each before anything is served.
+
+A seam that is gone is one clear sentence and no server, never a server without its door.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import socket
+import threading
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from http import HTTPStatus
+from typing import Any
+
+import viser
+import websockets.asyncio.server as web
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
+
+from app.adapter.wake import WakeUp
+from robots import InputError
+
+try:
+    from viser import _messages, infra
+except ImportError as error:
+    raise InputError(
+        f"viser {viser.__version__} is not the one this page was made for ({error}): install 1.1"
+    ) from None
+
+Guard = Callable[[Mapping[str, Any]], dict[str, Any]]
+"""From the keywords viser gives to websockets' `serve` to those we give."""
+
+_SERVING = threading.Lock()
+_NEEDED = ("process_request", "max_size")
+
+_OF_MODULES = (
+    (_messages, ("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect")),
+    (_messages, ("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage")),
+    (_messages, ("FileTransferStartUpload", "FileTransferPart", "Message")),
+)
+_OF_A_SERVER = (
+    "_websock_server._live_connections",
+    "_websock_server._incoming_handlers",
+    "_websock_server._client_state_from_id",
+    "_websock_server._broadcast_buffer.message_event",
+    "gui._current_file_upload_states",
+    "gui._thread_executor",
+    "scene._thread_executor",
+)
+
+
+def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
+    """A viser server that listens behind `guard`, opens no tunnel to strangers and never falls asleep. Raises
+    InputError if it cannot be guarded; then nothing listens."""
+    self_test(guard)
+    # viser greets with a panel of its own; we promise exactly one line.
+    with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
+        server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
+    try:
+        _require(served == [True], "how it serves")
+        for path in _OF_A_SERVER:
+            _require(_reaches(server, path), path)
+        handlers = server._websock_server
+        # Any client could ask for a public tunnel to this machine, button or not.
+        for tunnel in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+            handlers.unregister_handler(tunnel)
+        _keep_awake(server)
+    except BaseException:
+        stop(server)
+        raise
+    return server
+
+
+def stop(server: viser.ViserServer) -> None:
+    """Ends it, silently."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def self_test(guard: Guard) -> None:
+    """Whether viser is still the one we know, and refuses what a guard that is not open yet refuses: on a
+    server of its own that nothing stands behind, on this machine only. Raises InputError."""
+    for module, names in _OF_MODULES:
+        for name in names:
+            _require(hasattr(module, name), name)
+    with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
+        bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
+        bare.start()
+        try:
+            refused = _answer(bare._port).startswith(b"HTTP/1.1 503")
+        finally:
+            bare.stop()
+    _require(served == [True] and refused, "how it serves")
+
+
+@contextlib.contextmanager
+def _guarded(guard: Guard) -> Iterator[list[bool]]:
+    """Whatever viser serves meanwhile is served through `guard`. Yields one entry for each time, False where
+    `guard` did not fit: then every request is refused."""
+    served: list[bool] = []
+    plain = web.serve
+
+    def serve(*given: Any, **keywords: Any) -> Any:
+        # Nothing may be raised here: viser would wait for its server for ever.
+        try:
+            if missing := [name for name in _NEEDED if name not in keywords]:
+                raise KeyError(*missing)
+            changed = guard(keywords)
+        except Exception:
+            served.append(False)
+            return plain(*given, **{**keywords, "process_request": _refuse})
+        served.append(True)
+        return plain(*given, **changed)
+
+    with _SERVING:
+        web.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield served
+        finally:
+            web.serve = plain
+
+
+def _answer(port: int) -> bytes:
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
+        stranger.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        return stranger.recv(100)
+
+
+def _refuse(connection: ServerConnection, _: Request) -> Response:
+    return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
+
+
+def _require(found: bool, what: str) -> None:
+    if not found:
+        raise InputError(
+            f"viser {viser.__version__} is not the one this page was made for ({what} has changed): it is "
+            "not served, for nobody could be kept out. Install viser 1.1 again."
+        )
+
+
+def _reaches(start: object, path: str) -> bool:
+    for name in path.split("."):
+        try:
+            start = getattr(start, name)
+        except (AttributeError, RecursionError):
+            return False
+    return True
+
+
+def _keep_awake(server: viser.ViserServer) -> None:
+    """Before a sender first sleeps; viser makes one for all clients and one for each."""
+    websockets, loop = server._websock_server, server.get_event_loop()
+    websockets._broadcast_buffer.message_event = WakeUp(loop)
+
+    async def keep(connection: infra.WebsockClientConnection) -> None:
+        connection.get_message_buffer().message_event = WakeUp(loop)
+
+    websockets.on_client_connect(keep)
+
+
+def senders(server: viser.ViserServer) -> list[asyncio.Event]:
+    """What wakes each of them: of all clients together, then of each."""
+    websockets = server._websock_server
+    buffers = [each.message_buffer for each in list(websockets._client_state_from_id.values())]
+    return [buffer.message_event for buffer in (websockets._broadcast_buffer, *buffers)]
+
+
+# ---------------------------------------------------------------- one client
+
+
+def connection_of(server: viser.ViserServer, client: viser.ClientHandle) -> ServerConnection | None:
+    """What carries a client; None if it has left."""
+    return server._websock_server._live_connections.get(client.client_id)
+
+
+def give_workers(client: viser.ClientHandle, workers: ThreadPoolExecutor) -> None:
+    """This client's callbacks run on `workers` from now on, where they keep no other client's waiting."""
+    client.gui._thread_executor = workers
+    client.scene._thread_executor = workers
+
+
+def unfinished_uploads(client: viser.ClientHandle) -> int:
+    """Bytes that have come of files that are not complete."""
+    uploads = list(client.gui._current_file_upload_states.values())
+    return sum(state["transferred_bytes"] for state in uploads)
+
+
+async def read_storage(
+    client: viser.ClientHandle, keys: Sequence[str], timeout: float
+) -> tuple[str | None, ...]:
+    """What the browser keeps under each key; None where it keeps nothing, may not say, or does not answer in
+    so many seconds. Waits on the loop, where it keeps nobody else waiting."""
+    connection = client._websock_connection
+    loop = asyncio.get_running_loop()
+    asked: dict[str, asyncio.Future[str | None]] = {uuid.uuid4().hex: loop.create_future() for _ in keys}
+
+    def hear(_: int, answer: _messages.LocalStorageGetItemResponseMessage) -> None:
+        future = asked.get(str(answer.request_uuid))
+        if future is not None and not future.done():
+            future.set_result(answer.value if isinstance(answer.value, str) else None)
+
+    connection.register_handler(_messages.LocalStorageGetItemResponseMessage, hear)
+    try:
+        for key, request in zip(keys, asked, strict=True):
+            connection.queue_message(_messages.LocalStorageGetItemRequestMessage(key, request))
+        client.flush()
+        await asyncio.wait(asked.values(), timeout=timeout)
+    finally:
+        connection.unregister_handler(_messages.LocalStorageGetItemResponseMessage, hear)
+    return tuple(future.result() if future.done() else None for future in asked.values())
+
+
+# ---------------------------------------------------------------- one control
+
+
+def dom_id(handle: viser.GuiInputHandle[Any] | viser.GuiUploadButtonHandle) -> str:
+    """A control's id in the browser's document."""
+    return handle._impl.uuid
+
+
+def send_again(handle: viser.GuiInputHandle[Any]) -> None:
+    """The control's value once more; assigning it would send nothing, since viser knows it already."""
+    control = handle._impl
+    update = _messages.GuiUpdateMessage(control.uuid, {"value": control.value})
+    control.gui_api._websock_interface.queue_message(update)

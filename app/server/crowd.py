@@ -1,0 +1,74 @@
+"""How many connections there may be. Whoever has not said a word makes room for who comes after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+TOTAL = 256
+PER_ADDRESS = 96
+"""A class behind one address, twice."""
+
+
+@dataclass
+class _Guest:
+    address: str | None
+    leave: Callable[[], object]
+    spoke: bool = False
+
+
+class Crowd:
+    """Those who are connected, oldest first, by whatever identifies a connection."""
+
+    def __init__(self, total: int = TOTAL, per_address: int = PER_ADDRESS) -> None:
+        self._total, self._per_address = total, per_address
+        self._guests: dict[object, _Guest] = {}
+
+    def __len__(self) -> int:
+        return len(self._guests)
+
+    def enter(self, key: object, address: str | None, leave: Callable[[], object]) -> bool:
+        """Whether there is room. address: None if it says nothing (a proxy's). leave: ends the connection."""
+        if not self._room(self._total, lambda _: True):
+            return False
+        self._guests[key] = _Guest(None, leave)
+        if self.comes_from(key, address):
+            return True
+        del self._guests[key]
+        return False
+
+    def comes_from(self, key: object, address: str | None) -> bool:
+        """The address became known; whether there is room for one more from there."""
+        guest = self._guests.get(key)
+        if guest is None:
+            return False
+        if address is None or guest.address == address:
+            return True
+        if not self._room(self._per_address, lambda other: other.address == address):
+            return False
+        guest.address = address
+        return True
+
+    def _room(self, most: int, counts: Callable[[_Guest], bool]) -> bool:
+        inside = {key: guest for key, guest in self._guests.items() if counts(guest)}
+        if len(inside) < most:
+            return True
+        for key, guest in inside.items():
+            if not guest.spoke:
+                del self._guests[key]
+                guest.leave()
+                return True
+        return False
+
+    def spoke(self, key: object) -> None:
+        """This one is somebody."""
+        guest = self._guests.get(key)
+        if guest is not None:
+            guest.spoke = True
+
+    def has_spoken(self, key: object) -> bool:
+        guest = self._guests.get(key)
+        return guest is not None and guest.spoke
+
+    def leave(self, key: object) -> None:
+        self._guests.pop(key, None)

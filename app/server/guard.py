@@ -1,0 +1,198 @@
+"""The door, the crowd and the budgets around viser's web server."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import logging
+from collections.abc import Callable, Mapping
+from html import escape
+from http import HTTPStatus
+from typing import Any, NoReturn
+
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosedError
+from websockets.frames import CloseCode, Frame, Opcode
+from websockets.http11 import Request, Response
+
+from app.server import budget
+from app.server.budget import Budget
+from app.server.crowd import Crowd
+from app.server.door import Answer, Door, is_upgrade, secured
+
+HANDSHAKE = 5.0
+"""s for a request to be complete."""
+FIRST_WORD = 45.0
+"""s for a page to say something: drawing the first picture may take long without a graphics card."""
+_SLICE = 4096  # B that are parsed before anybody looks whether it was too much
+_TRANSFER = b"FileTransfer"  # in every message that begins or carries a file
+_PAGE = (
+    '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    "<title>{title}</title><body style='font:16px/1.5 sans-serif;max-width:40em;margin:3em auto'>"
+    "<h1>{title}</h1>{text}</body></html>"
+)
+
+Uploads = tuple[Callable[[], int], Callable[[], object]]
+"""Of one page: bytes of unfinished files; and what says that a file was too much."""
+
+
+class Guard:
+    """Given to `open_server`. Refuses everybody until it is opened."""
+
+    def __init__(self, door: Door) -> None:
+        self.crowd = Crowd()
+        self.refused = 0
+        self.taken = 0
+        """Messages that reached viser."""
+        self._door = door
+        self._open = False
+
+    def open(self, door: Door) -> None:
+        """From now on `door` decides."""
+        self._door, self._open = door, True
+
+    def close(self) -> None:
+        self._open = False
+
+    def __call__(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """The keywords of websockets' `serve`."""
+        files: Callable[[ServerConnection, Request], Response | None] = given["process_request"] or _nothing
+
+        def request(connection: ServerConnection, request: Request) -> Response | None:
+            answer = self._judge(connection, request)
+            if answer is not None:
+                self.refused += answer.status >= HTTPStatus.BAD_REQUEST
+                return _response(answer)
+            if is_upgrade(request):
+                asyncio.get_running_loop().call_later(FIRST_WORD, self._expect_word, connection)
+                return None
+            return files(connection, request)
+
+        def secure(_: ServerConnection, __: Request, response: Response) -> None:
+            secured(response.headers)
+
+        return {
+            **given,
+            "process_request": request,
+            "process_response": secure,
+            "create_connection": lambda *of, **more: GuardedConnection(*of, guard=self, **more),
+            "max_size": budget.MESSAGE,
+            "open_timeout": HANDSHAKE,
+            "server_header": None,
+            "logger": _log(),
+        }
+
+    def _judge(self, connection: ServerConnection, request: Request) -> Answer | None:
+        if not self._open:
+            return Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting", "<p>Try again in a moment.</p>")
+        answer = self._door.judge(request)
+        if answer is None and not self.crowd.comes_from(connection, self.address(connection, request)):
+            return Answer(
+                HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some of them and try again.</p>"
+            )
+        return answer
+
+    def address(self, connection: ServerConnection, request: Request | None) -> str | None:
+        """Who connects. None if a proxy on this machine does not say for whom."""
+        peer = connection.remote_address
+        address = str(peer[0]) if isinstance(peer, tuple) and peer else None
+        if address is None or not self._door.trusted or not ipaddress.ip_address(address).is_loopback:
+            return address
+        named = [] if request is None else request.headers.get_all("X-Forwarded-For")
+        return named[-1].rpartition(",")[2].strip()[:64] if named else None
+
+    def _expect_word(self, connection: ServerConnection) -> None:
+        if not self.crowd.has_spoken(connection):
+            connection.transport.abort()
+
+
+class GuardedConnection(ServerConnection):
+    """Counts before it decodes. `uploads` is what the page it serves tells about its files."""
+
+    def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
+        super().__init__(*of, **more)
+        self.uploads: Uploads | None = None
+        self._guard = guard
+        self._budget = Budget(self.loop.time)
+        self._waiting = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        if not self._guard.crowd.enter(self, self._guard.address(self, None), self.transport.abort):
+            self.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._guard.crowd.leave(self)
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        for at in range(0, len(data), _SLICE):
+            if self.transport.is_closing():
+                return
+            super().data_received(data[at : at + _SLICE])
+
+    def process_event(self, event: Any) -> None:
+        if isinstance(event, Frame):
+            if event.opcode in (Opcode.PING, Opcode.PONG):
+                if not self._budget.controls():
+                    self.transport.abort()
+                    return
+            elif event.opcode is not Opcode.CLOSE:
+                self._waiting += 1
+                if self._waiting > budget.WAITING:
+                    self.transport.abort()
+                    return
+        super().process_event(event)
+
+    async def recv(self, decode: bool | None = None) -> Any:
+        """As of websockets: but what is too much is read more slowly, and at last no more."""
+        while True:
+            raw = await super().recv(decode)
+            self._waiting = len(self.recv_messages.frames)
+            if isinstance(raw, str):
+                await self._end(CloseCode.UNSUPPORTED_DATA, "This page speaks binary.")
+            if waiting := self._budget.wait(len(raw)):
+                await asyncio.sleep(waiting)
+            if self._budget.spent:
+                await self._end(CloseCode.POLICY_VIOLATION, "Too many messages.")
+            if _TRANSFER in raw and not await self._may_upload(len(raw)):
+                continue
+            self._guard.crowd.spoke(self)
+            self._guard.taken += 1
+            return raw
+
+    async def _may_upload(self, size: int) -> bool:
+        if self.uploads is None:
+            return False
+        await asyncio.sleep(0)  # what came before has been taken
+        unfinished, say = self.uploads
+        if self._budget.uploads(size, unfinished):
+            return True
+        say()
+        return False
+
+    async def _end(self, code: CloseCode, reason: str) -> NoReturn:
+        await self.close(code, reason)
+        raise ConnectionClosedError(None, None)  # what viser takes for an end
+
+
+def _nothing(_: ServerConnection, __: Request) -> Response | None:
+    return None
+
+
+def _response(answer: Answer) -> Response:
+    body = _PAGE.format(title=escape(answer.title), text=answer.text).encode()
+    headers = Headers(answer.headers)
+    headers["Content-Type"] = "text/html; charset=utf-8"
+    headers["Content-Length"] = str(len(body))
+    headers["Connection"] = "close"
+    return Response(answer.status.value, answer.status.phrase, headers, body)
+
+
+def _log() -> logging.Logger:
+    """What strangers send wrong is no news for the terminal."""
+    log = logging.getLogger("himpc-lab.connections")
+    log.propagate = False
+    log.setLevel(logging.CRITICAL)
+    return log

@@ -1,0 +1,177 @@
+"""One browser tab, from its first word until it is closed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import viser
+
+from app.adapter import private
+from app.client.progress import Notebook, Progress, progress_from
+from app.html.text import block
+from app.page.page import Page
+from app.panels.run.classroom import add_watching
+from app.server.budget import UPLOADS
+from app.server.classroom import Classroom, Watcher
+from app.server.guard import GuardedConnection
+from app.server.sessions import Sessions
+from app.server.workers import Workers, told
+
+STORAGE = 5.0
+"""s a browser gets to say what it keeps."""
+_TOKENS = "himpc-lab-sessions"
+_DARK = "himpc-lab-dark"
+_PROGRESS = "himpc-lab-lessons"
+_LONGEST = 100_000  # characters of any of them that we read
+
+
+class Visit:
+    """Its steps (admitting, closing) come one after the other on a thread of its own, its callbacks run on a
+    few others. viser's loop waits for none of them."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        client: viser.ClientHandle,
+        sessions: Sessions | Classroom,
+        by_path: bool,
+    ) -> None:
+        """by_path: whether this page may name files of the machine."""
+        self._server = server
+        self._client = client
+        self._sessions = sessions
+        self._by_path = by_path
+        self._page: Page | None = None
+        self._left = False
+        self._dark = False
+        self._notebook = Notebook(Progress(), lambda _: None)
+        self._workers = Workers()
+        self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
+        private.give_workers(client, self._workers)
+        connection = private.connection_of(server, client)
+        if isinstance(connection, GuardedConnection):
+            connection.uploads = (lambda: private.unfinished_uploads(client), self._refuse_upload)
+
+    async def arrive(self) -> None:
+        """On viser's loop. A browser that does not answer is a new one."""
+        keys = (_TOKENS, _DARK, _PROGRESS)
+        found = await private.read_storage(self._client, keys, STORAGE)
+        tokens, dark, progress = (text if text and len(text) <= _LONGEST else None for text in found)
+        self._dark = dark == "1"
+        self._notebook = Notebook(progress_from(progress), lambda text: self._keep(_PROGRESS, text))
+        self._then(_tokens(tokens))
+
+    def leave(self) -> None:
+        """The tab was closed. Returns at once."""
+        if not self._left:
+            self._left = True
+            self._steps.submit(self._end).add_done_callback(told)
+            self._steps.shutdown(wait=False)
+
+    def close(self) -> None:
+        """As `leave`, and waits until it is done."""
+        self.leave()
+        self._steps.shutdown(wait=True)
+
+    # ---------------------------------------------------------------- steps, on a thread of their own
+
+    def _then(self, tokens: Sequence[str]) -> None:
+        """Another attempt to come in."""
+        if not self._left:
+            self._steps.submit(self._admit, tokens).add_done_callback(told)
+
+    def _admit(self, tokens: Sequence[str]) -> None:
+        if self._left:
+            return
+        before, self._page = self._page, None
+        if before is not None:  # it has only watched
+            before.close()
+        learner = self._sessions.enter(tokens, self._refuse)
+        if learner is None:
+            self._turn_away(tokens)
+            return
+        kept = [token for token in tokens if token != learner.token][-7:]
+        self._keep(_TOKENS, json.dumps([*kept, learner.token] if learner.token else kept))
+        self._page = Page(
+            self._client,
+            learner,
+            self._dark,
+            self._by_path,
+            self._server.get_event_loop(),
+            self._notebook,
+            on_dark=self._remember_dark,
+            greet=self._greet if isinstance(learner, Watcher) else _no_greeting,
+        )
+        self._page.start()
+
+    def _end(self) -> None:
+        page, self._page = self._page, None
+        if page is not None:
+            page.close()
+            self._sessions.leave(page.learner)
+        self._workers.shutdown(wait=False, cancel_futures=True)
+
+    # ---------------------------------------------------------------- what the page says
+
+    def _keep(self, key: str, text: str) -> None:
+        self._client.local_storage.set_item(key, text)
+
+    def _remember_dark(self, on: bool) -> None:
+        self._dark = on
+        self._keep(_DARK, "1" if on else "0")
+
+    def _greet(self, gui: viser.GuiApi) -> None:
+        """For a page that only watches, until it has the instructor's token."""
+
+        def take(token: str) -> bool:
+            right = isinstance(self._sessions, Classroom) and self._sessions.is_right(token)
+            if right:
+                self._then([token])
+            return right
+
+        add_watching(gui, take)
+
+    def _refuse(self, sentence: str) -> None:
+        self._client.add_notification("Not steered", sentence, color="orange", auto_close_seconds=4.0)
+
+    def _refuse_upload(self) -> None:
+        self._client.add_notification(
+            "Not uploaded",
+            f"Files that are on their way may have {UPLOADS // 1_000_000} MB in all: give a smaller one, or "
+            "reload the page and try again.",
+            color="red",
+        )
+
+    def _turn_away(self, tokens: Sequence[str]) -> None:
+        gui = self._client.gui
+        gui.configure_theme(dark_mode=self._dark, show_share_button=False, show_logo=False)
+        modal = gui.add_modal("All places are taken")
+        with modal:
+            gui.add_html(
+                block(
+                    f"This computer runs a robot for each of {self._sessions.max_sessions} pages, and all "
+                    "are in use. Close another tab and try again a few seconds later, or start himpc-lab "
+                    "with <code>--max-sessions</code>."
+                )
+            )
+            again = gui.add_button("Try again")
+
+        @again.on_click
+        async def _(_: object) -> None:
+            modal.close()
+            self._then(tokens)
+
+
+def _no_greeting(_: viser.GuiApi) -> None:
+    """A page that steers."""
+
+
+def _tokens(stored: str | None) -> list[str]:
+    """Tokens from the browser's storage, which anybody may have written."""
+    try:
+        found = json.loads(stored or "[]")
+    except (ValueError, RecursionError):
+        return []
+    return [token for token in found if isinstance(token, str)][-8:] if isinstance(found, list) else []

@@ -1,0 +1,144 @@
+"""Who may come in: judged before an answer, and before a socket is opened."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+
+import pytest
+from websockets.datastructures import Headers
+from websockets.http11 import Request
+
+from app.server.door import Answer, Door, as_origin, new_token
+from robots import InputError
+
+OURS = "127.0.0.1:8080"
+TOKEN = new_token()
+LOCAL = Door()
+TOKENED = Door(local=False, token=TOKEN, names=frozenset({"lab", "lab.local"}), cookie="himpc-lab-8080")
+PROXIED = Door(trusted=frozenset({"https://lab.example.org"}))
+
+
+def judged(door: Door, path: str = "/", **headers: str | list[str]) -> Answer | None:
+    """Keywords are headers, with _ for -."""
+    given = Headers()
+    for name, values in {"Host": OURS, **headers}.items():
+        for value in values if isinstance(values, list) else [values]:
+            given[name.replace("_", "-")] = value
+    return door.judge(Request(path, given))
+
+
+@pytest.mark.parametrize("upgrade", [{}, {"Upgrade": "websocket"}])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "https://evil.example"},
+        {"Origin": "null"},
+        {"Origin": ""},
+        {"Origin": "http://127.0.0.1:9999"},  # another page of this machine
+        {"Origin": "http://localhost:8080"},  # is not what the address says
+        {"Origin": f"https://{OURS}"},
+        {"Origin": f"http://{OURS}.evil.example"},
+        {"Origin": f"http://evil.example@{OURS}"},
+        {"Origin": [f"http://{OURS}", "https://evil.example"]},
+        {"Host": "evil.example:8080", "Origin": "http://evil.example:8080"},  # DNS rebinding
+        {"Host": "evil.example:8080"},
+        {"Host": "localhost.evil.example:8080"},
+        {"Host": "192.168.0.7:8080"},
+        {"Host": ["127.0.0.1:8080", "evil.example"]},
+        {"Host": []},
+        {"Host": ""},
+        {"Host": "[::1"},
+        {"Host": "127.0.0.1:8080@evil.example"},
+    ],
+    ids=str,
+)
+def test_other_sites_are_refused(headers: dict[str, str | list[str]], upgrade: dict[str, str]) -> None:
+    answer = judged(LOCAL, **headers, **upgrade)
+    assert answer is not None and answer.status is HTTPStatus.FORBIDDEN
+
+
+@pytest.mark.parametrize("host", [OURS, "localhost:8080", "[::1]:8080", "localhost:9000", "LOCALHOST:8080"])
+def test_our_own_page_comes_in(host: str) -> None:
+    """Also through a tunnel that ends at another port."""
+    assert judged(LOCAL, Host=host) is None
+    assert judged(LOCAL, Host=host, Origin=f"http://{host.lower()}", Upgrade="websocket") is None
+
+
+def test_links_from_elsewhere_work_and_parts_of_other_pages_do_not() -> None:
+    link = {"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "document"}
+    assert judged(LOCAL, **link) is None
+    assert judged(LOCAL, **{**link, "Sec_Fetch_Dest": "iframe"}) is not None
+    assert judged(LOCAL, Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="no-cors", Sec_Fetch_Dest="image")
+    assert judged(LOCAL, Sec_Fetch_Site="same-site", Sec_Fetch_Mode="cors", Sec_Fetch_Dest="empty")
+    assert judged(LOCAL, Sec_Fetch_Site="same-origin", Sec_Fetch_Mode="cors") is None
+
+
+@pytest.mark.parametrize("upgrade", [{}, {"Upgrade": "websocket"}])
+@pytest.mark.parametrize(
+    ("path", "cookie"),
+    [
+        ("/", ""),
+        ("/?token=", ""),
+        ("/?token=%ED%A0%80", ""),
+        (f"/?token={TOKEN[:-1]}", ""),
+        ("/", f"himpc-lab-8080={TOKEN}x"),
+        ("/", f"himpc-lab-9090={TOKEN}"),  # of another himpc-lab
+        ("/", "himpc-lab-8080=\xe4"),
+        ("/", "=;=;,;"),
+    ],
+)
+def test_without_the_token_nothing(path: str, cookie: str, upgrade: dict[str, str]) -> None:
+    answer = judged(TOKENED, path, Cookie=cookie, **upgrade)
+    assert answer is not None and answer.status is HTTPStatus.FORBIDDEN
+    assert "token" in answer.title and TOKEN not in answer.text
+
+
+def test_the_token_moves_from_the_address_into_a_cookie() -> None:
+    answer = judged(TOKENED, f"/?token={TOKEN}")
+    assert answer is not None and answer.status is HTTPStatus.SEE_OTHER
+    headers = dict(answer.headers)
+    assert headers["Location"] == "/" and headers["Cache-Control"] == "no-store"
+    cookie, *attributes = headers["Set-Cookie"].split("; ")
+    assert {"HttpOnly", "SameSite=Strict", "Path=/"} == set(attributes)
+    assert judged(TOKENED, Cookie=f'odd={{"a": [1, "é"]}}; {cookie}') is None
+    own = {"Origin": f"http://{OURS}", "Upgrade": "websocket"}
+    assert judged(TOKENED, Cookie=cookie, **own) is None
+    assert judged(TOKENED, Cookie=cookie, **{**own, "Origin": "https://evil.example"}) is not None
+    # A page of ours that a link elsewhere led to goes on by itself: only so the browser sends the cookie.
+    answer = judged(TOKENED, f"/?token={TOKEN}", Referer="https://mail.example/")
+    assert answer is not None and answer.status is HTTPStatus.OK
+    assert dict(answer.headers)["Refresh"] == "0; url=/"
+
+
+def test_beyond_this_machine_addresses_and_our_own_names_are_ours() -> None:
+    """A name that merely resolves to us is not, with or without a token: it may be anybody's."""
+    for door in (TOKENED, Door(local=False, names=TOKENED.names)):
+        refused = judged(door, Host="evil.example:8080", Origin="http://evil.example:8080")
+        assert refused is not None and "--trusted-origin" in refused.text
+        for host in ("192.168.0.7:8080", "lab:8080", "lab.local:8080", "[fe80::1]:8080"):
+            answer = judged(door, Host=host, Cookie=f"himpc-lab-8080={TOKEN}")
+            assert answer is None
+
+
+def test_a_trusted_proxy() -> None:
+    """Whether it passes the host on or not; another origin stays foreign."""
+    origin = {"Origin": "https://lab.example.org"}
+    assert judged(PROXIED, Host="lab.example.org", **origin) is None
+    assert judged(PROXIED, Host=OURS, **origin) is None
+    assert judged(PROXIED, Host="lab.example.org") is None
+    assert judged(PROXIED, Host="lab.example.org", Origin="https://evil.example") is not None
+    assert judged(PROXIED, Host="lab.example.org", Origin="https://lab.example.org.evil.example") is not None
+    assert judged(PROXIED, Host="evil.example", **origin) is not None
+    secure = Door(trusted=PROXIED.trusted, token=TOKEN)
+    answer = judged(secure, f"/?token={TOKEN}", Host="lab.example.org")
+    assert answer is not None and "; Secure" in dict(answer.headers)["Set-Cookie"]
+
+
+def test_origins_are_written_as_browsers_do() -> None:
+    assert as_origin("https://Lab.Example.org/") == "https://lab.example.org"
+    assert as_origin("https://lab.example.org:443") == "https://lab.example.org"
+    assert as_origin("http://lab:8080") == "http://lab:8080"
+    assert as_origin("http://[fe80::1]:8080") == "http://[fe80::1]:8080"
+    for wrong in ("lab.example.org", "https://", "*", "https://lab/page", "ftp://lab", "https://a:b", "null"):
+        with pytest.raises(InputError, match=r"--trusted-origin.*https://lab.example.org"):
+            as_origin(wrong)

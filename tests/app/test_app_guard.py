@@ -1,0 +1,309 @@
+"""The door and the budgets around viser's server, with real connections."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+import msgspec
+import pytest
+import websockets.asyncio.server as web
+from viser import __version__, _messages
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
+
+from app.adapter import private
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server import budget
+from app.server.budget import Bucket, Budget
+from app.server.crowd import Crowd
+from app.server.door import Door
+from app.server.guard import Guard
+from app.server.server import PageServer
+from browsing.wire import camera, pack
+from robots import InputError
+
+PROTOCOL: Any = [f"viser-v{__version__}"]
+LONG = 60.0
+
+
+@pytest.fixture(scope="module")
+def plain() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=2, grace=60.0)
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def tokened() -> Iterator[PageServer]:
+    running = PageServer(
+        SceneChoice("planar3-hold"), port=0, max_sessions=1, trusted_origins=["https://lab.example.org"]
+    )
+    yield running
+    running.close()
+
+
+def dial(server: PageServer, **more: Any) -> ClientConnection:
+    return connect(server.url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None, **more)
+
+
+def get(server: PageServer, path: str = "/", **headers: str) -> http.client.HTTPResponse:
+    parts = urlsplit(server.url)
+    assert parts.hostname is not None
+    connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=30)
+    connection.request("GET", path, headers={name.replace("_", "-"): text for name, text in headers.items()})
+    return connection.getresponse()
+
+
+def closed_with(page: Connection) -> int | None:
+    """The code, once everything that came before is read."""
+    try:
+        while True:
+            page.recv(timeout=LONG)
+    except ConnectionClosed:
+        return page.close_code
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "https://evil.example"},
+        {"Origin": "null"},
+        {"Origin": "http://127.0.0.1:9"},
+        {"Host": "evil.example", "Origin": "http://evil.example"},
+    ],
+    ids=str,
+)
+def test_who_is_not_admitted_reaches_nothing(plain: PageServer, headers: dict[str, str]) -> None:
+    """No socket, no frame, no learner, no process."""
+    learners, taken = plain.sessions.learners, plain.guard.taken
+    host = headers.get("Host", urlsplit(plain.url).netloc)
+    with socket.create_connection((urlsplit(plain.url).hostname, urlsplit(plain.url).port)) as stranger:
+        lines = [
+            "GET / HTTP/1.1",
+            f"Host: {host}",
+            f"Origin: {headers['Origin']}",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            "Sec-WebSocket-Version: 13",
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+            f"Sec-WebSocket-Protocol: {PROTOCOL[0]}",
+        ]
+        # A frame that is sent along with the handshake is not looked at either.
+        stranger.sendall("\r\n".join([*lines, "", ""]).encode() + b"\x82\x80\x00\x00\x00\x00")
+        answer = stranger.recv(100)
+        assert answer.startswith(b"HTTP/1.1 403 ")
+    assert get(plain, **headers).status == 403
+    assert plain.sessions.learners == learners and plain.guard.taken == taken
+
+
+def test_every_answer_forbids_frames_and_guesses(plain: PageServer) -> None:
+    for answer in (get(plain), get(plain, "/nowhere"), get(plain, Origin="null")):
+        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert "Server" not in answer.headers
+    with dial(plain) as page:
+        assert page.response is not None
+        assert page.response.headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_a_place_is_kept_for_who_reloads(plain: PageServer) -> None:
+    """Somebody without its token does not get it, however often he comes."""
+    pages = [dial(plain), dial(plain)]
+    for page in pages:
+        page.send(pack(camera()))
+    assert wait_until(lambda: len(plain.sessions.learners) == 2, LONG)
+    mine = plain.sessions.learners
+    for page in pages:
+        page.close()
+    assert wait_until(lambda: not any(learner.attached for learner in mine), LONG)
+    with dial(plain) as stranger:
+        stranger.send(pack(camera()))
+        assert wait_until(lambda: plain.guard.taken > 2, LONG)
+    assert plain.sessions.enter([], print) is None
+    assert plain.sessions.learners == mine
+    assert plain.sessions.enter([mine[0].token], print) is mine[0]
+    plain.sessions.leave(mine[0])
+
+
+def test_the_token_opens_page_and_socket(tokened: PageServer) -> None:
+    assert tokened.token is not None and tokened.token in tokened.with_token(tokened.url)
+    refused = get(tokened)
+    assert refused.status == 403
+    assert b"?token=" in refused.read()
+    with pytest.raises(InvalidStatus) as error:
+        dial(tokened)
+    assert error.value.response.status_code == 403
+    answer = get(tokened, f"/?token={tokened.token}")
+    assert (answer.status, answer.headers["Location"]) == (303, "/")
+    cookie = answer.headers["Set-Cookie"].partition(";")[0]
+    assert get(tokened, Cookie=cookie).status == 200
+    with dial(tokened, additional_headers={"Cookie": cookie}, origin=tokened.url) as page:
+        assert page.recv(timeout=LONG)
+    with connect(
+        f"{tokened.url.replace('http', 'ws')}/?token={tokened.token}", subprotocols=PROTOCOL
+    ) as page:
+        assert page.recv(timeout=LONG)
+
+
+def test_a_message_has_a_size(plain: PageServer) -> None:
+    with dial(plain) as page:
+        page.send(bytes(budget.MESSAGE + 1))
+        assert closed_with(page) == 1009
+    with dial(plain) as page:
+        page.send("text")
+        assert closed_with(page) == 1003
+
+
+def test_files_on_their_way_have_a_size(plain: PageServer) -> None:
+    """More than the importer reads is dropped before it is decoded; the page stays."""
+    with dial(plain) as page:
+        page.send(pack(camera()))
+        assert wait_until(lambda: bool(plain._viser.get_clients()), LONG)
+        client = list(plain._viser.get_clients().values())[-1]
+        button = client.gui.add_upload_button("File")
+        count = 6
+        start = _messages.FileTransferStartUpload(
+            source_component_uuid=private.dom_id(button),
+            transfer_uuid="one",
+            filename="robot.urdf",
+            mime_type="text/xml",
+            part_count=count,
+            size_bytes=count * 3_000_000,
+        )
+        page.send(pack(start))
+        for index in range(count):
+            part = _messages.FileTransferPart(
+                source_component_uuid=private.dom_id(button),
+                transfer_uuid="one",
+                part_index=index,
+                content=bytes(3_000_000),
+            )
+            page.send(pack(part))
+        before = plain.guard.taken
+        page.send(pack(camera()))
+        assert wait_until(lambda: plain.guard.taken > before, LONG)
+        assert 3_000_000 <= private.unfinished_uploads(client) <= budget.UPLOADS
+
+
+def test_two_thousand_pings_end_a_connection(plain: PageServer) -> None:
+    with dial(plain) as page, pytest.raises(ConnectionClosed):
+        for _ in range(2000):
+            page.ping()
+        closed_with(page)
+        page.ping()
+
+
+def test_a_bucket_is_paid_for_by_waiting() -> None:
+    now = [0.0]
+    bucket = Bucket(rate=10.0, size=20.0, now=lambda: now[0])
+    assert [bucket.take(1.0) for _ in range(20)] == [0.0] * 20
+    assert bucket.take(1.0) == pytest.approx(0.1)
+    now[0] += 0.1
+    assert bucket.take(0.0) == 0.0
+    now[0] += 100.0
+    assert bucket.take(20.0) == 0.0 and bucket.take(1.0) > 0.0
+
+
+def test_who_drags_never_waits_and_who_floods_is_ended() -> None:
+    now = [0.0]
+    spent = Budget(lambda: now[0])
+    for _ in range(10 * 100):  # a minute of dragging and turning at once is no more than this per second
+        now[0] += 0.01
+        assert spent.wait(300) == 0.0
+    flooded = 0
+    while not spent.spent:
+        now[0] += spent.wait(300)
+        flooded += 1
+        assert flooded < budget.BURST + 1.5 * budget.PATIENCE * budget.MESSAGES
+
+
+def test_files_that_are_complete_hold_nothing() -> None:
+    spent = Budget(lambda: 0.0)
+    assert all(spent.uploads(budget.UPLOADS // 5, lambda: 0) for _ in range(20))
+    full = Budget(lambda: 0.0)
+    assert not all(full.uploads(budget.UPLOADS // 5, lambda: budget.UPLOADS) for _ in range(6))
+
+
+def test_the_silent_make_room() -> None:
+    crowd, left = Crowd(total=4, per_address=2), []
+    for key in "ab":
+        assert crowd.enter(key, "1", lambda key=key: left.append(key))
+    crowd.spoke("b")
+    assert crowd.enter("c", "1", lambda: left.append("c"))
+    assert left == ["a"]  # the oldest that is silent
+    crowd.spoke("c")
+    assert not crowd.enter("d", "1", lambda: None)  # everybody here is somebody
+    assert crowd.enter("e", "2", lambda: left.append("e")) and crowd.enter("f", None, lambda: None)
+    assert crowd.enter("g", "3", lambda: None)
+    assert left == ["a", "e"] and len(crowd) == 4
+    assert not crowd.comes_from("f", "1")
+    crowd.leave("c")
+    assert crowd.comes_from("f", "1")
+
+
+def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    private.self_test(Guard(Door()))
+    changed = web.serve
+
+    def without(*given: Any, process_request: object = None, **keywords: Any) -> Any:
+        return changed(*given, **keywords)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(web, "serve", without)  # the answer is no longer asked of us
+        with pytest.raises(InputError, match=r"viser .*how it serves"):
+            private.self_test(Guard(Door()))
+    for gone in ("FileTransferPart", "GuiUpdateMessage"):
+        with monkeypatch.context() as patch:
+            patch.delattr(_messages, gone)
+            with pytest.raises(InputError, match=gone):
+                private.open_server("127.0.0.1", 0, Guard(Door()))
+    opened: list[Any] = []
+    with monkeypatch.context() as patch:
+        stop = private.stop
+        patch.setattr(private, "stop", lambda server: (opened.append(server.get_port()), stop(server)))
+        patch.setattr(private, "_OF_A_SERVER", ("gui._thread_pool",))
+        with pytest.raises(InputError, match="_thread_pool"):
+            private.open_server("127.0.0.1", 0, Guard(Door()))
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(f"http://127.0.0.1:{opened[0]}", timeout=5)
+
+
+def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    from app.server import server as module
+
+    made: list[Any] = []
+
+    class Sessions(module.Sessions):
+        def __init__(self, *given: Any) -> None:
+            super().__init__(*given)
+            made.append(self)
+            self.enter([])
+
+    monkeypatch.setattr(module, "Sessions", Sessions)
+    monkeypatch.setattr(private, "open_server", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        PageServer(SceneChoice("planar3-hold"), port=0)
+    (sessions,) = made
+    assert sessions.enter([]) is None and not sessions.learners
+
+
+def test_whoever_needs_longer_than_the_handshake_is_let_go(plain: PageServer) -> None:
+    """A connection without a request holds nothing for long."""
+    with socket.create_connection((urlsplit(plain.url).hostname, urlsplit(plain.url).port)) as silent:
+        silent.settimeout(LONG)
+        assert silent.recv(1) == b""
+
+
+def test_what_the_wire_says_is_what_viser_reads() -> None:
+    """`browsing/wire.py` speaks viser's own format."""
+    message = _messages.Message.deserialize(pack(camera()))
+    assert isinstance(message, _messages.ViewerCameraMessage)
+    assert msgspec.msgpack.decode(pack(camera()))["type"] == "ViewerCameraMessage"
