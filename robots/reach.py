@@ -13,6 +13,7 @@ import placo
 from lxml import etree
 
 from robots.robot import Robot
+from robots.urdf.read import without_shapes
 
 POSITION_TOLERANCE = 2e-3  # m
 ROTATION_TOLERANCE = np.radians(1.0)  # rad
@@ -40,7 +41,7 @@ class ReachJudge:
         self.robot = robot
         with tempfile.TemporaryDirectory(prefix="himpc-reach-") as folder:
             path = Path(folder) / "robot.urdf"
-            path.write_text(_bare_urdf(robot.urdf_text))
+            path.write_text(without_shapes(etree.fromstring(robot.urdf_text.encode())))
             self._wrapper = placo.RobotWrapper(str(path), placo.Flags.ignore_collisions)
         self._data = robot.model.createData()
         margin = 1e-4
@@ -155,12 +156,3 @@ def _judge_of(robot: Robot) -> ReachJudge:
 
 def _residual(result: ReachResult) -> float:
     return result.position_error / POSITION_TOLERANCE + result.rotation_error / ROTATION_TOLERANCE
-
-
-def _bare_urdf(text: str) -> str:
-    """The URDF without shapes, which the solver has no use for."""
-    root = etree.fromstring(text.encode())
-    for link in root.findall("link"):
-        for shape in (*link.findall("visual"), *link.findall("collision")):
-            link.remove(shape)
-    return etree.tostring(root, encoding="unicode")

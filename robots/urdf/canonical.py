@@ -17,7 +17,7 @@ from robots.report import Finding, ImportReport
 from robots.urdf.inertials import repair_inertials
 from robots.urdf.joints import normalise_joints
 from robots.urdf.limits import fill_efforts, fill_speeds
-from robots.urdf.read import Refusal, parse
+from robots.urdf.read import Refusal, parse, without_shapes
 from robots.urdf.structure import check_structure, movable_joints
 
 MAX_JOINTS = 20
@@ -92,7 +92,7 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
 def _model(root: Element) -> pin.Model:
     """The Pinocchio model of a repaired tree. Raises Refusal for what Pinocchio cannot take."""
     try:
-        model = pin.buildModelFromXML(etree.tostring(root, encoding="unicode"))
+        model = pin.buildModelFromXML(without_shapes(root))
     except (ValueError, RuntimeError) as error:
         reason = shortened(next(iter(str(error).strip().splitlines()), type(error).__name__), 100)
         raise Refusal("robot", f"Pinocchio cannot build it ({reason})") from None

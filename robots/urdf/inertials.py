@@ -98,7 +98,7 @@ def _repair_link(link: Element) -> Iterator[Finding]:
         fault = "a negative moment" if moments[0] <= 0.0 else "A + B < C"
         text = f"impossible principal moments {listed} kg·m² ({fault}); the nearest possible ones were used"
         yield Finding("repaired", label(link), text)
-    if physical is not inertia:
+    if physical is not inertia or not all(inertial.find("inertia").get(key) for key in _KEYS):
         _write_inertia(inertial, physical)
     return mass
 

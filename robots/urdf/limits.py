@@ -16,23 +16,24 @@ from robots.urdf.read import Refusal, child, label, numbers
 from robots.urdf.structure import movable_joints
 
 _SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: brisk but safe for an arm nobody described
+_LEAST = 1e-6  # rad/s, N·m: a smaller limit is none, nothing moves with it
 _LEVER = 3.0  # effort = this times what holding still against gravity can need
 _ACCELERATION = 10.0  # rad/s², m/s²: and at least enough to accelerate the joint like this
 
 
 def fill_speeds(root: Element) -> Iterator[Finding]:
-    """Fills missing, zero and negative velocity limits and marks such effort limits with 0."""
+    """Fills missing, vanishing and negative velocity limits and marks such effort limits with 0."""
     for joint in movable_joints(root):
         limit = child(joint, "limit")
         if limit is None:
             limit = etree.SubElement(joint, "limit")
         try:
-            if float(numbers(limit, "velocity", 1, (0.0,))[0]) <= 0.0:
+            if float(numbers(limit, "velocity", 1, (0.0,))[0]) < _LEAST:
                 speed = float(_SPEED[joint.get("type", "")])
                 limit.set("velocity", repr(speed))
                 unit = "m/s" if joint.get("type") == "prismatic" else "rad/s"
                 yield Finding("filled", label(joint), f"no velocity limit; {speed:.3g} {unit} was used")
-            if float(numbers(limit, "effort", 1, (0.0,))[0]) <= 0.0:
+            if float(numbers(limit, "effort", 1, (0.0,))[0]) < _LEAST:
                 limit.set("effort", "0")
         except Refusal as refusal:
             yield refusal.finding

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,8 @@ from robots.report import Finding
 
 MAX_BYTES = 10_000_000
 _LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: beyond, sums of inertias lose all digits
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+"""What the readers of URDF in C++ take for a number; Python takes more."""
 _XACRO_HINT = "; is this a xacro file? Run `xacro FILE > robot.urdf` first"
 
 
@@ -90,13 +94,17 @@ def numbers(
     if text is None or not text.strip():
         if default is None:
             raise Refusal(where, f"{name} is missing; it needs {count} number{'s' * (count > 1)}")
+        if text is not None:
+            del element.attrib[attribute]  # to other readers an empty number is no number
         return np.array(default, dtype=float)
+    words = text.split()
     try:
-        values = [float(word) for word in text.split()]
+        values = [float(word) for word in words]
     except ValueError:
         hint = _XACRO_HINT if "${" in text else ""
         raise Refusal(where, f"{name} is '{shortened(text)}', not {_count(count)}{hint}") from None
-    if len(values) != count or not all(math.isfinite(value) for value in values):
+    known = len(words) == count and all(_NUMBER.fullmatch(word) for word in words)
+    if not known or not all(math.isfinite(value) for value in values):
         raise Refusal(where, f"{name} is '{shortened(text)}', not {_count(count)}")
     if max(abs(value) for value in values) > _LARGEST.get(attribute, 1e9):
         raise Refusal(where, f"{name} is '{shortened(text)}', beyond anything physical; check its unit")
@@ -106,6 +114,18 @@ def numbers(
 def child(element: Element, tag: str) -> Element | None:
     """The first direct child with this tag."""
     return element.find(tag)
+
+
+def without_shapes(root: Element) -> str:
+    """The document without what is only looked at: no reader of kinematics has use for it."""
+    bare = copy.deepcopy(root)
+    for material in bare.findall("material"):
+        bare.remove(material)
+    for link in bare.findall("link"):
+        for tag in ("visual", "collision"):
+            for shape in link.findall(tag):
+                link.remove(shape)
+    return etree.tostring(bare, encoding="unicode")
 
 
 def named(root: Element, tag: str) -> dict[str, Element]:
@@ -131,4 +151,5 @@ def _count(count: int) -> str:
 
 
 def _first_line(error: Exception) -> str:
-    return shortened(str(error).strip().splitlines()[0], 150) if str(error).strip() else type(error).__name__
+    text = str(getattr(error, "msg", error)).strip()
+    return shortened(text.splitlines()[0], 150) if text else type(error).__name__

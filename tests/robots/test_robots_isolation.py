@@ -1,0 +1,124 @@
+"""Work on strangers' files: whatever happens to it is one sentence, and nothing is left behind."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import misbehaving
+import psutil
+import pytest
+from arms import two_joint_arm
+from hostile import chain
+
+from robots import InputError, check_urdf, isolation, load_robot, load_urdf_text
+from robots.isolation import Fault, isolated
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (misbehaving.crash, "SIGSEGV"),
+        (misbehaving.eat, "1 GB of memory"),
+        (misbehaving.descend, "too deeply"),
+    ],
+)
+def test_a_crash_is_a_sentence(work, words: str) -> None:
+    with pytest.raises(Fault, match=words):
+        isolated(work)
+
+
+def test_the_deadline_is_a_sentence(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(isolation, "DEADLINE", 2.0)
+    with pytest.raises(Fault, match="takes longer"):
+        isolated(misbehaving.stay, str(tmp_path / "pid"))
+
+
+def test_what_libraries_print_does_not_spoil_the_answer() -> None:
+    assert isolated(misbehaving.chatter) == "heard"
+
+
+def test_it_dies_with_its_parent(tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    code = (
+        f"import misbehaving; from robots.isolation import isolated as i; i(misbehaving.stay, {str(file)!r})"
+    )
+    path = os.pathsep.join(filter(None, sys.path))
+    with subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": path}) as parent:
+        while not (file.exists() and file.read_text()):
+            assert parent.poll() is None
+            time.sleep(0.02)
+        parent.kill()
+    child = int(file.read_text())
+    end = time.monotonic() + 5.0
+    while psutil.pid_exists(child) and psutil.Process(child).status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < end, "the importer outlived its parent by 5 s"
+        time.sleep(0.02)
+
+
+def test_a_daemonic_process_may_load() -> None:
+    """A simulation is one, and may not have children of `multiprocessing`."""
+    context = multiprocessing.get_context("spawn")
+    answers = context.Queue()
+    for text, expected in ((two_joint_arm(), 2), (chain(21), "21 moving joints")):
+        process = context.Process(target=misbehaving.load_in_a_daemon, args=(text, answers), daemon=True)
+        process.start()
+        answer = answers.get(timeout=60.0)
+        process.join()
+        assert answer == expected or str(expected) in str(answer)
+
+
+def test_check_and_load_go_the_same_way(tmp_path: Path) -> None:
+    for text in (two_joint_arm(), chain(10_000, "fixed"), chain(60), ""):
+        file = tmp_path / "arm.urdf"
+        file.write_text(text)
+        report = check_urdf(file)
+        try:
+            robot = load_robot(file)
+        except InputError as error:
+            assert not report.usable
+            assert report.of_kind("refused")[0].text in str(error)
+        else:
+            assert robot.report == report
+
+
+def test_a_crash_while_loading_is_reported_and_refused(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("robots.load.import_robot", lambda *_: None)  # no process can be sent this
+    monkeypatch.setattr("robots.load.isolated", _faulty)
+    file = tmp_path / "arm.urdf"
+    file.write_text(two_joint_arm())
+    assert "SIGBUS" in str(check_urdf(file).findings)
+    with pytest.raises(InputError, match="SIGBUS"):
+        load_urdf_text(two_joint_arm())
+
+
+def _faulty(*_: object) -> None:
+    raise Fault("reading it ended the importer (SIGBUS)")
+
+
+@pytest.mark.parametrize(
+    "path", ["a" * 100_000, "/" + "b/" * 50_000 + "c.urdf", "nul\0byte.urdf", "/dev/zero"]
+)
+def test_a_path_that_is_none_is_answered_briefly(path: str) -> None:
+    for use in (load_robot, check_urdf):
+        with pytest.raises(InputError) as caught:
+            use(path)
+        assert len(str(caught.value)) < 400
+        assert str(caught.value).isprintable()
+
+
+def test_an_unknown_tip_is_answered_briefly() -> None:
+    with pytest.raises(InputError) as caught:
+        load_urdf_text(two_joint_arm(), "n" * 100_000)
+    assert len(str(caught.value)) < 400
+    with pytest.raises(InputError, match="did you mean 'l2'"):
+        load_urdf_text(two_joint_arm(), "l22")
+
+
+def test_text_that_cannot_be_encoded_is_refused() -> None:
+    with pytest.raises(InputError):
+        load_urdf_text("\ud800" + two_joint_arm())
