@@ -10,7 +10,7 @@ from logging import getLogger
 from pathlib import Path
 from typing import Any
 
-from numba import boolean, float64, intp, njit
+from numba import boolean, float64, int64, intp, njit, types
 from numba.core import config, event
 
 try:
@@ -20,8 +20,10 @@ except ImportError:  # a system without it: two processes may then compile the s
 
 NUMBER, WHOLE, FLAG = float64, intp, boolean
 VECTOR, MATRIX, MATRICES, FRAMES = float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, :, ::1]
-INDICES, FLAGS = intp[::1], boolean[:, ::1]
+INDICES, TABLE, FLAGS = intp[::1], int64[:, ::1], boolean[:, ::1]
 """Arrays of our own, contiguous."""
+FIXED, FIXED_VECTOR = types.Array(float64, 2, "C", readonly=True), types.Array(float64, 1, "C", readonly=True)
+"""The same, not to be written to."""
 GIVEN, GIVEN_MATRIX, GIVEN_MATRICES = float64[:], float64[:, :], float64[:, :, :]
 GIVEN_INDICES = intp[:]
 """What others hand over: it may be a slice."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from himpc.htmpc.clearance import Clearances, CollisionModel
 from himpc.htmpc.geometry import Placed
 from himpc.htmpc.prediction import integrator
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.rows import Rows, Table
 
 Array = NDArray[np.float64]
 
@@ -36,10 +36,11 @@ class Avoidance:
         """Pairs near enough to matter at some configurations."""
         return self.model.between(joints, self.margin + _LOOK, gradients)
 
-    def rows(self, near: Clearances, N: int, dt: float) -> Rows:
-        """The linearised constraint on the change d of the inputs, one row per pair and knot."""
-        T_q = integrator(N, dt).T_q
-        A = (T_q[near.knot][:, :, None] * near.gradient[:, None, :]).reshape(len(near.knot), -1)
+    def rows(self, near: Clearances, N: int, dt: float, table: Table | None = None, place: int = 0) -> Rows:
+        """The linearised constraint on the change d of the inputs, one row per pair and knot; from a place
+        in a table on."""
+        table = Table(N * near.gradient.shape[1]) if table is None else table
+        A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance
         free = np.full(len(room), np.inf)
         return Rows(A, room, free, np.full(len(room), 7), near.knot + 1, np.arange(len(room)))

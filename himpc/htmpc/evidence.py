@@ -38,7 +38,8 @@ def evidence(level: Tracking, solved: Solved, final: Iterate, joints: tuple[str,
 
 
 def _binding(name: str, rows: Rows, multipliers: Array, joints: tuple[str, ...]) -> tuple[Binding, ...]:
-    felt = np.flatnonzero(np.abs(multipliers[: len(rows.A)]) > _FELT)
+    multipliers = multipliers[: len(rows.kind)]
+    felt = np.flatnonzero(np.abs(multipliers) > _FELT)
     found: list[Binding] = []
     for row in felt.tolist():
         kind, part = KINDS[rows.kind[row]], int(rows.part[row])

@@ -175,6 +175,12 @@ class Frames(NamedTuple):
 def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
     """A frame of the robot, the tip for an empty name, where its joints are as given."""
     tree = geometry(robot)
+    return Frames(*_frame(tree.moves, tree.turns, *where, *_mounted(robot, name)))
+
+
+@lru_cache(maxsize=256)
+def _mounted(robot: Robot, name: str) -> tuple[int, Array, Array]:
+    """The joint that carries a frame, and the frame's axes and origin in the joint's."""
     frame = robot.model.frames[robot.frame_id(name or robot.tip)]
-    turn, shift = np.ascontiguousarray(frame.placement.rotation), np.array(frame.placement.translation)
-    return Frames(*_frame(tree.moves, tree.turns, *where, frame.parentJoint, turn, shift))
+    place = frame.placement
+    return frame.parentJoint, np.ascontiguousarray(place.rotation), np.array(place.translation)

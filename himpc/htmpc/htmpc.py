@@ -19,7 +19,7 @@ from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
 from himpc.htmpc.problem import Problem, Tick
-from himpc.htmpc.rows import held, limit_rows
+from himpc.htmpc.rows import Table, held, limit_rows
 from himpc.htmpc.safety import commandable, permitted, plausible
 from himpc.htmpc.settings import HTMPCSettings, bounds, efforts
 from himpc.htmpc.sqp import Solved, solve_level
@@ -75,6 +75,7 @@ class HTMPC:
         self._hold = self._held(active, settings)
         self._levels = tuple(form for level, form in every if level in active)
         self._bounds = limits
+        self._table = Table(settings.horizon * robot.n)
         self._effort = Effort(weights, settings.horizon, settings.dt)
         self._avoidance = None if collision.empty else Avoidance(collision, settings.margin_m)
         self._tasks = tasks
@@ -139,14 +140,14 @@ class HTMPC:
         settings, limits = self._settings, self._bounds
         N, dt, period = settings.horizon, settings.dt, settings.period
         past, hold = self._past, self._hold
-        rows = limit_rows(start, N, dt, period, limits)
+        rows = limit_rows(start, N, dt, period, limits, self._table)
         plan = (
             shifted(past[-1], self._since, N, dt, limits) if past else braking(start, N, dt, period, limits)
         )
         if hold.size:
             brake = braking(start, N, dt, period, limits)
             plan[:, hold] = brake[:, hold]
-            rows = held(rows, brake, hold)
+            rows = held(rows, brake, hold, self._table)
         return Tick(
             robot=self.robot,
             data=self._data,
@@ -159,6 +160,7 @@ class HTMPC:
             plan=plan,
             avoidance=self._avoidance,
             method=self._method,
+            table=self._table,
         )
 
     def _solve(self, tick: Tick) -> list[Solved]:

@@ -19,6 +19,8 @@ from himpc.tasks.frame import FrameTask
 from robots import InputError, Robot
 
 Array = NDArray[np.float64]
+Desired = list[Array] | Array
+"""r of (6), knot by knot."""
 Base = Literal["holonomic", "unicycle"]
 UNICYCLE = (
     "base is 'unicycle': its G(q) depends on the heading, and the condensed prediction needs G = I; "
@@ -66,10 +68,10 @@ class Knots:
         """Where all joints are."""
         return placed(geometry(self._robot), self._q)
 
-    def errors(self, task: Task, desired: list[Array]) -> Array:
+    def errors(self, task: Task, desired: Desired) -> Array:
         """e = x − r of (6) at every knot, (K, m)."""
         if isinstance(task, FramePosition):
-            return self._frame(task.frame).p[:, task.components] - np.array(desired)
+            return self._frame(task.frame).p[:, task.components] - np.asarray(desired)
         pairs = zip(self._knots, desired, strict=True)
         return np.array([task.error(task.value(knot), goal) for knot, goal in pairs])
 
@@ -121,7 +123,7 @@ class Knot(Configuration):
         return pin.SE3(found.R[self._place], found.p[self._place])
 
 
-def desired_values(task: Task, preview: Preview, N: int) -> list[Array]:
+def desired_values(task: Task, preview: Preview, N: int) -> Desired:
     """r of (6) at knots 0 … N.
 
     Raises:
@@ -132,7 +134,7 @@ def desired_values(task: Task, preview: Preview, N: int) -> list[Array]:
             f"the preview of task '{task.name}' has {len(preview.displacement)} knots, not {N + 1}"
         )
     if preview.value.ndim == 1:
-        return list(preview.value + preview.displacement)
+        return preview.value + preview.displacement
     turn = np.zeros((N + 1, 3))
     turn[:, task.components if isinstance(task, FrameTask) else slice(0, 3)] = preview.displacement
     return [exp3(each) @ preview.value for each in turn]

@@ -141,6 +141,9 @@ def shifted(before: Motion, s: float, N: int, dt: float, bounds: Bounds) -> Arra
         end = Start(before.position(len(before.U) * before.dt), V[-1], before.U[-1])
         tail = braking(end, missing, before.dt, before.dt, bounds)
         V = np.vstack([V, velocities(end, tail, before.dt)])
+    whole = round(s / dt)
+    if dt == before.dt and abs(s - whole * dt) < 1e-12:
+        return np.diff(V[whole : whole + N + 1], axis=0) / dt
     old = before.dt * np.arange(len(V))
     new = s + dt * np.arange(N + 1)
     sampled = np.array([np.interp(new, old, column) for column in V.T]).T

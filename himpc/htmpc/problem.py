@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,19 +13,22 @@ from numpy.typing import NDArray
 from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import PENALTY, Avoidance
 from himpc.htmpc.clearance import Clearances
-from himpc.htmpc.cost import Effort, barrier, barrier_value
-from himpc.htmpc.kinematics import Knots
-from himpc.htmpc.prediction import Start, braking, positions
-from himpc.htmpc.rows import Rows, joined
+from himpc.htmpc.cost import Effort, barrier, barrier_value, gauss_newton
+from himpc.htmpc.kinematics import Desired, Knots
+from himpc.htmpc.prediction import Start, braking, integrator, positions
+from himpc.htmpc.rows import KINDS, Rows, Table
 from himpc.htmpc.settings import Bounds, HTMPCSettings
 from himpc.htmpc.tracking import Guard, Tracking
 from robots import Robot
 
 Array = NDArray[np.float64]
+_Part = tuple[NDArray[Any], ...]
+"""Bounds and labels of some rows."""
 
 PROXIMAL = 0.03
 """Share of the effort weights that the proximal form has. It only damps: with the full weights a level keeps
 errors of centimetres late in its horizon, which (12) then grants to the levels below."""
+_LEXICOGRAPHIC = KINDS.index("lexicographic")
 _RIDGE = 1e-8
 """Keeps the Hessian positive definite when effort weights are set to zero."""
 
@@ -44,25 +48,32 @@ class Tick:
         plan: the shifted previous plan, (N, n).
         avoidance: (7c), None if there is nothing to avoid.
         method: solves the QPs; it remembers the last one of a level.
+        table: has room for all rows; `rows` are its first.
     """
 
     robot: Robot
     data: pin.Data
     settings: HTMPCSettings
     start: Start
-    desired: dict[str, list[Array]]
+    desired: dict[str, Desired]
     effort: Effort
     rows: Rows
     bounds: Bounds
     plan: Array
     avoidance: Avoidance | None
-    method: ActiveSet = field(default_factory=ActiveSet)
+    method: ActiveSet
+    table: Table
 
     @cached_property
     def brake(self) -> Array:
         """Inputs that stop the robot, (N, n); what is left when bounds contradict each other."""
         settings = self.settings
         return braking(self.start, settings.horizon, settings.dt, settings.period, self.bounds)
+
+    @cached_property
+    def rest(self) -> tuple[float, Array]:
+        """Value and gradient (N·n,) of (10) without inputs."""
+        return self.effort.absolute(self.start, np.zeros_like(self.plan))
 
     def iterate(self, U: Array) -> Iterate:
         """Inputs (N, n) with what follows from them."""
@@ -87,9 +98,9 @@ class Iterate:
         return self._errors[level.name]
 
     def jacobian(self, level: Tracking) -> Array:
-        """∂e/∂u, (N, m, N·n)."""
+        """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
         if level.name not in self._jacobians:
-            self._jacobians[level.name] = level.jacobian(self.knots, self.tick.settings.dt)
+            self._jacobians[level.name] = level.jacobian(self.knots)
         return self._jacobians[level.name]
 
     @cached_property
@@ -156,35 +167,59 @@ class Problem:
 
     def model(self, at: Iterate) -> tuple[Array, Array]:
         """Hessian (k, k), Gauss-Newton for the errors, and gradient (k,) with respect to the inputs."""
-        e, E = at.errors(self.level), at.jacobian(self.level)
-        k = E.shape[-1]
-        rows = E.reshape(-1, k)
-        weighted = rows * self.level.Q.reshape(-1, 1)
-        H = (1.0 if self.absolute else PROXIMAL) * self.tick.effort.hessian + weighted.T @ rows
-        g = weighted.T @ e.ravel() + self._effort(at.U)[1]
+        tick, N, dt = self.tick, self.tick.settings.horizon, self.tick.settings.dt
+        H, g = gauss_newton(
+            *(at.jacobian(self.level), self.level.Q, at.errors(self.level), integrator(N, dt).T_q),
+            *(tick.effort.hessian, 1.0 if self.absolute else PROXIMAL, _RIDGE),
+        )
+        g = g + self._effort(at.U)[1]
         if self.softened:
             _, slope, curvature = barrier(self._soft_rows(at), at.U.ravel())
             H, g = H + curvature, g + slope
-        H[np.diag_indices(k)] += _RIDGE
         return H, g
 
     def rows(self, at: Iterate, slopes: Iterate | None = None) -> Rows:
         """The QP's rows for the change d of the inputs, without those that are softened.
 
         With `slopes` they lead back: the guards' rows are strict, and have the Jacobians of that iterate.
+        They are views of the tick's table; the next call fills it anew behind the rows of (7d).
         """
-        per_coordinate = self.tick.settings.lexicographic == "per_coordinate"
-        parts: list[Rows] = []
-        for guard in self.guards:
-            e, E = at.errors(guard.tracking), (slopes or at).jacobian(guard.tracking)
-            parts.append(guard.rows(e, E, per_coordinate, strict=slopes is not None))
+        tick = self.tick
+        first = place = len(tick.rows.A)
+        parts: list[_Part] = []
         if not self.softened:
-            parts.insert(0, self.tick.rows.about(at.U.ravel()))
-            if at.near is not None and len(at.near.knot) and self.guards:
-                # Below the first level the depth reached is kept: the rows contain d = 0.
-                rows = self._avoidance_rows(at)
-                parts.append(rows.widened(np.zeros(at.U.size)))
-        return joined(*parts) if parts else self.tick.rows.take(np.zeros(len(self.tick.rows.A), bool))
+            limits, first = tick.rows.about(at.U.ravel()), 0
+            parts.append(limits[1:])
+        for guard in self.guards:
+            bounds = self._guarded(guard, place, at, slopes)
+            parts.append(bounds)
+            place += len(bounds[0])
+        if not self.softened and at.near is not None and len(at.near.knot) and self.guards:
+            # Below the first level the depth reached is kept: the rows contain d = 0.
+            rows = self._avoidance_rows(at, place)
+            parts.append(rows.widened(np.zeros(at.U.size))[1:])
+            place += len(rows.A)
+        return _stacked(tick.table.A[first:place], *parts)
+
+    def _guarded(self, guard: Guard, place: int, at: Iterate, slopes: Iterate | None) -> _Part:
+        """Writes (12) or (11) for a level above into the table; returns its bounds and labels."""
+        settings, table, strict = self.tick.settings, self.tick.table, slopes is not None
+        N, T_q = settings.horizon, integrator(settings.horizon, settings.dt).T_q
+        e, J = at.errors(guard.tracking), (slopes or at).jacobian(guard.tracking)
+        if settings.lexicographic == "per_coordinate":
+            knots, parts = np.divmod(np.arange(e.size), e.shape[1])
+            if not strict:  # else they are there
+                table.spread(place, knots, J.reshape(e.size, -1), T_q)
+            return *guard.room(e, strict), np.full(e.size, _LEXICOGRAPHIC), knots + 1, parts
+        pull = np.einsum("km,kmj->kj", guard.tracking.Q * e, J)
+        table.reserve(place + 1)
+        table.A[place] = (T_q.T @ pull).ravel()
+        bounds = np.array([-np.inf]), np.array([guard.gap(e, strict)])
+        return *bounds, np.array([_LEXICOGRAPHIC]), np.array([N]), np.array([0])
+
+    def both(self, rows: Rows, slack: Rows) -> Rows:
+        """`rows` and `slack_rows` of the same iterate: they stand side by side in the table."""
+        return _stacked(self.tick.table.A[: len(rows.A) + len(slack.A)], rows[1:], slack[1:])
 
     @property
     def unchanging(self) -> int:
@@ -198,7 +233,7 @@ class Problem:
         """(7c) for the first level, whose violation it buys; None if nothing is near."""
         if not self.forced or at.near is None or not len(at.near.knot):
             return None
-        return self._avoidance_rows(at)
+        return self._avoidance_rows(at, len(self.tick.rows.A))
 
     def allowed(self, at: Iterate, share: float = 1.0) -> bool:
         """(13): whether no level above has got worse by more than (a share of) its tolerance."""
@@ -212,18 +247,30 @@ class Problem:
     def _effort(self, U: Array) -> tuple[float, Array]:
         effort = self.tick.effort
         if self.absolute:
-            return effort.absolute(self.tick.start, U)
+            return effort.about(self.tick.rest, U)
         value, slope = effort.relative(U, self.tick.plan)
         return PROXIMAL * value, PROXIMAL * slope
 
-    def _avoidance_rows(self, at: Iterate) -> Rows:
-        avoidance, settings = self.tick.avoidance, self.tick.settings
+    def _avoidance_rows(self, at: Iterate, place: int) -> Rows:
+        avoidance, tick = self.tick.avoidance, self.tick
         assert avoidance is not None
         assert at.near is not None
-        return avoidance.rows(at.near, len(at.U), settings.dt)
+        return avoidance.rows(at.near, len(at.U), tick.settings.dt, tick.table, place)
 
     def _soft_rows(self, at: Iterate) -> Rows:
         if at.near is None or not len(at.near.knot):
             return self.tick.rows
-        rows = self._avoidance_rows(at)
-        return joined(self.tick.rows, rows._replace(lower=rows.lower + rows.A @ at.U.ravel()))
+        place = len(self.tick.rows.A)
+        rows = self._avoidance_rows(at, place)
+        every = self.tick.table.A[: place + len(rows.A)]
+        moved = rows._replace(lower=rows.lower + rows.A @ at.U.ravel())
+        return _stacked(every, self.tick.rows[1:], moved[1:])
+
+
+def _stacked(A: Array, *parts: _Part) -> Rows:
+    """Rows whose bounds and labels come in parts."""
+    if not parts:
+        nothing = np.zeros(0, np.int64)
+        return Rows(A, np.zeros(0), np.zeros(0), nothing, nothing, nothing)
+    lower, upper, kind, knot, part = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Rows(A, lower, upper, kind, knot, part)

@@ -7,19 +7,30 @@ the jerk bound, "stop" rows room to stop before a position bound.
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.cascade.compiled import (
+    FIXED,
+    FIXED_VECTOR,
+    INDICES,
+    MATRIX,
+    NUMBER,
+    TABLE,
+    VECTOR,
+    WHOLE,
+    compiled,
+)
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.settings import Bounds
 
 Array = NDArray[np.float64]
 KINDS = ("velocity", "position", "acceleration", "jerk", "ramp", "stop", "lexicographic", "collision")
 
+_RAMP_STEPS = 10
+"""The input is taken back within at most this many knots beyond the horizon."""
 _STOP_STEPS = 40
 """Braking is watched for at most this many knots beyond the horizon."""
 
@@ -73,115 +84,156 @@ def joined(*parts: Rows) -> Rows:
     )
 
 
-class _Frame(NamedTuple):
-    """The part of the rows that depends on (N, Δt, n) only: A, and the labels."""
+class Table:
+    """Room for all rows of a controller: one array, filled anew at every step. Rows are views of it."""
 
-    A: Array
-    kind: NDArray[np.int64]
-    knot: NDArray[np.int64]
-    part: NDArray[np.int64]
+    def __init__(self, columns: int) -> None:
+        """columns: N·n."""
+        self.A = np.zeros((0, columns))
+        self.bounds = np.zeros((2, 0))
+        self.labels = np.zeros((3, 0), np.int64)
+
+    def reserve(self, count: int) -> None:
+        """Room for that many rows; those that are there stay."""
+        missing = count - len(self.A)
+        if missing > 0:
+            self.A = np.vstack([self.A, np.zeros((missing + 100, self.A.shape[1]))])
+            self.bounds = np.hstack([self.bounds, np.zeros((2, missing + 100))])
+            self.labels = np.hstack([self.labels, np.zeros((3, missing + 100), np.int64)])
+
+    def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
+        """From a place on, the rows whose values at knots (r,) have slopes (r, n) in q; returns them."""
+        self.reserve(place + len(knot))
+        _spread(self.A, place, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)
+        return self.A[place : place + len(knot)]
 
 
-@lru_cache(maxsize=16)
-def _frame(N: int, dt: float, n: int) -> _Frame:
-    matrices = integrator(N, dt)
-    eye = np.eye(n)
-    blocks = [np.kron(each, eye) for each in (matrices.T_v, matrices.T_q, np.eye(N), matrices.D)]
-    knots = np.repeat(np.arange(N), n)
-    return _Frame(
-        np.asarray(np.vstack(blocks), np.float64),
-        np.repeat(np.arange(4), N * n),
-        np.concatenate([knots + 1, knots + 1, knots, knots]),
-        np.tile(np.arange(n), 4 * N),
-    )
+@compiled(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
+def _spread(A: Array, place: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
+    n = slopes.shape[1]
+    for r in range(len(knot)):
+        for s in range(len(T_q)):
+            for j in range(n):
+                A[place + r, s * n + j] = T_q[knot[r], s] * slopes[r, j]
 
 
-def limit_rows(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> Rows:
-    """All rows that bounds of this tick can make binding.
+def limit_rows(
+    start: Start, N: int, dt: float, period: float, bounds: Bounds, table: Table | None = None
+) -> Rows:
+    """All rows that bounds of this tick can make binding, in a table, from its beginning on.
 
     A row is left out when no inputs inside the input bounds can reach its bound.
     """
     n = len(start.v)
-    frame, matrices = _frame(N, dt, n), integrator(N, dt)
-    drift = (start.q + matrices.t[:, None] * start.v).ravel()
-    resting = np.tile(start.v, N)
-    a, v, tile = np.tile(bounds.a, N), np.tile(bounds.v, N), np.tile
-    change = np.vstack([bounds.j * min(period, dt), np.tile(bounds.j * dt, (N - 1, 1))]).ravel()
-    before = np.zeros((N, n))
-    before[0] = start.u
-    before = before.ravel()
-    lower = np.concatenate([-v - resting, tile(bounds.q_lower, N) - drift, -a, before - change])
-    upper = np.concatenate([v - resting, tile(bounds.q_upper, N) - drift, a, before + change])
-    reach = np.concatenate(
-        [
-            np.repeat(matrices.t, n) * a,
-            0.5 * np.repeat(matrices.t, n) ** 2 * a,
-            np.full(N * n, np.inf),
-            np.concatenate([bounds.a + np.abs(start.u), 2.0 * a[n:]]),
-        ]
-    )
-    bounded = np.isfinite(lower) | np.isfinite(upper)
-    near = bounded & ((upper < reach) | (lower > -reach))
-    limits = Rows(
-        frame.A[near], lower[near], upper[near], frame.kind[near], frame.knot[near], frame.part[near]
-    )
-    tails = [each for each in (_ramp(start, N, dt, bounds), _stop(start, N, dt, bounds)) if each is not None]
-    return joined(limits, *tails) if tails else limits
-
-
-def _ramp(start: Start, N: int, dt: float, bounds: Bounds) -> Rows | None:
-    """|v_N ± Δt (m u_{N−1} − j Δt m(m+1)/2)| ≤ v_max: speed while the input goes back to zero, m steps on."""
-    n, step = len(start.v), bounds.j * dt
-    T_v = integrator(N, dt).T_v[-1]
-    coefficients: list[tuple[int, int]] = [
-        (joint, m)
-        for joint in np.flatnonzero(np.isfinite(step) & np.isfinite(bounds.v) & (bounds.a > step)).tolist()
-        for m in range(1, min(math.ceil(bounds.a[joint] / step[joint]), 10) + 1)
-    ]
-    if not coefficients:
-        return None
-    A = np.zeros((len(coefficients), N, n))
-    room = np.empty(len(coefficients))
-    for row, (joint, m) in enumerate(coefficients):
-        A[row, :, joint] = T_v
-        A[row, -1, joint] += m * dt
-        room[row] = bounds.v[joint] + dt * step[joint] * m * (m + 1) / 2
-    joints = np.array([joint for joint, _ in coefficients])
-    return _labelled(A, -room - start.v[joints], room - start.v[joints], 4, N, joints)
-
-
-def _stop(start: Start, N: int, dt: float, bounds: Bounds) -> Rows | None:
-    """q_N + mΔt v_N ∓ ½a(mΔt)² inside the range: where full braking for m steps leads."""
-    n = len(start.v)
+    table = Table(N * n) if table is None else table
+    table.reserve((4 * N + _RAMP_STEPS + _STOP_STEPS) * n)
     matrices = integrator(N, dt)
-    T, a = float(matrices.t[-1]), bounds.a
-    usable = np.isfinite(a) & (np.isfinite(bounds.q_lower) | np.isfinite(bounds.q_upper))
-    fastest = np.minimum(bounds.v, np.abs(start.v) + a * T)
-    steps = dt * np.arange(1, _STOP_STEPS + 1)
-    with np.errstate(invalid="ignore"):
-        # Where q gets at most in m steps of braking, from the fastest motion that the input bounds permit.
-        far = 0.5 * a * T**2 + steps[:, None] * fastest - 0.5 * a * steps[:, None] ** 2
-        moving = steps[:, None] < fastest / a + dt
-    ahead = start.q + T * start.v
-    near = (ahead + far > bounds.q_upper) | (ahead - far < bounds.q_lower)
-    m, joints = np.nonzero(near & moving & usable)
-    if not m.size:
-        return None
-    A = np.zeros((m.size, N, n))
-    A[np.arange(m.size), :, joints] = matrices.T_q[-1] + steps[m, None] * matrices.T_v[-1]
-    brake = 0.5 * a[joints] * steps[m] ** 2
-    coasting = ahead[joints] + steps[m] * start.v[joints]
-    lower, upper = bounds.q_lower[joints] - brake, bounds.q_upper[joints] + brake
-    return _labelled(A, lower - coasting, upper - coasting, 5, N, joints)
+    q, v, u = (np.array(each, float) for each in start)
+    every = (bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j)
+    limits = (np.array(each, float) for each in every)
+    count = _limits(
+        *(matrices.T_v, matrices.T_q, matrices.t, q, v, u, *limits, period, dt),
+        *(table.A, table.bounds, table.labels),
+    )
+    return Rows(table.A[:count], *table.bounds[:, :count], *table.labels[:, :count])
 
 
-def _labelled(A: Array, lower: Array, upper: Array, kind: int, N: int, joints: NDArray[np.int64]) -> Rows:
-    rows = len(A)
-    return Rows(A.reshape(rows, -1), lower, upper, np.full(rows, kind), np.full(rows, N), joints)
+@compiled(
+    *(FIXED, FIXED, FIXED_VECTOR, VECTOR, VECTOR, VECTOR),
+    *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER),
+    *(MATRIX, MATRIX, TABLE),
+)
+def _limits(
+    T_v: Array,
+    T_q: Array,
+    t: Array,
+    q: Array,
+    v: Array,
+    u: Array,
+    q_lower: Array,
+    q_upper: Array,
+    v_max: Array,
+    a_max: Array,
+    j_max: Array,
+    period: float,
+    dt: float,
+    A: Array,
+    bounds: Array,
+    labels: NDArray[np.int64],
+) -> int:
+    N, n = len(t), len(q)
+    T, count = t[N - 1], 0
+    for kind in range(4):
+        for k in range(N):
+            for i in range(n):
+                a = a_max[i]
+                if kind == 0:
+                    middle, low, high, reach = v[i], -v_max[i], v_max[i], t[k] * a
+                elif kind == 1:
+                    middle, low, high = q[i] + t[k] * v[i], q_lower[i], q_upper[i]
+                    reach = 0.5 * t[k] ** 2 * a
+                elif kind == 2:
+                    middle, low, high, reach = 0.0, -a, a, np.inf
+                else:
+                    change = j_max[i] * (min(period, dt) if k == 0 else dt)
+                    middle, low, high = -u[i] if k == 0 else 0.0, -change, change
+                    reach = a + abs(u[i]) if k == 0 else 2.0 * a
+                low, high = low - middle, high - middle
+                if (np.isfinite(low) or np.isfinite(high)) and (high < reach or low > -reach):
+                    A[count] = 0.0
+                    if kind < 2:
+                        for s in range(k + 1):
+                            A[count, s * n + i] = T_v[k, s] if kind == 0 else T_q[k, s]
+                    else:
+                        A[count, k * n + i] = 1.0
+                        if kind == 3 and k > 0:
+                            A[count, (k - 1) * n + i] = -1.0
+                    bounds[0, count], bounds[1, count] = low, high
+                    labels[0, count], labels[1, count], labels[2, count] = kind, k + (kind < 2), i
+                    count += 1
+    # "ramp": |v_N ± Δt (m u_{N−1} − j Δt m(m+1)/2)| ≤ v_max, speed while the input goes back to zero.
+    for i in range(n):
+        step = j_max[i] * dt
+        if not (np.isfinite(step) and np.isfinite(v_max[i]) and a_max[i] > step):
+            continue
+        for m in range(1, int(min(np.ceil(a_max[i] / step), _RAMP_STEPS)) + 1):
+            A[count] = 0.0
+            for s in range(N):
+                A[count, s * n + i] = T_v[N - 1, s]
+            A[count, (N - 1) * n + i] += m * dt
+            room = v_max[i] + dt * step * m * (m + 1) / 2
+            bounds[0, count], bounds[1, count] = -room - v[i], room - v[i]
+            labels[0, count], labels[1, count], labels[2, count] = 4, N, i
+            count += 1
+    # "stop": q_N + mΔt v_N ∓ ½a(mΔt)² inside the range, where full braking for m steps leads; left out where
+    # the fastest motion that the input bounds permit does not get there.
+    for m in range(1, _STOP_STEPS + 1):
+        ahead = m * dt
+        for i in range(n):
+            a = a_max[i]
+            if not (np.isfinite(a) and (np.isfinite(q_lower[i]) or np.isfinite(q_upper[i]))):
+                continue
+            fastest = min(v_max[i], abs(v[i]) + a * T)
+            if not ahead < fastest / a + dt:
+                continue
+            end, brake = q[i] + T * v[i], 0.5 * a * ahead**2
+            far = 0.5 * a * T**2 + ahead * fastest - brake
+            if not (end + far > q_upper[i] or end - far < q_lower[i]):
+                continue
+            A[count] = 0.0
+            for s in range(N):
+                A[count, s * n + i] = T_q[N - 1, s] + ahead * T_v[N - 1, s]
+            coasting = end + ahead * v[i]
+            bounds[0, count] = q_lower[i] - brake - coasting
+            bounds[1, count] = q_upper[i] + brake - coasting
+            labels[0, count], labels[1, count], labels[2, count] = 5, N, i
+            count += 1
+    return count
 
 
-def held(rows: Rows, brake: Array, joints: NDArray[np.int64]) -> Rows:
-    """Rows that keep some joints on their way to rest: their inputs are those of `brake` (N, n)."""
+def held(rows: Rows, brake: Array, joints: NDArray[np.int64], table: Table) -> Rows:
+    """Rows that keep some joints on their way to rest: their inputs are those of `brake` (N, n). They take
+    the place of the given ones at the beginning of the table."""
     N, n = brake.shape
     chosen = (np.arange(N)[:, None] * n + joints).ravel()
     value = brake.ravel()[chosen]
@@ -193,4 +245,7 @@ def held(rows: Rows, brake: Array, joints: NDArray[np.int64]) -> Rows:
         np.repeat(np.arange(N), len(joints)),
         np.tile(joints, N),
     )
-    return joined(rows.take(~np.isin(rows.part, joints)), fixed)
+    found = joined(rows.take(~np.isin(rows.part, joints)), fixed)
+    table.reserve(len(found.A))
+    table.A[: len(found.A)] = found.A
+    return found._replace(A=table.A[: len(found.A)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.avoidance import PENALTY
 from himpc.htmpc.problem import Iterate, Problem
-from himpc.htmpc.rows import KINDS, Rows, joined
+from himpc.htmpc.rows import KINDS, Rows
 from himpc.htmpc.working_set import solve_by_working_set
 from himpc.qp import QPSolution
 
@@ -107,6 +107,7 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     tick = problem.tick
     H, g = problem.model(at)
     rows, slack = problem.rows(at), problem.slack_rows(at)
+    every = rows if slack is None else problem.both(rows, slack)
     own = tick.settings.solver == "daqp" and tick.method.begin(H)
     solution = _solve(problem, H, g, rows, slack, own)
     rung = "solve"
@@ -115,7 +116,6 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
         safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
         rung = "widened"
         solution = _solve(problem, H, g, rows.widened(safe), slack, own)
-    every = rows if slack is None else joined(rows, slack)
     if not solution.solved:
         return _Direction(np.zeros_like(at.U), 0.0, solution, every, "keep", H, g, own)
     size = at.U.size
@@ -142,7 +142,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: Rows, slack: Rows | None,
         return solve_by_working_set(H, g, rows.A, rows.lower, rows.upper, first, solver)
     if own:
         # No slack is bought where the rows can be met and cost less than its price.
-        solution = problem.tick.method.solve(g, joined(rows, slack), 0)
+        solution = problem.tick.method.solve(g, problem.both(rows, slack), 0)
         if solution.solved and _price(solution, slack) <= PENALTY:
             return solution
     k, N = len(g), problem.tick.settings.horizon

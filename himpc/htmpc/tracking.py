@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kinematics import Knots
-from himpc.htmpc.prediction import integrator
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.kinematics import Desired, Knots
 from himpc.htmpc.settings import HTMPCSettings
 from himpc.stack import Level
 from himpc.tasks import Task
@@ -32,16 +30,15 @@ class Tracking:
     tasks: tuple[Task, ...]
     Q: Array
 
-    def errors(self, knots: Knots, desired: dict[str, list[Array]]) -> Array:
+    def errors(self, knots: Knots, desired: dict[str, Desired]) -> Array:
         """e of (6) at knots 1 … N, (N, m)."""
-        return np.hstack([knots.errors(task, desired[task.name][1:]) for task in self.tasks])
+        parts = [knots.errors(task, desired[task.name][1:]) for task in self.tasks]
+        return parts[0] if len(parts) == 1 else np.hstack(parts)
 
-    def jacobian(self, knots: Knots, dt: float) -> Array:
-        """∂e_k/∂u at knots 1 … N, (N, m, N·n)."""
-        J = np.concatenate([knots.jacobian(task) for task in self.tasks], axis=1)
-        N, m, n = J.shape
-        T_q = integrator(N, dt).T_q
-        return (J[:, :, None, :] * T_q[:, None, :, None]).reshape(N, m, N * n)
+    def jacobian(self, knots: Knots) -> Array:
+        """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
+        parts = [knots.jacobian(task) for task in self.tasks]
+        return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def cost(self, e: Array) -> float:
         """J of (8) without its constant first term."""
@@ -99,27 +96,13 @@ class Guard:
         cost = self.tracking.cost
         return cost(e) - cost(self.best) - 0.5 * float(self.tracking.Q.sum()) * delta**2
 
-    def rows(self, e: Array, E: Array, per_coordinate: bool, strict: bool = False) -> Rows:
-        """(12) or (11) linearised for the change d of the inputs; d = 0 is always inside unless `strict`.
+    def room(self, e: Array, strict: bool = False) -> tuple[Array, Array]:
+        """Bounds (N·m,) of (12) on the change of e, (N, m), in every coordinate and knot; zero is always
+        inside unless `strict`: that does not grant what a step has already taken beyond e*."""
+        room = np.abs(self.best) if strict else np.maximum(np.abs(self.best), np.abs(e))
+        return (-room - e).ravel(), (room - e).ravel()
 
-        Args:
-            e: errors at the present iterate, (N, m). E: their Jacobian, (N, m, N·n).
-            per_coordinate: (12) or (11).
-            strict: do not grant what a step has already taken beyond e*.
-        """
-        N, m, k = E.shape
-        if per_coordinate:
-            room = np.abs(self.best) if strict else np.maximum(np.abs(self.best), np.abs(e))
-            return Rows(
-                E.reshape(-1, k),
-                (-room - e).ravel(),
-                (room - e).ravel(),
-                np.full(N * m, 6),
-                np.repeat(np.arange(1, N + 1), m),
-                np.tile(np.arange(m), N),
-            )
-        slope = np.einsum("km,kmj->j", self.tracking.Q * e, E)
+    def gap(self, e: Array, strict: bool = False) -> float:
+        """By how much (11) lets the cost grow from that of e; at least zero unless `strict`."""
         gap = self.tracking.cost(self.best) - self.tracking.cost(e)
-        gap = gap if strict else max(gap, 0.0)
-        label = np.array([6]), np.array([N]), np.array([0])
-        return Rows(slope[None], np.array([-np.inf]), np.array([gap]), *label)
+        return gap if strict else max(gap, 0.0)

@@ -10,15 +10,25 @@ from htmpc_problems import FREE, at_home, mobile_settings, mobile_stack, point, 
 
 from himpc import FrameOrientation, FramePosition, Level
 from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
+from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import Avoidance
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
 from himpc.htmpc.kinematics import Knots, desired_values
-from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
-from himpc.htmpc.problem import Problem, Tick
-from himpc.htmpc.rows import KINDS, Rows, limit_rows
+from himpc.htmpc.prediction import (
+    Motion,
+    Start,
+    braking,
+    integrator,
+    positions,
+    shifted,
+    underway,
+    velocities,
+)
+from himpc.htmpc.problem import Iterate, Problem, Tick
+from himpc.htmpc.rows import KINDS, Rows, Table, limit_rows
 from himpc.htmpc.settings import Bounds, efforts
-from himpc.htmpc.tracking import Guard, tracking
+from himpc.htmpc.tracking import Guard, Tracking, tracking
 from himpc.references import Hold, Preview
 from himpc.rotation import exp3, log3
 from robots import InputError, Robot, load_robot
@@ -49,6 +59,7 @@ def tick_of(robot: Robot, **changes: object) -> Tick:
     tasks = tuple(task for level in settings.stack for task in level.tasks)
     goals = previews(at_home(robot, np.array([0.4, -0.2])), 0.0, settings)
     collision = CollisionModel(robot, settings.obstacles)
+    table = Table(settings.horizon * robot.n)
     return Tick(
         robot=robot,
         data=robot.model.createData(),
@@ -56,11 +67,19 @@ def tick_of(robot: Robot, **changes: object) -> Tick:
         start=start,
         desired={task.name: desired_values(task, goals[task.name], settings.horizon) for task in tasks},
         effort=Effort(efforts(robot, settings), settings.horizon, settings.dt),
-        rows=limit_rows(start, settings.horizon, settings.dt, settings.period, limits),
+        rows=limit_rows(start, settings.horizon, settings.dt, settings.period, limits, table),
         bounds=limits,
         plan=np.random.default_rng(9).normal(0, 0.5, (settings.horizon, robot.n)),
         avoidance=None if collision.empty else Avoidance(collision, settings.margin_m),
+        method=ActiveSet(),
+        table=table,
     )
+
+
+def slopes(at: Iterate, level: Tracking) -> Array:
+    """∂e_k/∂u, (N, m, N·n)."""
+    J, T_q = at.jacobian(level), integrator(4, 0.1).T_q
+    return np.einsum("ks,kmj->kmsj", T_q, J).reshape(*J.shape[:2], -1)
 
 
 # ------------------------------------------------------------------ prediction
@@ -215,7 +234,7 @@ def test_errors_and_their_jacobian(robot: Robot) -> None:
     U = 0.5 * np.random.default_rng(7).normal(0, 1, (4, 9))
     for level in (tracking(robot, each, tick.settings) for each in tick.settings.stack):
         at = tick.iterate(U)
-        e, E = at.errors(level), at.jacobian(level)
+        e, E = at.errors(level), slopes(at, level)
         task = level.tasks[0]
         assert isinstance(task, FramePosition)
         for k, q in enumerate(positions(tick.start, U, 0.1)):
@@ -335,15 +354,29 @@ def test_guard_rows_always_contain_no_change(robot: Robot) -> None:
     tick = tick_of(robot)
     level = tracking(robot, tick.settings.stack[0], tick.settings)
     at = tick.iterate(0.2 * np.random.default_rng(12).normal(0, 1, (4, 9)))
-    e, E = at.errors(level), at.jacobian(level)
+    e, E = at.errors(level), slopes(at, level)
     for scale in (1.0, 0.5, 2.0):
-        for per_coordinate in (True, False):
-            rows = Guard(level, scale * e).rows(e, E, per_coordinate)
-            assert rows.violation(np.zeros(36)) == 0.0
-    rows = Guard(level, e).rows(e, E, True)
+        guard = Guard(level, scale * e)
+        low, high = guard.room(e)
+        assert (low <= 0.0).all()
+        assert (high >= 0.0).all()
+        assert guard.gap(e) >= 0.0
+        # What a step took beyond e* is asked back where it is to be led back.
+        assert (guard.gap(e, strict=True) < 0.0) == (scale < 1.0)
+    below = Problem(tick, tracking(robot, tick.settings.stack[1], tick.settings), (Guard(level, e),), True)
+    rows = below.rows(at)
+    rows = rows.take(rows.kind == KINDS.index("lexicographic"))
+    np.testing.assert_allclose(rows.A, E.reshape(-1, 36), atol=1e-15)
+    assert rows.violation(np.zeros(36)) == 0.0
     worse = np.asarray(np.linalg.lstsq(E.reshape(-1, 36), e.ravel(), rcond=None)[0], np.float64)
     assert rows.violation(0.1 * worse) > 0.01
     assert rows.violation(-0.1 * worse) < 1e-9
+    cost = tick_of(robot, lexicographic="cost")
+    row = Problem(cost, below.level, (Guard(level, e),), True).rows(cost.iterate(at.U))
+    row = row.take(row.kind == KINDS.index("lexicographic"))
+    weight = np.asarray(level.Q * e)
+    np.testing.assert_allclose(row.A[0], np.einsum("km,kmj->j", weight, E), atol=1e-12)
+    np.testing.assert_array_equal(row.upper, [0.0])
 
 
 def test_too_many_coordinates_are_explained(robot: Robot) -> None:
