@@ -95,7 +95,7 @@ def _solve(
         np.empty(most + 1),
         np.empty(most + 1),
     )
-    watched, weight = np.empty(rows, np.intp), np.empty(rows)
+    watched = np.empty(rows, np.intp)
     seen = np.zeros(rows, np.uint8)
     watching = 0
     forward(L, -g, z_0)
@@ -107,7 +107,7 @@ def _solve(
         seen[active[c]] = 1
     for i in range(rows):
         if seen[i]:
-            watched[watching], weight[watching] = i, 1.0 / (np.sqrt(dot(A[i], A[i], n)) + 1e-300)
+            watched[watching] = i
             watching += 1
     # Rows held from before are kept as far as their multipliers have the right sign here.
     while True:
@@ -128,15 +128,15 @@ def _solve(
     status, steps = _LIMIT, 0
     while steps < MOST_STEPS:
         backward(L, z, x)
-        worst_place, excess, sign = -1, 0.0, 0.0
+        p, excess, sign = -1, 0.0, 0.0
         for place in range(watching):
             i = watched[place]
             value = dot(A[i], x, n)
             missing = max(lower[i] - value, value - upper[i])
-            if missing > _SATISFIED and missing * weight[place] > excess and seen[i] != 2:
-                worst_place, excess = place, missing * weight[place]
+            if missing > max(excess, _SATISFIED) and seen[i] != 2:
+                p, excess = i, missing
                 sign = 1.0 if value < lower[i] else -1.0
-        if worst_place < 0:
+        if p < 0:
             # What adding up steps has lost comes back before the other rows are looked at.
             for c in range(count):
                 beta[c] = lower[active[c]] if side[c] > 0.0 else -upper[active[c]]
@@ -148,13 +148,12 @@ def _solve(
                     value = dot(A[i], x, n)
                     if max(lower[i] - value, value - upper[i]) > _SATISFIED:
                         seen[i], more = 1, True
-                        watched[watching], weight[watching] = i, 1.0 / (np.sqrt(dot(A[i], A[i], n)) + 1e-300)
+                        watched[watching] = i
                         watching += 1
             if more:
                 continue
             status = _SOLVED
             break
-        p = watched[worst_place]
         forward(L, A[p], normal)
         for i in range(n):
             normal[i] *= sign

@@ -14,6 +14,7 @@ from himpc.plan import Binding
 
 Array = NDArray[np.float64]
 
+_LEXICOGRAPHIC = KINDS.index("lexicographic")
 _FELT = 1e-6
 """Smaller multipliers are rounding."""
 
@@ -40,10 +41,12 @@ def evidence(level: Tracking, solved: Solved, final: Iterate, joints: tuple[str,
 def _binding(name: str, rows: Rows, multipliers: Array, joints: tuple[str, ...]) -> tuple[Binding, ...]:
     multipliers = multipliers[: len(rows.kind)]
     felt = np.flatnonzero(np.abs(multipliers) > _FELT)
+    each = zip(
+        *(values[felt].tolist() for values in (rows.kind, rows.knot, rows.part, multipliers)), strict=True
+    )
     found: list[Binding] = []
-    for row in felt.tolist():
-        kind, part = KINDS[rows.kind[row]], int(rows.part[row])
-        joint = joints[part] if rows.kind[row] < KINDS.index("lexicographic") else f"{kind} {part}"
-        side = "upper" if multipliers[row] > 0 else "lower"
-        found.append(Binding(name, joint, kind, side, int(rows.knot[row]), float(abs(multipliers[row])), 0.0))
+    for kind, knot, part, multiplier in each:
+        joint = joints[part] if kind < _LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
+        side = "upper" if multiplier > 0 else "lower"
+        found.append(Binding(name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
     return tuple(found)

@@ -46,16 +46,20 @@ def backward(L: Array, z: Array, x: Array) -> None:
 
 @quick
 def project(Q: Array, n: Array, d: Array, w: Array, count: int) -> float:
-    """w ← n − QᵀQn and d ← Qn, in two rounds; returns ‖w‖²."""
+    """w ← n − QᵀQn and d ← Qn; returns ‖w‖². What little is left is freed from rounding by a second round."""
     w[:] = n
     d[:count] = 0.0
+    before = after = dot(n, n, len(n))
     for _ in range(2):
         for c in range(count):
             along = dot(Q[c], w, len(n))
             d[c] += along
             for i in range(len(n)):
                 w[i] -= along * Q[c, i]
-    return dot(w, w, len(n))
+        after = dot(w, w, len(n))
+        if after > 0.5 * before:
+            break
+    return after
 
 
 @quick

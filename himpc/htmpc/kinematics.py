@@ -77,16 +77,21 @@ class Knots:
 
     def value(self, task: Task) -> Array:
         """x at the first knot."""
+        if isinstance(task, FramePosition):
+            return self._frame(task.frame).p[0, task.components]
         return task.value(self._knots[0])
 
     def jacobian(self, task: Task) -> Array:
         """J of a task at every knot, (K, m, n)."""
+        if isinstance(task, FramePosition):
+            return self._frame(task.frame).J[:, :3][:, task.components]
         return task.jacobian(self._path)
 
     def _frame(self, name: str) -> Frames:
-        if name not in self._frames:
-            self._frames[name] = frame_at(self._robot, self.joints, name)
-        return self._frames[name]
+        found = self._frames.get(name)
+        if found is None:
+            found = self._frames[name] = frame_at(self._robot, self.joints, name)
+        return found
 
     @cached_property
     def _path(self) -> Path:

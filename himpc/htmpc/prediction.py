@@ -135,15 +135,16 @@ def shifted(before: Motion, s: float, N: int, dt: float, bounds: Bounds) -> Arra
     plan brakes: one that coasts makes hard limits infeasible for good.
     """
     reach = s + N * dt
-    missing = max(0, math.ceil((reach - len(before.U) * before.dt) / before.dt - 1e-9))
-    V = np.vstack([before.start.v, velocities(before.start, before.U, before.dt)])
+    length = len(before.U) * before.dt
+    missing = max(0, math.ceil((reach - length) / before.dt - 1e-9))
+    U = before.U
     if missing:
-        end = Start(before.position(len(before.U) * before.dt), V[-1], before.U[-1])
-        tail = braking(end, missing, before.dt, before.dt, bounds)
-        V = np.vstack([V, velocities(end, tail, before.dt)])
+        end = Start(before.position(length), before.velocity(length), before.U[-1])
+        U = np.vstack([U, braking(end, missing, before.dt, before.dt, bounds)])
     whole = round(s / dt)
     if dt == before.dt and abs(s - whole * dt) < 1e-12:
-        return np.diff(V[whole : whole + N + 1], axis=0) / dt
+        return U[whole : whole + N].copy()
+    V = np.vstack([before.start.v, velocities(before.start, U, before.dt)])
     old = before.dt * np.arange(len(V))
     new = s + dt * np.arange(N + 1)
     sampled = np.array([np.interp(new, old, column) for column in V.T]).T

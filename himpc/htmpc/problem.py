@@ -93,9 +93,10 @@ class Iterate:
 
     def errors(self, level: Tracking) -> Array:
         """e at knots 1 … N, (N, m)."""
-        if level.name not in self._errors:
-            self._errors[level.name] = level.errors(self.knots, self.tick.desired)
-        return self._errors[level.name]
+        found = self._errors.get(level.name)
+        if found is None:
+            found = self._errors[level.name] = level.errors(self.knots, self.tick.desired)
+        return found
 
     def jacobian(self, level: Tracking) -> Array:
         """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""

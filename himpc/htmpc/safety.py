@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,11 +28,17 @@ def plausible(robot: Robot, q: Array, v: Array) -> bool:
         robot: whose limits say what is absurd.
         q, v: measured joint positions and velocities, (n,).
     """
+    lower, upper, fastest = _believable(robot)
     # A comparison with NaN is false: what is not finite is not plausible either.
+    return bool(((q >= lower) & (q <= upper) & (np.abs(v) <= fastest)).all())
+
+
+@lru_cache(maxsize=32)
+def _believable(robot: Robot) -> tuple[Array, Array, Array]:
+    """Least and greatest positions and greatest speeds that a measurement may show, (n,) each."""
     lower = np.where(np.isfinite(robot.q_lower), robot.q_lower - _OUTSIDE, -_FARTHEST)
     upper = np.where(np.isfinite(robot.q_upper), robot.q_upper + _OUTSIDE, _FARTHEST)
-    fastest = np.where(np.isfinite(robot.v_limit), _FASTEST * robot.v_limit, _FARTHEST)
-    return bool((q >= lower).all() and (q <= upper).all() and (np.abs(v) <= fastest).all())
+    return lower, upper, np.where(np.isfinite(robot.v_limit), _FASTEST * robot.v_limit, _FARTHEST)
 
 
 def commandable(v: Array, last: Array | None, bounds: Bounds) -> Array:
