@@ -39,6 +39,7 @@ class Wire:
     Attributes:
         controls: by identity, what the page shows, as the message that made it with the updates since.
         commands: by identity, what the palette holds.
+        made: every control there ever was, in the order they came.
         notices: (title, body) of every notification.
     """
 
@@ -46,6 +47,7 @@ class Wire:
         protocol: Any = [f"viser-v{__version__}"]
         self.controls: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, dict[str, Any]] = {}
+        self.made: list[dict[str, Any]] = []
         self.notices: list[tuple[str, str]] = []
         self._socket = connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None)
         self.say(camera())
@@ -63,7 +65,11 @@ class Wire:
         """What a browser would send."""
         self._socket.send(pack(message))
 
-    def write(self, uuid: str, **updates: Any) -> None:
+    def send(self, raw: bytes) -> None:
+        """Anything at all."""
+        self._socket.send(raw)
+
+    def write(self, uuid: str, /, **updates: Any) -> None:
         """Writes attributes of a control, as its input does with `value`."""
         self.say(_messages.GuiUpdateMessage(uuid, updates))
 
@@ -105,6 +111,7 @@ class Wire:
                 self._update(self.controls[message["uuid"]], message["updates"])
             case _ if kind.startswith("Gui") and "props" in message and "uuid" in message:
                 self.controls[message["uuid"]] = message
+                self.made.append(message)
             case _:
                 pass
 

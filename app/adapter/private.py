@@ -11,7 +11,7 @@ import io
 import socket
 import threading
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from http import HTTPStatus
 from typing import Any
@@ -41,6 +41,9 @@ _OF_MODULES = (
     (_messages, ("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect")),
     (_messages, ("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage")),
     (_messages, ("FileTransferStartUpload", "FileTransferPart", "Message")),
+    (_messages, ("TransformControlsUpdateMessage", "SceneNodeDragMessage")),
+    (_messages, ("SceneNodeClickMessage", "ScenePointerMessage")),
+    (infra.WebsockClientConnection, ("_handle_incoming_message",)),
 )
 _OF_A_SERVER = (
     "_websock_server._live_connections",
@@ -48,6 +51,7 @@ _OF_A_SERVER = (
     "_websock_server._client_state_from_id",
     "_websock_server._broadcast_buffer.message_event",
     "gui._current_file_upload_states",
+    "gui._gui_input_handle_from_uuid",
     "gui._thread_executor",
     "scene._thread_executor",
 )
@@ -214,7 +218,46 @@ async def read_storage(
     return tuple(future.result() if future.done() else None for future in asked.values())
 
 
+# ---------------------------------------------------------------- what a browser says
+
+Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
+"""Takes a message, and what hands one on to viser."""
+
+
+def intercept(client: viser.ClientHandle, take: Inlet) -> None:
+    """Every message of this browser goes to `take` first."""
+    connection = client._websock_connection
+    plain = connection._handle_incoming_message
+
+    async def handle(client_id: Any, message: Any) -> None:
+        await take(message, lambda passed: plain(client_id, passed))
+
+    connection._handle_incoming_message = handle
+
+
+def is_write(message: Any) -> bool:
+    """Whether it changes a control: `uuid` says which one, `updates` what of it."""
+    return isinstance(message, _messages.GuiUpdateMessage)
+
+
+def is_of_hand(message: Any) -> bool:
+    """Whether it tells what a hand did in the 3D view."""
+    hands = (
+        _messages.TransformControlsUpdateMessage,
+        _messages.SceneNodeDragMessage,
+        _messages.SceneNodeClickMessage,
+        _messages.ScenePointerMessage,
+    )
+    return isinstance(message, hands)
+
+
 # ---------------------------------------------------------------- one control
+
+
+def control_of(client: viser.ClientHandle, uuid: object) -> viser.GuiInputHandle[Any] | None:
+    """A control of this page that is still there."""
+    found = client.gui._gui_input_handle_from_uuid.get(uuid) if isinstance(uuid, str) else None
+    return None if found is None or found._impl.removed else found  # pyright: ignore[reportReturnType]
 
 
 def dom_id(handle: viser.GuiInputHandle[Any] | viser.GuiUploadButtonHandle) -> str:

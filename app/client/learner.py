@@ -78,6 +78,12 @@ class Learner(Simulation):
         with self._lock:
             return self.choice if self.ready is ready else ready.choice
 
+    def lecture_of(self, ready: Ready) -> Lecture | None:
+        """How far the lesson of a scene is; None if another scene came in since. A page that is about to be
+        built anew must not show the next lesson first: what is pressed there would be lost with it."""
+        with self._lock:
+            return self.lecture if self.ready is ready else None
+
     def _hear(self, process: Process, report: Report) -> None:
         super()._hear(process, report)
         if process is not self._process:

@@ -201,7 +201,7 @@ class Stage:
                 self._compare.update(now)
                 self._face.write(shown)
                 self._binding.update(shown)
-            self._course.follow(settings)
+            self._course.follow(learner.lecture_of(self._ready), settings)
             self._bindings.refresh(settings)
 
     def close(self) -> None:

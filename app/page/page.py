@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -16,6 +18,7 @@ from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.page.inlet import Inlet
 from app.page.layout import Stage
 from app.view.robot import aim
 from lessons.scenes.names import ALL_SCENES
@@ -23,6 +26,10 @@ from lessons.scenes.names import ALL_SCENES
 RATE = 30.0  # Hz, poses
 PLOTS_RATE = 12.0  # Hz
 _TEXTS = 8
+_BROKEN = (
+    "This page cannot be shown: {}. Start again loads the scene anew; if that does not help, reload the page "
+    "and choose another scene."
+)
 
 
 class Page:
@@ -45,6 +52,7 @@ class Page:
         self._on_dark = on_dark
         self._greet = greet
         self._client = client
+        self._inlet = Inlet(client)
         self._dark = dark
         self._by_path = by_path
         self._event_loop = loop
@@ -52,7 +60,7 @@ class Page:
         self._phone = False
         self._seen: tuple[SceneChoice, str] | None = None  # what the camera was last turned to
         self._stage: Stage | None = None
-        self._built = -1
+        self._built: Ready | None = None
         self._trouble: Trouble | None = None
         self._next_plots = 0.0
         self._waiting: viser.GuiHtmlHandle | None = None
@@ -90,16 +98,19 @@ class Page:
         frame = 0
         while not self._closed.is_set():
             began = time.perf_counter()
-            self._look(frame)
+            try:
+                self._look(frame)
+            except Exception as error:
+                self._break(error)
             frame += 1
             self._closed.wait(max(0.002, 1 / RATE - (time.perf_counter() - began)))
 
     def _look(self, frame: int) -> None:
         learner = self.learner
-        ready, changed = learner.ready, learner.changed
-        if ready is not None and changed != self._built:
+        ready = learner.ready
+        if ready is not None and ready is not self._built:
+            self._built = ready  # also of one that cannot be built: once is enough
             self._build(ready)
-            self._built = changed
         self._pass_on()
         stage = self._stage
         if stage is None:
@@ -113,7 +124,7 @@ class Page:
             stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
         except Exception:
             # Another scene may come in at any moment: its rows and poses do not fit this stage.
-            if learner.changed == self._built:
+            if learner.ready is self._built:
                 raise
 
     def _plots_due(self) -> bool:
@@ -169,6 +180,22 @@ class Page:
                 self._seen = seen
         self._trouble = None
 
+    def _break(self, error: Exception) -> None:
+        """Something of the page does not work: a sentence and a way on, instead of what no longer moves."""
+        if self._closed.is_set():
+            return  # the tab is gone, and its panels with it
+        traceback.print_exc()
+        before, self._stage = self._stage, None
+        self._waiting = self._again = None
+        with contextlib.suppress(Exception), self._client.atomic():
+            self._client.scene.reset()
+            self._client.gui.reset()
+            self._client.gui.add_html(in_trouble("STOPPED", _BROKEN.format(_words(error))))
+            self._client.gui.add_button("Start again").on_click(self._restart)
+        if before is not None:
+            with contextlib.suppress(Exception):
+                before.close()
+
     def _pass_on(self) -> None:
         """Sentences of the session go where they belong."""
         refusals, notices = self.learner.take_messages()
@@ -179,3 +206,7 @@ class Page:
                 self._client.add_notification("Not loaded", sentence, color="red")
         for sentence in notices[-3:]:
             self._client.add_notification("Not changed", sentence, color="orange", auto_close_seconds=8.0)
+
+
+def _words(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"[:300]

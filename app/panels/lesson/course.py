@@ -10,7 +10,7 @@ import viser
 from app.client.learner import Learner
 from app.client.progress import Notebook
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import Exercise, Lecture
 from app.panels.lesson.cards import add_cards, add_invitation
 from app.panels.lesson.step import LessonPanel
 from app.panels.widgets.window import Window
@@ -72,10 +72,10 @@ class Course:
         self._list.close()
         self._choose(choice)
 
-    def follow(self, settings: AnySettings) -> None:
+    def follow(self, lecture: Lecture | None, settings: AnySettings) -> None:
         """Shows how far the lesson is."""
         if self._panel is not None:
-            self._panel.follow(self._learner.lecture, settings)
+            self._panel.follow(lecture, settings)
 
     def close(self) -> None:
         """The panels are about to be removed."""

@@ -1,0 +1,61 @@
+"""Everything a browser says passes here before viser applies it."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import viser
+
+from app.adapter import private
+from app.page.values import NotAllowed, allowed, in_reach
+
+_OFTEN = 2.0  # s between two notices of one page
+_GONE = "What you just pressed or changed was replaced meanwhile: if it is still there, do it once more."
+_FAR = "That is no place in this scene."
+
+
+class Inlet:
+    """Of one page. A value that a control cannot have is refused with a notice, and the control put back; a
+    press on a control that is gone is not lost in silence; and neither is a callback's exception."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        self._client = client
+        self._next_notice = 0.0
+        private.intercept(client, self._take)
+
+    async def _take(self, message: Any, go_on: Callable[[Any], Awaitable[None]]) -> None:
+        try:
+            if private.is_write(message):
+                await self._write(message, go_on)
+            elif not private.is_of_hand(message) or in_reach(list(vars(message).values())):
+                await go_on(message)
+            else:
+                self._say("Not moved", _FAR)
+        except Exception as error:
+            traceback.print_exc()
+            self._say("That did not work", f"{type(error).__name__}: {error}"[:300])
+
+    async def _write(self, message: Any, go_on: Callable[[Any], Awaitable[None]]) -> None:
+        handle = private.control_of(self._client, message.uuid)
+        if handle is None:
+            self._say("Not taken", _GONE)
+            return
+        try:
+            value = allowed(handle, message.updates)
+        except NotAllowed as refusal:
+            self._say("Not changed", str(refusal))
+            private.send_again(handle)
+            return
+        typed, message.updates = message.updates["value"], {"value": value}
+        await go_on(message)
+        if isinstance(handle, viser.GuiSliderHandle) and typed != value:
+            private.send_again(handle)
+
+    def _say(self, title: str, sentence: str) -> None:
+        now = time.monotonic()
+        if now >= self._next_notice:
+            self._next_notice = now + _OFTEN
+            self._client.add_notification(title, sentence, color="orange", auto_close_seconds=8.0)

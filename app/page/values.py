@@ -1,0 +1,95 @@
+"""What a browser may write into the page's controls: their values, of the right kind, and nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import viser
+
+LONGEST = 200_000
+"""Characters of a text."""
+FARTHEST = 1e6
+"""m: what is dragged further has left every scene."""
+
+
+class NotAllowed(Exception):
+    """Carries a sentence that says what is refused and why."""
+
+
+def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
+    """The value that an update brings, on a slider's scale if it was typed beyond it. Raises NotAllowed for
+    every other update: of anything but the value, or to a value the control cannot have."""
+    label = str(getattr(handle, "label", "") or "A control")
+    if not isinstance(updates, dict) or list(updates) != ["value"]:
+        raise NotAllowed(f"{label}: a page may write its value and nothing else.")
+    value = updates["value"]
+    if isinstance(handle, viser.GuiUploadButtonHandle):
+        raise NotAllowed(f"{label}: a file is sent, not written.")
+    options = getattr(handle, "options", None)
+    if options is not None:
+        if not isinstance(value, str) or value not in options:
+            raise NotAllowed(f"{label}: choose one of {', '.join(map(str, options))[:300]}.")
+        return value
+    value = _like(handle.value, value, label)
+    low, high = getattr(handle, "min", None), getattr(handle, "max", None)
+    if isinstance(handle, viser.GuiSliderHandle):
+        return min(max(value, low), high)
+    return _within(value, low, high, label)
+
+
+def _like(present: Any, value: Any, label: str) -> Any:
+    """The value, if it is of the kind of the present one."""
+    match present:
+        case bool():
+            if isinstance(value, bool):
+                return value
+            raise NotAllowed(f"{label}: give yes or no.")
+        case int() | float():
+            return _number(value, label)
+        case str():
+            if isinstance(value, str) and len(value) <= LONGEST:
+                return value
+            raise NotAllowed(f"{label}: give a text of at most {LONGEST} characters.")
+        case tuple():
+            if isinstance(value, (list, tuple)) and len(value) == len(present):
+                return tuple(_like(old, new, label) for old, new in zip(present, value, strict=True))
+            raise NotAllowed(f"{label}: give {len(present)} numbers.")
+        case _:
+            raise NotAllowed(f"{label} cannot be written.")
+
+
+def _number(value: Any, label: str) -> int | float:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    # A whole number may be too long for a float.
+    if number and abs(value) <= 1e300 and math.isfinite(value):
+        return value
+    raise NotAllowed(f"{label}: give a number.")
+
+
+def _within(value: Any, low: Any, high: Any, label: str) -> Any:
+    for one, least, most in zip(_each(value), _ends(low), _ends(high), strict=False):
+        if (least is not None and one < least) or (most is not None and one > most):
+            ends = [f"at least {low}"] * (low is not None) + [f"at most {high}"] * (high is not None)
+            raise NotAllowed(f"{label}: give {' and '.join(ends)}.")
+    return value
+
+
+def _each(value: Any) -> Iterable[Any]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _ends(end: Any) -> Iterable[Any]:
+    return end if isinstance(end, tuple) else (end,) * 4
+
+
+def in_reach(value: Any, depth: int = 0) -> bool:
+    """Whether all numbers in what a hand did in the 3D view are places in a scene."""
+    if isinstance(value, bool) or value is None or isinstance(value, str):
+        return True
+    if isinstance(value, (int, float)):
+        return abs(value) <= FARTHEST  # false for what is not a number
+    if isinstance(value, (list, tuple)):
+        return depth < 4 and len(value) <= 64 and all(in_reach(each, depth + 1) for each in value)
+    return False

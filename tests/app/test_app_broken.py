@@ -1,0 +1,99 @@
+"""A page that is built anew, or cannot be: no press is lost in silence, and no page is dead."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+
+from app.client.learner import Learner
+from app.client.moment import Moment
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
+from app.link.messages import Load
+from app.page.layout import Stage
+from app.page.page import Page
+from app.panels.run.help import HelpPanel
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+from lessons.course import load_lesson
+
+
+def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a slow computer the next lesson is there while the texts of this one are still being written. A page
+    that showed it at once, and was then built for it, lost what was pressed in between."""
+    leaving, write = threading.Event(), Stage._write
+
+    def slow(stage: Stage, moment: Moment) -> None:
+        learner = stage._learner
+        if leaving.is_set() and stage._ready.choice.exercise == Exercise("one-task"):
+            eventually(lambda: learner.ready is not stage._ready and learner.lecture is not None)
+        write(stage, moment)
+
+    monkeypatch.setattr(Stage, "_write", slow)
+    server = PageServer(SceneChoice.of_lesson(Exercise("one-task")), port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows(load_lesson("one-task").steps[0].title))
+            learner = server.sessions.learners[0]
+            leaving.set()
+            learner.send(Load(SceneChoice.of_lesson(Exercise("deadlines"))))
+            assert eventually(lambda: page.shows(load_lesson("deadlines").steps[0].title))
+            assert eventually(lambda: answers(page) != [] and page.shows("t = "))
+            asked = answers(page)[0]
+            page.write(asked, value="B")
+            assert eventually(lambda: learner.lecture is not None and learner.lecture.answer == 1)
+            assert page.shows("(your answer)") or eventually(lambda: page.shows("(your answer)"))
+            assert answers(page) == [asked]
+    finally:
+        server.close()
+
+
+def answers(page: Wire) -> list[str]:
+    """Every place there ever was to answer the first step of the lesson on deadlines."""
+    return [each["uuid"] for each in page.made if each["props"].get("options") == ["A", "B", "C"]]
+
+
+def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.find("Playback") is not None)
+            before = page.find("Playback")
+            assert before is not None
+            server.sessions.learners[0].send(Load(SceneChoice("ridgeback-ur10-drag")))
+            assert eventually(lambda: page.find("Playback") not in (None, before))
+            page.write(before, value="Pause")
+            assert eventually(lambda: any("replaced" in body for _, body in page.notices))
+    finally:
+        server.close()
+
+
+@pytest.mark.parametrize("place", [(HelpPanel, "_fill"), (Stage, "_write"), (Page, "_pass_on")])
+def test_a_page_that_fails_says_so_and_can_be_started_again(
+    place: tuple[type, str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    owner, name = place
+    works, broken = getattr(owner, name), threading.Event()
+
+    def fails(self: Any, *given: Any) -> Any:
+        if not broken.is_set():
+            raise ValueError("no <place> for it")
+        return works(self, *given)
+
+    monkeypatch.setattr(owner, name, fails)
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows("no &lt;place&gt; for it"))
+            again = page.find("Start again")
+            assert again is not None and page.find("Playback") is None
+            broken.set()
+            page.write(again, value=True)
+            assert eventually(lambda: page.shows("RUNNING"))
+            learner = server.sessions.learners[0]
+            assert isinstance(learner, Learner) and learner.failure is None
+    finally:
+        server.close()
+    assert "no <place> for it" in capfd.readouterr().err  # whoever started it can see where

@@ -1,0 +1,85 @@
+"""What strangers write into a page's controls: refused with a notice, and the page lives on."""
+
+from __future__ import annotations
+
+import math
+import random as chance
+import time
+from typing import Any
+
+import msgspec
+import pytest
+from viser import _messages
+
+from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+
+VALUES: tuple[Any, ...] = (
+    None, True, False, 0, -1, 3.7, math.nan, math.inf, -math.inf, 1e308, -1e308, 2**63 - 1, "", "word",
+    "nan", "12", "x" * 300_000, [], [1], [1, 2], [1, 2, 3], [1, 2, 3, 4], [math.nan] * 3, ["a"], [[1]],
+    {}, {"a": 1}, b"bytes",
+)  # fmt: skip
+NAMES = (
+    "label", "visible", "disabled", "order", "hint", "options", "min", "max", "step", "precision", "content",
+    "uuid", "gui_api", "props", "removed", "update_cb", "sync_cb", "is_button", "parent_container_id",
+    "update_timestamp", "hold_cbs_from_freq", "_impl", "__class__", "no_such_thing",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [
+        SceneChoice("planar3-hold"),
+        SceneChoice("ridgeback-ur10-drag"),
+        SceneChoice.of_lesson(Exercise("deadlines")),
+    ],
+    ids=["torque", "velocity", "lesson"],
+)
+def test_whatever_is_written_the_page_goes_on(choice: SceneChoice, capfd: pytest.CaptureFixture[str]) -> None:
+    random = chance.Random(11)
+    server = PageServer(choice, port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows("every command, searchable") and page.shows("t = "))
+            learner = server.sessions.learners[0]
+            inputs = {uuid: each for uuid, each in list(page.controls.items()) if "value" in each}
+            assert len(inputs) > 20
+            pressable = ("GuiButtonMessage", "GuiButtonGroupMessage", "GuiUploadButtonMessage")
+            tried: set[str] = set()
+            for uuid, control in inputs.items():
+                for name in NAMES if control["type"] not in tried else random.sample(NAMES, 3):
+                    page.write(uuid, **{name: random.choice(VALUES)})
+                    page.write(uuid, **{"value": control["value"], name: random.choice(VALUES)})
+                if control["type"] not in pressable:  # what a press does is no bad value
+                    for value in VALUES if control["type"] not in tried else random.sample(VALUES, 4):
+                        page.write(uuid, value=value)
+                tried.add(control["type"])
+                time.sleep(0.05)  # a flood is another matter
+            page.say(_messages.GuiUpdateMessage("no such control", {"value": 1}))
+            page.say(_messages.GuiUpdateMessage(next(iter(inputs)), {}))
+            odd = {"type": "GuiUpdateMessage", "uuid": 5, "updates": 7}
+            page.send(msgspec.msgpack.encode(odd))
+            assert eventually(lambda: any(title == "Not changed" for title, _ in page.notices))
+            label = choice.exercise is None
+            assert_is_alive(page, learner, label)
+    finally:
+        server.close()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def assert_is_alive(page: Wire, learner: Any, runs: bool) -> None:
+    """The session answers, the page shows what it says, and what is pressed is done."""
+    assert learner.failure is None
+    before = learner.status.ticks
+    playback = page.find("Playback")
+    assert playback is not None
+    page.write(playback, value="Step")
+    assert eventually(lambda: page.shows("PAUSED"))
+    if runs:
+        assert eventually(lambda: learner.status.ticks != before)
+    speed = page.find("Speed")
+    assert speed is not None
+    page.write(speed, value=0.5)
+    assert eventually(lambda: learner.status.speed == 0.5)
