@@ -94,6 +94,14 @@ def test_app_is_the_folders_it_says() -> None:
     assert {path.name for path in (ROOT / "app").glob("*.py")} == {"__init__.py", "__main__.py"}
 
 
+def test_the_way_through_app_names_files_that_are_there() -> None:
+    """What app/__init__.py tells of a target's way down and a row's way up is about these files."""
+    told = ast.get_docstring(ast.parse((ROOT / "app" / "__init__.py").read_text())) or ""
+    named = set(re.findall(r"`(\w+/\w+)`", told))
+    assert len(named) >= 10
+    assert {name for name in named if not (ROOT / "app" / f"{name}.py").exists()} == set()
+
+
 @pytest.mark.parametrize("folder", APP)
 def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
     """commands → server → page → panels → view → client → link ← worker, never back and never across."""
