@@ -19,6 +19,8 @@ from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
 
+NEXT = Exercise("deadlines")
+
 
 def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a slow computer the next lesson is there while the texts of this one are still being written. A page
@@ -31,10 +33,10 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
         late = leaving.is_set() and stage._ready.choice.exercise == Exercise("one-task")
         if late:
             writing.set()
-            eventually(lambda: learner.ready is not stage._ready and learner.lecture is not None)
+            eventually(lambda: learner.lecture is not None and learner.lecture.exercise == NEXT)
         write(stage, moment)
         if late:
-            eventually(lambda: any(answers(page) for page in pages), 1.0)  # the browser has it already
+            eventually(lambda: any(answers(page) for page in pages), 3.0)  # the browser has it already
 
     monkeypatch.setattr(Stage, "_write", slow)
     server = PageServer(SceneChoice.of_lesson(Exercise("one-task")), port=0, max_sessions=1)
@@ -45,7 +47,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
             learner = server.sessions.learners[0]
             leaving.set()
             assert writing.wait(40.0)
-            learner.send(Load(SceneChoice.of_lesson(Exercise("deadlines"))))
+            learner.send(Load(SceneChoice.of_lesson(NEXT)))
             assert eventually(lambda: page.shows(load_lesson("deadlines").steps[0].title))
             assert eventually(lambda: answers(page) != [] and page.shows("t = "))
             asked = answers(page)[0]
