@@ -31,7 +31,7 @@ from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 STRICT = ("himpc", "hiqp", "nhimpc")
 """Controllers that keep priorities to rounding."""
@@ -221,7 +221,7 @@ class Monkey:
             if not np.isfinite(rows[:, fields[name]]).all():
                 self.found.blame(f"{name} is not a number in {self._where()}")
         settings = self.learner.settings
-        if not isinstance(settings, SceneSettings):
+        if not isinstance(settings, TorqueSettings):
             return
         # Null-space methods know no bounds: what motors that do not saturate are asked for, they give.
         if settings.controller in UNBOUNDED and not settings.plant.saturate:

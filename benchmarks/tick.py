@@ -14,13 +14,13 @@ from time import perf_counter_ns
 import numpy as np
 
 from himpc.telemetry import write_plan
-from lessons.scenes.catalog import load_scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
 
 
 def measure(scene: str, ticks: int) -> dict[str, dict[str, float] | float]:
     """Runs a scene and times the parts of every tick apart, on the same states as the whole tick."""
-    session = Session(load_scene(scene))
+    session = TorqueSession(torque_scene(scene))
     T_s, N = session.settings.T_s, session.settings.horizon
     spent: dict[str, list[int]] = {"tick": [], "reference": [], "control step": [], "telemetry": []}
     row = np.empty(session.layout.size)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from himpc.missions import Go, MissionTask
 from robots import InputError
+from robots.collision import Ball
 
 Vector = tuple[float, ...]
 
@@ -49,8 +51,58 @@ class Reset:
     """Back to the scene's start; settings stay as they are."""
 
 
-Event = Set | MoveLevel | MoveTarget | Push | Reset
-_KINDS = {kind.__name__: kind for kind in (Set, MoveLevel, MoveTarget, Push, Reset)}
+@dataclass(frozen=True)
+class Release:
+    """Somebody takes the ball: a hold of unknown length ends."""
+
+    task: str
+
+
+@dataclass(frozen=True)
+class InsertTask:
+    """A new task towards a goal (m), before another one or at the end; see `himpc.missions.MissionTask`."""
+
+    name: str
+    role: str
+    goal: Vector
+    before: str | None = None
+    cruise: float | None = None
+    tolerance: float = 0.02
+    hold: float | None = 0.0
+
+    def task(self) -> MissionTask:
+        """The task. Raises InputError for values that cannot be."""
+        return MissionTask(self.name, self.role, Go(self.goal, self.cruise), self.tolerance, self.hold)
+
+
+@dataclass(frozen=True)
+class RemoveTask:
+    """A task that is not completed leaves the mission."""
+
+    task: str
+
+
+@dataclass(frozen=True)
+class Appear:
+    """A ball (centre and radius, m) is suddenly there, or an obstacle of that name is somewhere else."""
+
+    name: str
+    centre: Vector
+    radius: float
+
+    def ball(self) -> Ball:
+        """The obstacle. Raises InputError for numbers that cannot be."""
+        if len(self.centre) != 3:
+            raise InputError(f"obstacle '{self.name}' needs a centre of three numbers")
+        x, y, z = self.centre
+        return Ball(self.name, (x, y, z), self.radius)
+
+
+Event = Set | MoveLevel | MoveTarget | Push | Reset | Release | InsertTask | RemoveTask | Appear
+_KINDS = {
+    kind.__name__: kind
+    for kind in (Set, MoveLevel, MoveTarget, Push, Reset, Release, InsertTask, RemoveTask, Appear)
+}
 
 
 def as_data(event: Event) -> dict[str, Any]:
@@ -62,10 +114,10 @@ def from_data(data: dict[str, Any]) -> Event:
     """The inverse of `as_data`. Raises InputError for data that is no event."""
     fields = dict(data)
     kind = _KINDS.get(str(fields.pop("event", "")))
+    if kind is None:
+        raise InputError(f"{data} is no event: its kind must be one of {', '.join(_KINDS)}")
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
     try:
-        if kind is None:
-            raise TypeError
         return kind(**values)
     except TypeError:
-        raise InputError(f"{data} is no event: its kind must be one of {', '.join(_KINDS)}") from None
+        raise InputError(f"{data} is no event: it does not fit {kind.__name__}") from None

@@ -17,7 +17,7 @@ from app.link.messages import Command, Failed, Loading, Ready, Refused, Report, 
 from app.link.process import Process
 from app.link.ring import Block
 from app.link.spares import Spares
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 
 T = TypeVar("T")
 _COMPLAIN = 2.0  # s between two notices that commands are lost
@@ -33,7 +33,7 @@ class Simulation:
     def __init__(self, spares: Spares) -> None:
         self.ready: Ready | None = None
         self.status: Status | None = None
-        self.settings: AnySettings | None = None
+        self.settings: Settings | None = None
         self.failure: str | None = None
         self.changed = 0
         self.tape = Tape()
@@ -124,7 +124,7 @@ class Simulation:
             notices, self._notices = self._notices, []
             return refusals, notices
 
-    def settings_of(self, ready: Ready) -> AnySettings:
+    def settings_of(self, ready: Ready) -> Settings:
         """The settings of a scene that came in: the newest ones, unless another scene came in since."""
         with self._lock:
             return ready.settings if self.settings is None or self.ready is not ready else self.settings

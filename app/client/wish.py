@@ -6,12 +6,12 @@ import time
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from lessons.kinds import AnyEvent
+from lessons.events import Event
 
 HOLD = 0.8
 """s during which a control that was just touched is not overwritten: the session's answer is on its way."""
 
-Send = Callable[[AnyEvent], None]
+Send = Callable[[Event], None]
 """Puts an event into the session's mailbox."""
 
 T = TypeVar("T")

@@ -41,14 +41,17 @@ def run(
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
-    from lessons.kinds import arrays_of, prepared, run_scene, summary_of
+    from lessons.recording.arrays import arrays
+    from lessons.recording.run import run
+    from lessons.recording.summary import summary
+    from lessons.scenes.catalog import prepared
 
     given = _given(scene, urdf, tip, state)
     given = replace(given, seed=given.seed if seed is None else seed)
     loaded = prepared(given.prepared(), controller, set)
     with progress_bar(f"{given.scene} …", json is None) as progress:
-        recording = run_scene(loaded, duration, given.seed, progress)
-    result = summary_of(recording)
+        recording = run(loaded, duration, given.seed, progress)
+    result = summary(recording)
     if npz is not None:
         how = {
             "scene": given.scene,
@@ -59,7 +62,7 @@ def run(
             "duration": recording.duration,
             "set": [*given.set, *set],
         }
-        _save(npz, arrays_of(recording, how))
+        _save(npz, arrays(recording, how))
     if json is not None:
         write_json(result, json)
     else:

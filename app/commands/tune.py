@@ -37,10 +37,10 @@ def tune(
     """
     from lessons.experiments.tune import chosen
     from lessons.experiments.tune import tune as tune_scene
-    from lessons.recording.run import with_assignments
-    from lessons.scenes.catalog import load_scene
+    from lessons.scenes.catalog import torque_scene
+    from lessons.settings.assignments import with_assignments
 
-    loaded = load_scene(scene)
+    loaded = torque_scene(scene)
     loaded = replace(loaded, settings=with_assignments(loaded.settings, set))
     seconds = loaded.duration if duration is None else duration
     steps = []

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from app.link.exercise import Exercise
-from lessons.kinds import AnyScene, find_scene, prepared
 from lessons.replay.state import State
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.scene import Scene
 from lessons.settings.assignments import differences
 from robots import InputError
 
@@ -44,11 +45,11 @@ class SceneChoice:
                 f"step {state.step or 1} of lesson '{state.lesson}' has another scene than the code: "
                 "it was made by another version; open the lesson itself"
             )
-        mine = differences(exercise.run.prepared(), state.prepared().settings)
+        mine = differences(exercise.run.prepared().settings, state.prepared().settings)
         return replace(lesson, seed=state.seed, mine=mine)
 
-    def scene(self) -> AnyScene:
+    def scene(self) -> Scene:
         """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
         if self.exercise is not None:
             return self.exercise.run.prepared()
-        return prepared(find_scene(self.name, self.urdf, self.tip, self.urdf_text), None, self.set)
+        return prepared(load_scene(self.name, self.urdf, self.tip, self.urdf_text), None, self.set)

@@ -11,7 +11,8 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
 from app.link.wire import Handle
 from himpc.telemetry import Layout
-from lessons.kinds import AnyEvent, AnySettings
+from lessons.events import Event
+from lessons.settings.settings import Settings
 from robots import Robot
 
 # ------------------------------------------------------------------ page → simulation
@@ -21,7 +22,7 @@ from robots import Robot
 class Post:
     """An event for the session's mailbox."""
 
-    event: AnyEvent
+    event: Event
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Begin:
     """Where a follower begins: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
-    settings: AnySettings
+    settings: Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +137,7 @@ class Ready:
     block: Handle  # of the shared memory
     robot: Robot
     layout: Layout
-    settings: AnySettings
+    settings: Settings
     tasks: tuple[TaskView, ...]
     room: np.ndarray
 
@@ -213,7 +214,7 @@ class Status:
     path: np.ndarray
     binding: tuple[BindingRow, ...]
     notices: tuple[str, ...] = ()
-    settings: AnySettings | None = field(default=None)
+    settings: Settings | None = field(default=None)
     gauge: tuple[float, float] | None = None
     mission: MissionView | None = None
     lecture: Lecture | None = None
@@ -246,7 +247,7 @@ class Script:
     before taking the events.
     """
 
-    events: tuple[tuple[float, AnyEvent], ...]
+    events: tuple[tuple[float, Event], ...]
     t: float
     begin: Begin | None
 
@@ -267,8 +268,8 @@ class Told:
     """
 
     choice: SceneChoice
-    settings: AnySettings
-    log: tuple[tuple[float, AnyEvent], ...]
+    settings: Settings
+    log: tuple[tuple[float, Event], ...]
     t: float
 
 

@@ -37,7 +37,8 @@ from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
-from lessons.kinds import AnyEvent, AnySettings
+from lessons.events import Event
+from lessons.settings.settings import Settings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -133,10 +134,10 @@ class Stage:
 
     # ---------------------------------------------------------------- events out
 
-    def _settings(self) -> AnySettings:
+    def _settings(self) -> Settings:
         return self._learner.settings_of(self._ready)
 
-    def _post(self, event: AnyEvent) -> None:
+    def _post(self, event: Event) -> None:
         self._learner.send(Post(event))
 
     # ---------------------------------------------------------------- following

@@ -17,7 +17,7 @@ from app.link.messages import Post, Ready, Status
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from app.view.robot import RobotView
-from lessons.kinds import AnyEvent
+from lessons.events import Event
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Context:
     dark: bool
     theme: Callable[[bool], None]
 
-    def post(self, event: AnyEvent) -> None:
+    def post(self, event: Event) -> None:
         """An event for the session's mailbox."""
         self.learner.send(Post(event))
 
@@ -65,7 +65,7 @@ class Face(Protocol):
         """What the 3D view shows besides robot and floor."""
         ...
 
-    def toggle(self, place: int) -> AnyEvent | None:
+    def toggle(self, place: int) -> Event | None:
         """The event that switches the level at a place (0-based) on or off; None if there is none."""
         ...
 

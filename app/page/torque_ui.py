@@ -25,7 +25,7 @@ from app.view.robot import RobotView, camera_for
 from app.view.target import Frames
 from app.view.trails import Trails
 from lessons.events import Set
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 
 class TorqueFace:
@@ -123,7 +123,7 @@ class TorqueFace:
         self._level_plots.draw(moment.window, beside, T_s)
         self._joint_plots.draw(moment.window, beside)
 
-    def write(self, now: Snapshot[SceneSettings]) -> None:
+    def write(self, now: Snapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:
             fields = now.ready.layout.fields
             # The snapshot's row is its own copy.

@@ -27,9 +27,8 @@ from app.view.surroundings import Carried, People, ReachCircle
 from app.view.target import Frames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
-from lessons.events import Set
-from lessons.settings.velocity import MobileSettings
-from lessons.velocity_events import Appear
+from lessons.events import Appear, Set
+from lessons.settings.velocity import VelocitySettings
 from robots.stretch import horizontal_reach
 
 _AHEAD, _RADIUS = 0.7, 0.2
@@ -102,7 +101,7 @@ class VelocityFace:
 
     # ---------------------------------------------------------------- events out
 
-    def _settings(self) -> MobileSettings:
+    def _settings(self) -> VelocitySettings:
         return self._context.settings
 
     def _status(self) -> Status | None:
@@ -189,7 +188,7 @@ class VelocityFace:
             fields = self._context.ready.layout.fields
             self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), None)
 
-    def write(self, now: Snapshot[MobileSettings]) -> None:
+    def write(self, now: Snapshot[VelocitySettings]) -> None:
         self._begin.update(now)
         self._mission.update(now)
         self._roles.update(now)

@@ -17,7 +17,7 @@ from app.view.coordinates import draggable, full, raw, xyzw
 from app.view.reachability import Judge, Question, Verdict
 from app.view.target import Frames, TargetGizmo
 from lessons.events import MoveTarget
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 _OWN = 1.0
 """s after a drag in which targets that change are taken to be the hand's own."""
@@ -106,7 +106,7 @@ class Hand:
     def show(
         self,
         frames: Frames,
-        settings: SceneSettings,
+        settings: TorqueSettings,
         latest: np.ndarray,
         fields: dict[str, slice],
     ) -> None:

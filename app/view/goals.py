@@ -12,8 +12,7 @@ from app.html.palette import RGB
 from app.html.text import free_name, quantity
 from app.link.messages import MissionRow, Ready, Status, TaskView
 from app.view.goal import Goal
-from lessons.events import MoveTarget
-from lessons.velocity_events import InsertTask
+from lessons.events import InsertTask, MoveTarget
 
 _THERE = 5e-3
 """m: a point this near has got there."""

@@ -9,7 +9,7 @@ from app.link.messages import Begin, Command, Follow, Loading, Quit, Reached, Re
 from app.link.wire import Wire
 from app.worker.reports.start import Run
 from app.worker.simulation import Body
-from lessons.kinds import AnyScene
+from lessons.scenes.scene import Scene
 from lessons.session.follower import Follower, followed
 from robots import InputError
 
@@ -28,7 +28,7 @@ class Shadow(Body):
         super().__init__(begin.choice)
         self.follower = Follower(self.session, begin.settings, own)
 
-    def _load_scene(self, choice: SceneChoice) -> AnyScene:
+    def _load_scene(self, choice: SceneChoice) -> Scene:
         return followed(super()._load_scene(choice), self._leader, self._own)
 
     def _lecturer(self, choice: SceneChoice, run: Run) -> None:

@@ -6,7 +6,7 @@ import math
 
 from app.link.choice import SceneChoice
 from app.link.messages import Begin, Script
-from lessons.kinds import AnySession
+from lessons.session.session import Session
 
 
 class Leader:
@@ -19,7 +19,7 @@ class Leader:
         self._told = 0
         self._t = math.nan
 
-    def begin(self, choice: SceneChoice, session: AnySession) -> None:
+    def begin(self, choice: SceneChoice, session: Session) -> None:
         """The session was just reset: followers begin here, and until one is there no time passes."""
         self.on, self.leash = True, 0.0
         self._begin = Begin(choice, session.settings)
@@ -33,7 +33,7 @@ class Leader:
         """Whether going on to t (s) would leave the follower too far behind."""
         return t > self.leash + 1e-9
 
-    def script(self, session: AnySession) -> Script | None:
+    def script(self, session: Session) -> Script | None:
         """What is new since the last call, if anything is."""
         if not self.on:
             return None

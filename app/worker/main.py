@@ -104,7 +104,7 @@ def _simulate(wire: Wire, body: Body) -> None:
         now = time.perf_counter()
         ran = 0
         if body.running:
-            due = pacer.due(now, body.run.step_s)
+            due = pacer.due(now, body.session.step_s)
             ran = _run(body, pacer, due, until=now + _CHUNK)
         else:
             pacer.rest(now)
@@ -131,7 +131,7 @@ def _simulate(wire: Wire, body: Body) -> None:
 def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:
     """Runs up to so many steps, and returns how many it were."""
     for ran in range(due):
-        step_s = body.run.step_s
+        step_s = body.session.step_s
         if body.leader.waits(body.session.t + step_s):
             return ran
         body.advance()

@@ -34,9 +34,10 @@ from app.worker.lesson.lecturer import Lecturer
 from app.worker.link_poses import LinkPoses
 from app.worker.reports.start import Run, start
 from lessons.events import Reset, Set
-from lessons.kinds import AnyScene, AnySession, AnySettings
-from lessons.recording.run import parse_assignment
-from lessons.replay.state import settings_now
+from lessons.scenes.scene import Scene
+from lessons.session.session import Session
+from lessons.settings.assignments import parse_assignment
+from lessons.settings.settings import Settings
 from robots import InputError
 
 
@@ -45,7 +46,7 @@ class Loaded:
     """A scene at its beginning, once nothing of it can be refused any more. mine: a learner's changes."""
 
     choice: SceneChoice
-    scene: AnyScene
+    scene: Scene
     run: Run
     lecturer: Lecturer | None
     mine: tuple[Post, ...]
@@ -60,11 +61,11 @@ class Body:
         self.speed = 1.0
         self.ticks = self.over_budget = self.late = self._steps = 0
         self.resets = 0
-        self._sent: AnySettings | None = None
+        self._sent: Settings | None = None
         self.leader = Leader()
         self._enter(self._loaded(choice, self._load_scene(choice)))
 
-    def _loaded(self, choice: SceneChoice, scene: AnyScene) -> Loaded:
+    def _loaded(self, choice: SceneChoice, scene: Scene) -> Loaded:
         run = start(scene, choice.seed)
         mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
         return Loaded(choice, scene, run, self._lecturer(choice, run), mine)
@@ -78,7 +79,7 @@ class Body:
         self._late = fields["late"].start if "late" in fields else None
         self._begin_anew(loaded)
 
-    def _load_scene(self, choice: SceneChoice) -> AnyScene:
+    def _load_scene(self, choice: SceneChoice) -> Scene:
         return choice.scene()
 
     def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
@@ -103,7 +104,7 @@ class Body:
             self.leader.begin(self.choice, self.session)
 
     @property
-    def session(self) -> AnySession:
+    def session(self) -> Session:
         return self.run.session
 
     # ---------------------------------------------------------------- commands
@@ -118,12 +119,12 @@ class Body:
             case Post(Reset()) if lecturer is not None and not lecturer.waiting:
                 self._begin(own=False, fast=False)
             case Post(Reset() as event):
-                self.run.post(event)
+                self.session.post(event)
                 self.resets += 1
                 if not self.running:
                     self._steps = max(self._steps, 1)  # a reset must show while paused, too
             case Post(event):
-                self.run.post(event)
+                self.session.post(event)
                 if lecturer is not None:
                     lecturer.touch(event)
             case RunStep(own, fast):
@@ -147,7 +148,7 @@ class Body:
             case Load(choice):
                 return self._load(choice)
             case Tell():
-                return Told(self.choice, settings_now(self.session), tuple(self.session.log), self.session.t)
+                return Told(self.choice, self.session.settings_now, tuple(self.session.log), self.session.t)
             case Lead(on):
                 self._lead(on)
             case Leash(until):
@@ -160,7 +161,7 @@ class Body:
         if not on:
             self.leader.end()
             return
-        if self.run.between:
+        if self.session.between:
             self.tick()
         self.session.post(Reset())
         self.session.drain()
@@ -212,7 +213,7 @@ class Body:
 
     def advance(self) -> bool:
         """One step of the run; whether a control period ended with it, and its telemetry was written."""
-        row = self.run.advance()
+        row = self.session.advance()
         if row is None:
             return False
         self.block.write(row)
@@ -238,7 +239,7 @@ class Body:
     def _finish_period(self) -> None:
         # A pause stands between two control periods: what is changed meanwhile takes effect at once, and
         # where the same events strike again a recording of the run comes out the same.
-        if not self.running and self.run.between:
+        if not self.running and self.session.between:
             self.tick()
 
     def settle(self) -> None:

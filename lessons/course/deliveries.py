@@ -8,14 +8,13 @@ You need: lesson "first-hold-then-reach"
 
 from __future__ import annotations
 
-from lessons.events import MoveTarget
+from lessons.events import MoveTarget, Release
 from lessons.teaching.challenge import Challenge, Score
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
 from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
 from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, Option
-from lessons.velocity_events import Release
 
 HAND = Signal("error/ee", "mm")
 WAY = Signal("way of the base", "m")

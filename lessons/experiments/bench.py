@@ -10,8 +10,8 @@ import numpy as np
 
 from himpc.cascade.cascade import Route
 from himpc.qp import Solver, is_installed
-from lessons.scenes.catalog import load_scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
 
 HORIZONS = (5, 10, 20, 30)
 CONTENDERS: tuple[tuple[Route, Solver], ...] = (
@@ -55,14 +55,14 @@ def bench(
         ticks: timed ticks per contender.
         progress: called with the share that is done.
     """
-    loaded = load_scene(scene)
+    loaded = torque_scene(scene)
     timings = []
     for place, N in enumerate(horizons):
         sessions = {}
         contenders = CONTENDERS if N <= _LONGEST_EXPLICIT else CONTENDERS[:1]
         for route, solver in (each for each in contenders if is_installed(each[1])):
             settings = replace(loaded.settings, horizon=N, route=route, solver=solver)
-            sessions[route, solver] = Session(replace(loaded, settings=settings))
+            sessions[route, solver] = TorqueSession(replace(loaded, settings=settings))
         steps: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
         solves: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
         for _ in range(-(-ticks // _TURN)):

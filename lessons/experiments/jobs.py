@@ -4,26 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lessons.parallel import Failed, on_cores, one_by_one
-from lessons.recording.run import run, with_assignments
-from lessons.recording.torque import Recording, summary
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
-from lessons.settings.torque import changed
+from lessons.recording.recording import Recording
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.scene import Scene
 
 Array = NDArray[np.float64]
 
 TIMING_KEYS = ("step_ms", "real_time_factor")
 """Keys of a summary that differ from run to run; all others are the same to the bit."""
 
-_KEPT = ("t", "q", "v", "tau", "tau_demand", "tau_lower", "tau_upper", "v_limit", "at_bound", "delta_tau")
+_KEPT = (
+    "t",
+    "q",
+    "v",
+    "tau",
+    "tau_demand",
+    "tau_lower",
+    "tau_upper",
+    "v_limit",
+    "at_bound",
+    "delta_tau",
+    "step_us",
+)
 _KEPT_PER_TASK = ("x", "x_d", "error")
+_KEPT_PER_LEVEL = ("cost", "step")
 
 
 @dataclass(frozen=True)
@@ -48,9 +61,7 @@ class Job:
 
     def prepared(self) -> Scene:
         """The scene with controller and assignments. Raises InputError for what cannot be."""
-        scene = load_scene(self.scene)
-        settings = with_assignments(changed(scene.settings, "controller", self.controller), self.set)
-        return replace(scene, settings=settings)
+        return prepared(load_scene(self.scene), self.controller, self.set)
 
     def do(self) -> Run:
         """The run. Raises InputError for what cannot be."""
@@ -133,10 +144,9 @@ def _arrays(recording: Recording) -> dict[str, Array]:
     names = [
         *_KEPT,
         *(f"{field}/{task.name}" for task in layout.tasks for field in _KEPT_PER_TASK),
-        *(f"cost/{level}" for level in layout.levels),
-        "step_us",
+        *(f"{field}/{level}" for level in layout.levels for field in _KEPT_PER_LEVEL),
     ]
-    return {name: np.ascontiguousarray(recording[name]) for name in names}
+    return {name: np.ascontiguousarray(recording[name]) for name in names if name in layout.fields}
 
 
 def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = None) -> Results:

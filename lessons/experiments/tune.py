@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lessons.recording.recording import Recording
 from lessons.recording.run import run
-from lessons.recording.torque import Recording, summary
-from lessons.scenes.torque_scene import Scene
-from lessons.settings.torque import changed
+from lessons.recording.summary import summary
+from lessons.scenes.torque_scene import TorqueScene
 from robots import InputError
 
 MAX_STEPS = 60
@@ -39,7 +39,7 @@ class Step:
 
 
 def tune(
-    scene: Scene,
+    scene: TorqueScene,
     start: float,
     factor: float,
     accuracy: float,
@@ -71,7 +71,7 @@ def tune(
         raise InputError(f"--factor is {factor}: give a factor from 1.01 to 10, e.g. 1.5")
     scale, kept_control = start, False
     for _ in range(MAX_STEPS):
-        settings = changed(scene.settings, "M_bar_scale", scene.settings.M_bar_scale * scale)
+        settings = scene.settings.changed("M_bar_scale", scene.settings.M_bar_scale * scale)
         recording = run(replace(scene, settings=settings), seconds, seed)
         error, roughness = _error(recording), _roughness(recording)
         if recording.session.diverged_at is not None:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.telemetry import Layout
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 from lessons.settings.values import finite
 
 Array = NDArray[np.float64]
 
 
-def named(layout: Layout, rows: Array, settings: AnySettings, how: dict[str, Any]) -> dict[str, Any]:
+def named(layout: Layout, rows: Array, settings: Settings, how: dict[str, Any]) -> dict[str, Any]:
     """Every field of telemetry by its name, and what the run was.
 
     Args:
@@ -33,7 +32,7 @@ def named(layout: Layout, rows: Array, settings: AnySettings, how: dict[str, Any
     data: dict[str, Any] = {name: rows[:, where] for name, where in layout.fields.items()}
     data = {name: found[:, 0] if found.shape[1] == 1 else found for name, found in data.items()}
     data["joint_names"] = np.array(layout.joints)
-    told = {**how, "in_force": json.loads(json.dumps(asdict(settings), default=str))}
+    told = {**how, "in_force": settings.as_data()}
     data["settings"] = np.array(json.dumps(finite(told)))
     return data
 

@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from lessons.events import Reset
-from lessons.kinds import AnySettings, settings_after
+from lessons.events import Event, Reset
 from lessons.replay.state import State
 from lessons.settings.assignments import differences
-from lessons.settings.torque import SceneSettings
-from lessons.velocity_events import MobileEvent
+from lessons.settings.settings import Settings, settings_after
 
-Log = Sequence[tuple[float, MobileEvent]]
-_COMMON = ("Set", "MoveLevel", "MoveTarget", "Push")
+Log = Sequence[tuple[float, Event]]
 
 
 def script(state: State, log: Log, duration: float) -> str:
@@ -36,7 +33,7 @@ def script(state: State, log: Log, duration: float) -> str:
     resets = [place for place, (_, event) in enumerate(log) if isinstance(event, Reset)]
     start = resets[-1] + 1 if resets else 0
     settings = settings_after(scene.settings, (event for _, event in log[:start]))
-    assignments = differences(state.loaded(), settings)
+    assignments = differences(state.loaded().settings, settings)
     events = log[start:]
     find = ", ".join(repr(each) for each in _arguments(state))
     parts = [
@@ -47,7 +44,7 @@ def script(state: State, log: Log, duration: float) -> str:
         ),
         *_imports(events),
         _IMPORTS,
-        f"SCENE = find_scene({find})",
+        f"SCENE = load_scene({find})",
         _tuple("SETTINGS", (repr(each) for each in assignments)),
         _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
         f"DURATION = {_literal(float(duration))}  # s",
@@ -75,15 +72,18 @@ import numpy as np
 _CAUTION = """
 Measured computing times took part in it, so every repetition comes out a little different."""
 
-_IMPORTS = """from lessons.kinds import arrays_of, find_scene, prepared, run_scene, summary_of
+_IMPORTS = """from lessons.recording.arrays import arrays
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import load_scene, prepared
 """
 
 _TAIL = """
 scene = replace(prepared(SCENE, None, SETTINGS), events=EVENTS)
-recording = run_scene(scene, DURATION, SEED, to_the_end=True)
-print(json.dumps(summary_of(recording), indent=2))
+recording = run(scene, DURATION, SEED, to_the_end=True)
+print(json.dumps(summary(recording), indent=2))
 if len(sys.argv) > 1:
-    np.savez_compressed(sys.argv[1], **arrays_of(recording, {"scene": SCENE.name, "seed": SEED}))
+    np.savez_compressed(sys.argv[1], **arrays(recording, {"scene": SCENE.name, "seed": SEED}))
 """
 
 
@@ -93,28 +93,18 @@ def _arguments(state: State) -> tuple[str | None, ...]:
     return (state.scene,) if state.urdf is None else (state.scene, state.urdf)
 
 
-def _measures_time(settings: AnySettings, events: Log) -> bool:
+def _measures_time(settings: Settings, events: Log) -> bool:
     """Whether the clock on the wall ever decided anything."""
     for event in (None, *(event for _, event in events)):
         settings = settings if event is None else settings_after(settings, (event,))
-        if not isinstance(settings, SceneSettings):
-            if settings.delay_measured:
-                return True
-        elif settings.deadline_ms and not settings.solve_ms_per_knot:
+        if settings.measures_time:
             return True
     return False
 
 
 def _imports(events: Log) -> list[str]:
     names = sorted({type(event).__name__ for _, event in events})
-    lines = []
-    for module, own in (
-        ("lessons.events", [name for name in names if name in _COMMON]),
-        ("lessons.velocity_events", [name for name in names if name not in _COMMON]),
-    ):
-        lines += [f"from {module} import {', '.join(own)}"] if own else []
-    # kinds sorts between the two; a script is not linted, but it should look as if.
-    return lines
+    return [f"from lessons.events import {', '.join(names)}"] if names else []
 
 
 def _tuple(name: str, items: Iterable[str]) -> str:
@@ -122,7 +112,7 @@ def _tuple(name: str, items: Iterable[str]) -> str:
     return f"{name} = (\n{lines})" if lines else f"{name} = ()"
 
 
-def _call(event: MobileEvent) -> str:
+def _call(event: Event) -> str:
     """An event as the call that makes it; what is as by default is left out."""
     given = [
         f"{field.name}={_literal(value)}" if place > 1 else _literal(value)

@@ -9,18 +9,15 @@ import re
 import shlex
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from lessons.course import COURSE
-from lessons.kinds import AnyScene, AnySettings, find_scene, prepared
-from lessons.recording.run import parse_assignment
-from lessons.scenes.names import MOBILE_SCENES, SCENES
-from lessons.session.torque import Session
-from lessons.session.velocity import MobileSession
-from lessons.settings.assignments import differences
-from lessons.settings.missions import OrderOptions
-from lessons.settings.torque import SceneSettings
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.names import SCENES, VELOCITY_SCENES
+from lessons.scenes.scene import Scene
+from lessons.settings.assignments import differences, parse_assignment
+from lessons.settings.settings import Settings
 from robots import CATALOG, InputError
 from robots.errors import unknown_name
 
@@ -59,18 +56,18 @@ class State:
     lesson: str | None = None
     step: int | None = None
 
-    def loaded(self) -> AnyScene:
+    def loaded(self) -> Scene:
         """The scene as it is without the assignments. Raises InputError for one that cannot be loaded."""
-        return find_scene(self.scene, self.urdf, self.tip)
+        return load_scene(self.scene, self.urdf, self.tip)
 
-    def prepared(self) -> AnyScene:
+    def prepared(self) -> Scene:
         """The scene with every assignment. Raises InputError, one sentence, for what cannot be."""
         return prepared(self.loaded(), None, self.set)
 
 
 def state_of(
     scene: str,
-    settings: AnySettings,
+    settings: Settings,
     *,
     urdf: str | None = None,
     tip: str | None = None,
@@ -83,23 +80,8 @@ def state_of(
     Raises:
         InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
     """
-    own = find_scene(scene, urdf, tip)
-    return State(scene, urdf, tip, differences(own, settings), seed, lesson, step)
-
-
-def settings_now(session: Session | MobileSession) -> AnySettings:
-    """The settings in force in a session. At velocity level priorities belong to the run: where a scene can
-    begin with others, those of now stand among the settings."""
-    settings = session.settings
-    if isinstance(settings, SceneSettings) or not isinstance(settings.options, OrderOptions):
-        return settings
-    assert isinstance(session, MobileSession)
-    names = [task.name for task in session.progress.mission]
-    order = tuple(name for name in names if name in session.roles)
-    if len(order) < len(session.roles):
-        return settings
-    own = () if order == tuple(session.roles) and not settings.options.order else order
-    return replace(settings, options=replace(settings.options, order=own))
+    own = load_scene(scene, urdf, tip)
+    return State(scene, urdf, tip, differences(own.settings, settings), seed, lesson, step)
 
 
 def command_line(state: State) -> str:
@@ -186,8 +168,8 @@ def _checked(given: Any) -> State:
     if not isinstance(given, dict) or not given.keys() <= set(_KEYS.values()):
         raise InputError("the code holds something else than a state of himpc-lab: copy it again")
     scene = _text(given, "s", "scene") or ""
-    if scene not in SCENES and scene not in MOBILE_SCENES:
-        raise unknown_name("scene", scene, (*SCENES, *MOBILE_SCENES))
+    if scene not in SCENES and scene not in VELOCITY_SCENES:
+        raise unknown_name("scene", scene, (*SCENES, *VELOCITY_SCENES))
     urdf = _text(given, "r", "robot")
     if urdf is not None and urdf not in CATALOG:
         raise InputError(

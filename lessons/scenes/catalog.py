@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TypeVar
 
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
 from lessons.scenes.hold import hold, hold_of
+from lessons.scenes.missions import velocity_scene
 from lessons.scenes.mobile_hold import ridgeback_hold
-from lessons.scenes.names import MOBILE_SCENES, SCENES
+from lessons.scenes.names import ALL_SCENES, VELOCITY_SCENES
 from lessons.scenes.planar import planar3_circle, planar3_conflict, planar3_singular
-from lessons.scenes.torque_scene import Scene
+from lessons.scenes.scene import Scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.settings.assignments import with_assignments
+from lessons.settings.torque import TorqueSettings
+from lessons.settings.velocity import VelocitySettings
 from robots import InputError
 from robots.errors import unknown_name
 
-_MAKERS: dict[str, Callable[[], Scene]] = {
+AnyScene = TypeVar("AnyScene", bound=Scene)
+
+
+_MAKERS: dict[str, Callable[[], TorqueScene]] = {
     "iiwa14-hold": lambda: hold_of("iiwa14"),
     "panda-hold": lambda: hold_of("panda"),
     "planar3-hold": lambda: hold_of("planar3"),
@@ -32,7 +42,7 @@ def load_scene(
     """A scene by its name.
 
     Args:
-        name: a key of SCENES.
+        name: a key of ALL_SCENES.
         urdf: path of a URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
         urdf_text: a URDF's text instead of its path (uploads).
@@ -40,16 +50,44 @@ def load_scene(
     Raises:
         InputError: unknown scene, a URDF where none fits or none where one is needed, or a bad one.
     """
-    if name in MOBILE_SCENES:
-        raise InputError(
-            f"scene '{name}' is driven by velocities; this takes torques: choose e.g. iiwa14-hold"
-        )
-    if name not in SCENES:
-        raise unknown_name("scene", name, (*SCENES, *MOBILE_SCENES))
+    if name not in ALL_SCENES:
+        raise unknown_name("scene", name, ALL_SCENES)
     if name == "hold":
         if urdf is None and urdf_text is None:
             raise InputError("scene 'hold' needs a robot: add --urdf FILE.urdf, or take iiwa14-hold")
         return hold(urdf, tip, urdf_text)
     if urdf is not None or urdf_text is not None or tip is not None:
         raise InputError(f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf and --tip")
-    return _MAKERS[name]()
+    return velocity_scene(name) if name in VELOCITY_SCENES else _MAKERS[name]()
+
+
+def torque_scene(name: str, urdf: str | None = None, tip: str | None = None) -> TorqueScene:
+    """A torque-level scene by its name. Raises InputError also for one of the other kind."""
+    scene = load_scene(name, urdf, tip)
+    if not isinstance(scene, TorqueScene):
+        raise InputError(
+            f"scene '{name}' is driven by velocities; this takes torques: choose e.g. iiwa14-hold"
+        )
+    return scene
+
+
+def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:
+    """The scene with another controller (None: its own) and every "PATH=VALUE", in order.
+
+    Raises:
+        InputError: unknown controller or one of the other kind, unknown path, or a value that does not fit.
+    """
+    settings = scene.settings
+    if controller is not None:
+        if controller not in settings.controllers and controller in _COMMANDS:
+            raise InputError(
+                f"controller '{controller}' commands {_COMMANDS[controller]} and scene '{scene.name}' takes "
+                f"{_COMMANDS[settings.controller]}: choose one of {', '.join(settings.controllers)}"
+            )
+        settings = settings.changed("controller", controller)
+    return replace(scene, settings=with_assignments(settings, assignments))
+
+
+_COMMANDS = dict.fromkeys(TorqueSettings.controllers, "torques") | dict.fromkeys(
+    VelocitySettings.controllers, "velocities"
+)

@@ -13,8 +13,8 @@ from himpc.limits import Limits
 from himpc.references import Circle, Hold, Phase, Reference, Sinusoid
 from himpc.stack import Level, Stack
 from himpc.tasks import FrameOrientation, FramePosition, Joints
-from lessons.scenes.torque_scene import Scene
-from lessons.settings.torque import SceneSettings
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ OMEGA = 0.5 * np.pi
 """rad/s; RT4 repeats after 4 s."""
 
 
-def iiwa14_circle() -> Scene:
+def iiwa14_circle() -> TorqueScene:
     """`iiwa14-circle`: Table IV's gains, Q = 200, R = 10, N = 5, the paper's M̄, data-sheet limits, from rest.
 
     The paper prints z_d = 1.096 − 0.1(0.5πt); read as 1.096 − 0.1 sin(0.5πt), the only reading that gives
@@ -35,11 +35,11 @@ def iiwa14_circle() -> Scene:
         Level((FrameOrientation(name="orientation", K_p=50.0, K_v=5.0),)),
         Level((Joints(name="q1", joints=robot.joint_names[:1], K_p=50.0, K_v=5.0),)),
     )
-    return Scene(
+    return TorqueScene(
         name="iiwa14-circle",
         title="KUKA iiwa 14 on RT4 of the HIMPC paper",
         robot=robot,
-        settings=SceneSettings(levels=levels, M_bar=tuple(robot.M_bar)),
+        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar)),
         references=rt4,
         q_0=np.deg2rad([0.0, 60.0, 0.0, 60.0, 0.0, 0.0, 0.0]),
         v_0=np.zeros(robot.n),
@@ -47,7 +47,7 @@ def iiwa14_circle() -> Scene:
     )
 
 
-def iiwa14_circle_paper() -> Scene:
+def iiwa14_circle_paper() -> TorqueScene:
     """`iiwa14-circle-paper`: the same reference, stack and weights as section VI most likely simulated them.
 
     The paper leaves open what its plant was. Its q₁ error (8.77°) fits a weightless robot without friction or
@@ -74,7 +74,7 @@ def iiwa14_circle_paper() -> Scene:
     )
 
 
-def _reference_velocity(scene: Scene) -> Array:
+def _reference_velocity(scene: TorqueScene) -> Array:
     """The smallest joint velocity with which levels 1 and 2 start on their references, (n,) rad/s."""
     robot, upper = scene.robot, scene.settings.levels[:2]
     references = scene.references(robot, scene.settings.levels)

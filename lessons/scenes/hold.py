@@ -8,15 +8,15 @@ import numpy as np
 
 from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
-from lessons.scenes.torque_scene import Scene
-from lessons.settings.torque import SceneSettings
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar
 
 PLANAR3_PLANT = PlantSettings(armature=(0.05, 0.05, 0.03))
 """The paper's M̄ = 0.033 supposes geared motors: without armature the loop would be unstable."""
 
 
-def hold_of(name: str) -> Scene:
+def hold_of(name: str) -> TorqueScene:
     """The hold scene of a catalog robot.
 
     The iiwa does not keep the paper's M̄ here: it was tuned for one motion, and in a few per cent of the
@@ -30,7 +30,7 @@ def hold_of(name: str) -> Scene:
     return replace(_hold(robot, plant), name=f"{name}-hold", sources={})
 
 
-def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> Scene:
+def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> TorqueScene:
     """The hold scene of any robot: a URDF path, a catalog name or a URDF's text.
 
     Raises:
@@ -41,18 +41,18 @@ def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> Sce
     return _hold(robot, plant)
 
 
-def _hold(robot: Robot, plant: PlantSettings) -> Scene:
+def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
     position_axes, orientation_axes = _free_axes(robot)
     K_p, K_v = gains(robot, plant)
     levels = [Level((FramePosition(name="position", axes=position_axes, K_p=K_p, K_v=K_v),))]
     if orientation_axes:
         levels.append(Level((FrameOrientation(name="orientation", axes=orientation_axes, K_p=K_p, K_v=K_v),)))
     levels.append(Level((Posture(name="posture", K_p=K_p, K_v=K_v),)))
-    return Scene(
+    return TorqueScene(
         name="hold",
         title=f"{robot.name}: drag the target; position, then orientation, then posture",
         robot=robot,
-        settings=SceneSettings(levels=tuple(levels), M_bar=tuple(robot.M_bar), plant=plant),
+        settings=TorqueSettings(levels=tuple(levels), M_bar=tuple(robot.M_bar), plant=plant),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

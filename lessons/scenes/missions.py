@@ -10,35 +10,34 @@ import numpy as np
 from himpc.htmpc import HTMPCSettings
 from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition
-from lessons.events import MoveTarget
-from lessons.scenes.names import MOBILE_SCENES
-from lessons.scenes.velocity_scene import MobileScene
+from lessons.events import Event, MoveTarget, Release
+from lessons.scenes.names import VELOCITY_SCENES
+from lessons.scenes.velocity_scene import VelocityScene
 from lessons.settings.missions import (
     CLUTTER,
     ClutteredOptions,
     DeliveryOptions,
     HandoverOptions,
-    MobileOptions,
+    MissionOptions,
     SquareOptions,
     Stay,
     WaypointOptions,
 )
-from lessons.settings.velocity import STAGE_WEIGHT, MobileSettings
-from lessons.velocity_events import MobileEvent, Release
+from lessons.settings.velocity import STAGE_WEIGHT, VelocitySettings
 from robots import Robot, load_robot
 
 DELIVERY_SPEEDS = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0)
 """m/s and rad/s: a robot that works among people."""
 
 
-def mobile_scene(name: str) -> MobileScene:
-    """A scene of MOBILE_SCENES."""
+def velocity_scene(name: str) -> VelocityScene:
+    """A scene of VELOCITY_SCENES."""
     return _MAKERS[name]()
 
 
 def _ridgeback(
-    name: str, options: MobileOptions, duration: float, events: tuple[tuple[float, MobileEvent], ...] = ()
-) -> MobileScene:
+    name: str, options: MissionOptions, duration: float, events: tuple[tuple[float, Event], ...] = ()
+) -> VelocityScene:
     levels = (
         Level((FramePosition(name="ee"),), Q=STAGE_WEIGHT["proximal"]),
         Level((FramePosition(name="base", frame="base", axes="xy"),), Q=STAGE_WEIGHT["proximal"]),
@@ -50,26 +49,26 @@ def _scene(
     name: str,
     robot: Robot,
     levels: tuple[Level, ...],
-    options: MobileOptions,
+    options: MissionOptions,
     duration: float,
-    events: tuple[tuple[float, MobileEvent], ...] = (),
-) -> MobileScene:
-    return MobileScene(
+    events: tuple[tuple[float, Event], ...] = (),
+) -> VelocityScene:
+    return VelocityScene(
         name=name,
-        title=MOBILE_SCENES[name],
+        title=VELOCITY_SCENES[name],
         robot=robot,
-        settings=MobileSettings(HTMPCSettings(levels), options=options),
+        settings=VelocitySettings(HTMPCSettings(levels), options=options),
         q_0=robot.home,
         duration=duration,
         events=events,
     )
 
 
-def _among_people(scene: MobileScene) -> MobileScene:
+def _among_people(scene: VelocityScene) -> VelocityScene:
     return replace(scene, robot=replace(scene.robot, v_limit=np.array(DELIVERY_SPEEDS)))
 
 
-def _handover() -> MobileScene:
+def _handover() -> VelocityScene:
     """The ball is taken after 14 s; meanwhile the second person moves, and shifts the hand later on."""
     events = (
         (8.0, MoveTarget("base 2", (-1.2, -0.4))),
@@ -81,13 +80,13 @@ def _handover() -> MobileScene:
     return _among_people(_ridgeback("ridgeback-ur10-handover", HandoverOptions(), 60.0, events))
 
 
-def _cluttered() -> MobileScene:
+def _cluttered() -> VelocityScene:
     scene = _ridgeback("ridgeback-ur10-cluttered", ClutteredOptions(), 30.0)
     htmpc = replace(scene.settings.htmpc, obstacles=CLUTTER)
     return replace(scene, settings=replace(scene.settings, htmpc=htmpc))
 
 
-def _arm(robot: str) -> MobileScene:
+def _arm(robot: str) -> VelocityScene:
     levels = (
         Level((FramePosition(name="position"),), Q=STAGE_WEIGHT["proximal"]),
         Level((FrameOrientation(name="orientation"),), Q=STAGE_WEIGHT["proximal"]),
@@ -95,7 +94,7 @@ def _arm(robot: str) -> MobileScene:
     return _scene(f"{robot}-htmpc", load_robot(robot), levels, Stay(), 4.0)
 
 
-_MAKERS: dict[str, Callable[[], MobileScene]] = {
+_MAKERS: dict[str, Callable[[], VelocityScene]] = {
     "ridgeback-ur10-drag": lambda: _ridgeback("ridgeback-ur10-drag", Stay(), 8.0),
     "ridgeback-ur10-square": lambda: _ridgeback("ridgeback-ur10-square", SquareOptions(), 16.0),
     "ridgeback-ur10-waypoints": lambda: _ridgeback("ridgeback-ur10-waypoints", WaypointOptions(), 60.0),

@@ -6,12 +6,12 @@ import numpy as np
 
 from himpc.stack import Level
 from himpc.tasks import FramePosition
-from lessons.scenes.torque_scene import Scene
-from lessons.settings.torque import SceneSettings
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.settings.torque import TorqueSettings
 from robots import load_robot
 
 
-def ridgeback_hold() -> Scene:
+def ridgeback_hold() -> TorqueScene:
     """`ridgeback-ur10-hold`: EE position, then the base's place; the rest is damped.
 
     The base's M̄ is half its mass, so its loop is slower than the arm's: it gets softer gains.
@@ -21,11 +21,11 @@ def ridgeback_hold() -> Scene:
         Level((FramePosition(name="ee", K_p=100.0, K_v=20.0),)),
         Level((FramePosition(name="base", frame="base", axes="xy", K_p=16.0, K_v=8.0),)),
     )
-    return Scene(
+    return TorqueScene(
         name="ridgeback-ur10-hold",
         title="Ridgeback and UR10 under HIMPC: drag the targets of hand and base; the hand comes first",
         robot=robot,
-        settings=SceneSettings(levels=levels, M_bar=tuple(robot.M_bar)),
+        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar)),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

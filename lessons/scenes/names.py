@@ -16,7 +16,7 @@ SCENES: dict[str, str] = {
 }
 """Torque level."""
 
-MOBILE_SCENES: dict[str, str] = {
+VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
     "ridgeback-ur10-square": "the HTMPC paper's test: the hand stays, the base is sent out of reach and back",
     "ridgeback-ur10-waypoints": "two places for the hand; the base finds its own way past the first (Fig. 8)",
@@ -28,5 +28,5 @@ MOBILE_SCENES: dict[str, str] = {
 }
 """Velocity level."""
 
-ALL_SCENES: dict[str, str] = SCENES | MOBILE_SCENES
+ALL_SCENES: dict[str, str] = SCENES | VELOCITY_SCENES
 """Either."""

@@ -13,8 +13,8 @@ from himpc.references import Circle, Hold, Phase, Preview, Reference, Sinusoid
 from himpc.references.preview import sampled, times
 from himpc.stack import Level, Stack
 from himpc.tasks import FramePosition, Joints
-from lessons.scenes.torque_scene import Scene
-from lessons.settings.torque import SceneOptions, SceneSettings
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.settings.torque import SceneOptions, TorqueSettings
 from robots import InputError, NominalSettings, PlantSettings, Robot, load_robot
 
 OMEGA = 2 * math.pi / 8
@@ -98,7 +98,7 @@ class Switched:
         )
 
 
-def planar3_circle() -> Scene:
+def planar3_circle() -> TorqueScene:
     """`planar3-circle`, RT1: q₁ swings by 20°, which the circle allows.
 
     From the paper: link lengths, limits, gains (Table I), Q = 200, R = 10, N = 5, M̄, q₀. Left open there and
@@ -112,11 +112,11 @@ def planar3_circle() -> Scene:
         Level((Joints(name="q1", joints=robot.joint_names[:1], K_p=50.0, K_v=5.0),)),
     )
     options = CircleOptions(q1_amplitude_deg=20.0)
-    return Scene(
+    return TorqueScene(
         name="planar3-circle",
         title="planar arm on RT1 of the HIMPC paper",
         robot=robot,
-        settings=SceneSettings(
+        settings=TorqueSettings(
             levels=levels, M_bar=tuple(robot.M_bar), nominal=NOMINAL, plant=PLANT, options=options
         ),
         references=options.references,
@@ -126,7 +126,7 @@ def planar3_circle() -> Scene:
     )
 
 
-def planar3_conflict() -> Scene:
+def planar3_conflict() -> TorqueScene:
     """`planar3-conflict`, RT2: q₁ is asked to swing by −120°, from where the circle cannot be reached.
 
     Else as `planar3-circle`, with velocity bounds approached more slowly. The paper prints no amplitude; −60°
@@ -144,7 +144,7 @@ def planar3_conflict() -> Scene:
     return replace(scene, name="planar3-conflict", title=title, settings=settings)
 
 
-def planar3_singular() -> Scene:
+def planar3_singular() -> TorqueScene:
     """`planar3-singular`, RT3: starts straight, and is straight again after 8 s and 16 s.
 
     Else as `planar3-circle`. Fig. 9 shows two tangent circles without their sizes, time law or q₁: read as

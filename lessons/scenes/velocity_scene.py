@@ -3,35 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from lessons.settings.velocity import MobileSettings
-from lessons.velocity_events import MobileEvent
-from robots import Robot
-
-Array = NDArray[np.float64]
+from lessons.scenes.scene import Scene
+from lessons.settings.velocity import VelocitySettings
 
 
-@dataclass(frozen=True, eq=False)
-class MobileScene:
-    """Everything a velocity-level run starts from.
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class VelocityScene(Scene):
+    """A scene whose robot takes velocities; it starts at rest, and the options of its settings make the
+    mission."""
 
-    Attributes:
-        name: identity.
-        title: one line for lists and the page.
-        robot: the robot.
-        settings: controller, limits, plant, the levels by role, and the options that make the mission.
-        q_0: initial positions, (n,) rad or m; the robot starts at rest.
-        duration: longest headless run, s; it ends earlier when the mission is done.
-        events: (time in s, event) in order, for scripted scenes.
-    """
-
-    name: str
-    title: str
-    robot: Robot
-    settings: MobileSettings
-    q_0: Array
+    settings: VelocitySettings
     duration: float = 16.0
-    events: tuple[tuple[float, MobileEvent], ...] = ()

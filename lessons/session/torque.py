@@ -1,11 +1,10 @@
-"""The headless loop: one scene, one controller, one plant, one mailbox."""
+"""The headless loop of a torque-level scene: references → controller → plant."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +16,15 @@ from himpc.references import Preview, Reference, Target
 from himpc.rotation import quaternion
 from himpc.stack import Stack
 from himpc.tasks import FramePosition, Task
-from himpc.telemetry import Layout, layout_of, write_plan
-from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.scenes.torque_scene import Scene
+from himpc.telemetry import layout_of, write_plan
+from lessons.events import Event, MoveTarget, Push
+from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
 from lessons.session.deadline import Outbox
 from lessons.session.leak import dynamic_leak
+from lessons.session.session import LOST_SPEED, Session
 from lessons.session.targets import move_target, target_at
-from lessons.settings.levels import moved
-from lessons.settings.torque import SceneSettings, changed
+from lessons.settings.torque import TorqueSettings
 from robots import InputError, Plant, convergence_gauge
 
 Array = NDArray[np.float64]
@@ -35,57 +34,57 @@ TRUTH_TICKS = 20
 
 LOST_POSITION = 0.5
 """m: a level-1 position error above this counts as divergence."""
-LOST_SPEED = 20.0
-"""A joint faster than this many times its limit counts as divergence."""
 
 
-class Session:
-    """One learner's run. `tick` advances one control period; events wait in the mailbox until then.
+@final
+class TorqueSession(Session):
+    """A run whose controller gives torques: every step is a control tick.
 
     Attributes:
-        scene: what it started from.
-        seed: seed of the run; all randomness must come from it.
-        robot: the scene's robot.
         plant: the simulation.
-        settings: the settings in force.
-        layout: where the fields of a row lie.
         plan: the last plan, None before the first tick.
-        notices: sentences for the learner (refused events, divergence); drain them.
-        log: (time, event) of every event that took effect.
     """
 
-    def __init__(self, scene: Scene, seed: int = 0) -> None:
+    scene: TorqueScene
+    settings: TorqueSettings
+    plant: Plant
+
+    def __init__(self, scene: TorqueScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
-        self.scene = scene
-        self.seed = seed
-        self.robot = scene.robot
-        self.settings: SceneSettings = scene.settings
+        super().__init__(scene, seed)
+        self.settings = scene.settings
         self.plant = Plant(scene.robot, scene.settings.plant)
         self.controller = make_controller(
             scene.settings.controller, scene.robot, scene.settings.for_controller()
         )
-        self.layout: Layout = layout_of(scene.robot, scene.settings.levels)
-        self.notices: list[str] = []
-        self.log: list[tuple[float, Event]] = []
-        self._mailbox: deque[Event] = deque()
+        self.layout = layout_of(scene.robot, scene.settings.levels)
         self._data = scene.robot.model.createData()
         self._row = np.full(self.layout.size, np.nan)
         self.reset()
 
     @property
     def t(self) -> float:
-        """Simulated time since the last reset, s."""
         return self.plant.t
 
+    @property
+    def step_s(self) -> float:
+        return self.settings.T_s
+
+    @property
+    def between(self) -> bool:
+        return False
+
+    @property
+    def over(self) -> bool:
+        return False
+
     def reset(self) -> None:
-        """Back to the scene's start with the settings as they are."""
+        super().reset()
         scene = self.scene
         self.plant.reset(scene.q_0, scene.v_0, scene.tau_0)
         self.controller.reset(self.plant.tau)
         self.references = self._fresh_references()
         self.plan: Plan | None = None
-        self.diverged_at: float | None = None
-        self._script = deque(scene.events)
         self._push_until = math.inf
         self._ticks = 0
         self._outbox = Outbox()
@@ -106,32 +105,14 @@ class Session:
         reference = self.references.get(task)
         return reference if isinstance(reference, Target) else None
 
-    def post(self, event: Event) -> None:
-        """Puts an event in the mailbox; it takes effect at the next tick, or leaves a notice."""
-        self._mailbox.append(event)
-
     def drain(self) -> None:
-        """Lets what waits in the mailbox take effect now, without time passing. `tick` does it by itself;
-        a page that is paused does it to show a change at once."""
-        while self._script and self._script[0][0] <= self.t + 1e-9:
-            self._mailbox.append(self._script.popleft()[1])
-        while self._mailbox:
-            event = self._mailbox.popleft()
-            try:
-                self._take(event)
-                self.log.append((self.t, event))
-            except InputError as error:
-                self.notices.append(str(error))
+        super().drain()
         if self.t >= self._push_until - 1e-9:
             self.plant.push(None)
             self._push_until = math.inf
 
-    def _take(self, event: Event) -> None:
+    def _happen(self, event: Event) -> None:
         match event:
-            case Set(path, value):
-                self.adopt(changed(self.settings, path, value))
-            case MoveLevel(level, to):
-                self.adopt(replace(self.settings, levels=moved(self.settings.levels, level, to)))
             case MoveTarget(task, value):
                 tasks = {each.name: each for each in _tasks(self.settings.levels)}
                 move_target(tasks, self.references, task, value)
@@ -145,12 +126,10 @@ class Session:
                 except ValueError as error:
                     raise InputError(f"the push was not applied: {error}") from None
                 self._push_until = self.t + seconds
-            case Reset():
-                self.reset()
+            case _:
+                raise InputError("This scene has no mission: choose one of the HTMPC scenes.")
 
-    def adopt(self, settings: SceneSettings) -> None:
-        """Takes over settings at once, as an event that changed them would. Raises InputError if they do
-        not fit."""
+    def adopt(self, settings: TorqueSettings) -> None:
         if settings.plant != self.settings.plant:
             self.plant.configure(settings.plant)
         if settings.controller == self.settings.controller:
@@ -162,8 +141,8 @@ class Session:
         self.settings = settings
         self._hands = _hands(settings.levels)
 
-    def tick(self) -> Array:
-        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it).
+    def advance(self) -> Array:
+        """One control tick and its row (a buffer: copy it to keep it).
 
         A row holds the true joint state, the references, what the controller decided, and the torque
         applied from this tick on.
@@ -192,10 +171,9 @@ class Session:
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
-            if wild:
-                self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
             if wild or self._is_far(plan):
-                self.diverged_at = t
+                # A hand that drags a target out of reach loses level 1, too: that is no notice.
+                self._lost(t, notice=wild)
         return row
 
     def _write_references(self, row: Array, previews: Mapping[str, Preview]) -> None:
@@ -228,7 +206,7 @@ class Session:
         return self.plant.broken or not slow or not math.isfinite(q.dot(q))
 
     def _is_far(self, plan: Plan) -> bool:
-        """Level 1 is lost. A hand that drags a target out of reach does that too, so it is no notice."""
+        """Level 1 is lost."""
         errors = (plan.errors.get(name) for name in self._hands)
         return any(error is not None and error.dot(error) > LOST_POSITION**2 for error in errors)
 
@@ -255,7 +233,6 @@ class Session:
         return path
 
     def binding(self) -> list[Binding]:
-        """The constraints that bind in the last plan."""
         return [] if self.plan is None else self.plan.binding(self.robot.joint_names)
 
 

@@ -1,10 +1,10 @@
-"""The headless loop of a velocity-level scene: mission → window → controller → plant, with a mailbox."""
+"""The headless loop of a velocity-level scene: mission → window → controller → plant."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import replace
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,14 @@ from himpc.missions import Progress, advanced, insert, move, release, remove, re
 from himpc.plan import Binding
 from himpc.references import Reference
 from himpc.stack import Level, Stack
-from himpc.telemetry import Layout
-from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.scenes.velocity_scene import MobileScene
+from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
+from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.servo_commands import Commands, command_step
+from lessons.session.session import LOST_SPEED, Session
 from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
 from lessons.session.velocity_rows import layout_of, write_bounds, write_plan, write_truth
-from lessons.settings.velocity import MobileSettings, changed, with_obstacle
-from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release, RemoveTask
+from lessons.settings.missions import OrderOptions
+from lessons.settings.velocity import VelocitySettings
 from robots import InputError, VelocityPlant
 from robots.errors import unknown_name
 
@@ -31,40 +31,32 @@ Array = NDArray[np.float64]
 
 CLEARANCE_WITHIN = 1.0
 """m: obstacles farther away than this are not measured."""
-LOST_SPEED = 20.0
-"""A joint faster than this many times its limit counts as divergence."""
 
 
-class MobileSession:
-    """One learner's run at velocity level. `tick` advances one control period, `advance` one command of it.
+@final
+class VelocitySession(Session):
+    """A run whose controller gives velocities. A control period is one or more commands to the servos, and
+    `advance` is one of them.
 
     Attributes:
-        scene: what it started from.
-        seed: seed of the run; all randomness comes from it.
-        robot: the scene's robot.
         plant: the simulation.
-        settings: the settings in force.
         bounds: the bounds in force.
         roles: the tasks of the scene's levels by name: what a mission can move.
-        layout: where the fields of a row lie.
         progress: how far the mission has come.
         plan: the last plan, None before the first tick.
-        notices: sentences for the learner (refused events, divergence); drain them.
-        log: (time, event) of every event that took effect.
     """
 
-    def __init__(self, scene: MobileScene, seed: int = 0) -> None:
+    scene: VelocityScene
+    settings: VelocitySettings
+    plant: VelocityPlant
+
+    def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
-        self.scene = scene
-        self.seed = seed
-        self.robot = scene.robot
+        super().__init__(scene, seed)
         self._take_settings(scene.settings)
         self._data = scene.robot.model.createData()
         self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
-        self.layout: Layout = layout_of(scene.robot, scene.settings.htmpc.stack)
-        self.notices: list[str] = []
-        self.log: list[tuple[float, MobileEvent]] = []
-        self._mailbox: deque[MobileEvent] = deque()
+        self.layout = layout_of(scene.robot, scene.settings.htmpc.stack)
         self._row = np.full(self.layout.size, np.nan)
         self.plant = VelocityPlant(scene.robot, scene.settings.plant, seed)
         # What does not fit the robot is refused here, not at the first tick.
@@ -73,45 +65,39 @@ class MobileSession:
 
     @property
     def t(self) -> float:
-        """Simulated time since the last reset, s."""
         # Adding up command periods must not put a tick a rounding before the moment it stands for.
         return round(self.plant.t, 9)
 
     def reset(self) -> None:
-        """Back to the scene's start with the settings as they are."""
+        super().reset()
         self.plant.reset(self.scene.q_0)
         home, _ = self._points(self.scene.q_0, np.zeros(self.robot.n))
         self.progress = Progress(self.settings.options.mission(home))
         self._stack: Stack = ()
         self.plan: VelocityPlan | None = None
         self.controller: VelocityController | None = None
-        self.diverged_at: float | None = None
         self._solve_ms = 0.0
         self._commands: Commands | None = None
         self._commanded = self._input = np.zeros(self.robot.n)
         self._nearest = math.inf
-        self._script = deque(self.scene.events)
 
-    def post(self, event: MobileEvent) -> None:
-        """Puts an event in the mailbox; it takes effect at the next control step, or leaves a notice."""
-        self._mailbox.append(event)
+    @property
+    def over(self) -> bool:
+        return self.progress.done
 
-    def drain(self) -> None:
-        """Lets what waits in the mailbox take effect now, without time passing; `tick` does it by itself."""
-        while self._script and self._script[0][0] <= self.t + 1e-9:
-            self._mailbox.append(self._script.popleft()[1])
-        while self._mailbox:
-            event = self._mailbox.popleft()
-            try:
-                self._take(event)
-                self.log.append((self.t, event))
-            except InputError as error:
-                self.notices.append(str(error))
+    @property
+    def settings_now(self) -> VelocitySettings:
+        """The settings in force. Priorities belong to the run: where a scene can begin with others, those of
+        now stand among the settings."""
+        settings, options = self.settings, self.settings.options
+        order = tuple(task.name for task in self.progress.mission if task.name in self.roles)
+        if not isinstance(options, OrderOptions) or len(order) < len(self.roles):
+            return settings
+        own = () if order == tuple(self.roles) and not options.order else order
+        return replace(settings, options=replace(options, order=own))
 
-    def _take(self, event: MobileEvent) -> None:
+    def _happen(self, event: Event) -> None:
         match event:
-            case Set(path, value):
-                self.adopt(changed(self.settings, path, value))
             case MoveLevel(name, to):
                 self.progress = reorder(self.progress, name, to)
             case MoveTarget(name, goal):
@@ -124,16 +110,10 @@ class MobileSession:
                 if event.role not in self.roles:
                     raise unknown_name("role", event.role, self.roles)
                 self.progress = insert(self.progress, event.task(), event.before)
-            case Appear():
-                self.adopt(with_obstacle(self.settings, event.ball()))
-            case Push():
+            case _:
                 raise InputError("this scene is driven by velocity servos: a push would not move it")
-            case Reset():
-                self.reset()
 
-    def adopt(self, settings: MobileSettings) -> None:
-        """Takes over settings at once, as an event that changed them would. Raises InputError if they do
-        not fit."""
+    def adopt(self, settings: VelocitySettings) -> None:
         # A controller that refuses them leaves everything as it is; the window's order comes with the tick.
         fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
         if settings.controller != self.settings.controller:
@@ -142,7 +122,7 @@ class MobileSession:
             self.plant.configure(settings.plant)
         self._take_settings(settings)
 
-    def _for_controller(self, settings: MobileSettings) -> HTMPCSettings:
+    def _for_controller(self, settings: VelocitySettings) -> HTMPCSettings:
         """The controller's settings for the levels of this tick."""
         lag = 1e-3 * settings.felt(self._solve_ms).latency_ms if settings.compensate_delay else 0.0
         hold = settings.htmpc.hold
@@ -154,7 +134,7 @@ class MobileSession:
             hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
         return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold)
 
-    def _take_settings(self, settings: MobileSettings) -> None:
+    def _take_settings(self, settings: VelocitySettings) -> None:
         self.settings = settings
         self.bounds = bounds(self.robot, settings.htmpc.limits)
         self._collision = CollisionModel(self.robot, settings.htmpc.obstacles, settings.htmpc.self_collision)
@@ -174,27 +154,17 @@ class MobileSession:
         return np.array([task.value(Configuration(self.robot, self._data, q, q)) for q in self.plan.q])
 
     def binding(self) -> list[Binding]:
-        """The constraints that bind in the last plan."""
         return [] if self.plan is None else [each for level in self.plan.levels for each in level.binding]
 
     # ---------------------------------------------------------------- one tick
 
     @property
     def between(self) -> bool:
-        """Whether a control period has begun and is not over: what is posted now has to wait for its end."""
         return self._commands is not None
 
     @property
     def step_s(self) -> float:
-        """Simulated time of the next `advance`, s."""
         return command_step(self.settings.T_s)[1] if self._commands is None else self._commands.h
-
-    def tick(self) -> Array:
-        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it)."""
-        row = self.advance()
-        while row is None:
-            row = self.advance()
-        return row
 
     def advance(self) -> Array | None:
         """One command to the servos, after planning if a control period begins; the row of `tick` when the
@@ -248,10 +218,8 @@ class MobileSession:
         row[fields["jerk"]] = (U[0] - self._input) / min(commands.period, self.settings.htmpc.dt)
         write_bounds(row, self.layout)
         self._commanded, self._input = commands.last, U[0]
-        if self.diverged_at is None and self._lost(row):
-            t = float(row[fields["t"]][0])
-            self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
-            self.diverged_at = t
+        if self.diverged_at is None and self._is_wild(row):
+            self._lost(float(row[fields["t"]][0]))
 
     def _direct(self) -> tuple[VelocityController, dict[str, Reference]]:
         """The controller, with the window as its stack, and the references of its tasks by name."""
@@ -283,7 +251,7 @@ class MobileSession:
         speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ v)) for name, task in self.roles.items()}
         return points, speeds
 
-    def _lost(self, row: Array) -> bool:
+    def _is_wild(self, row: Array) -> bool:
         """Not finite or far too fast. A large error is no sign here: missions send the robot metres away."""
         fields = self.layout.fields
         fastest = float((np.abs(row[fields["v"]]) / self.robot.v_limit).max())

@@ -1,20 +1,52 @@
-"""Settings told as assignments "PATH=VALUE": what differs between a scene's own and others."""
+"""Settings told as assignments "PATH=VALUE": read, written, and what differs between two of them."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
 
-from lessons.kinds import AnyScene, AnySettings, changed_any, paths_of
-from lessons.recording.run import parse_assignment
-from lessons.settings.torque import SceneSettings, value_at
-from lessons.settings.velocity import MobileSettings
-from lessons.settings.velocity import value_at as mobile_value_at
+from lessons.settings.settings import Settings
 from robots import InputError
-from robots.collision import Ball, Floor
 
-_SHORTHANDS = ("Q", "R")
-"""Paths that set every level at once."""
+S = TypeVar("S", bound=Settings)
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """("horizon", 10) from "horizon=10". Values are JSON (numbers, true, lists) or plain words.
+
+    Raises:
+        InputError: there is no "=", or the value is NaN or infinite.
+    """
+    path, equals, value = text.partition("=")
+    if not equals or not path:
+        raise InputError(f"--set {text}: write it as PATH=VALUE, e.g. --set horizon=10")
+    try:
+        return path, json.loads(value, parse_constant=_refuse_constant(text))
+    except RecursionError:
+        raise InputError(f"--set {path}: the list is nested too deeply; give a number or a list") from None
+    except InputError:
+        raise
+    except ValueError:
+        if value.lower() in ("nan", "inf", "-inf", "infinity", ""):
+            raise InputError(
+                f"--set {text}: '{value}' is no finite number; give one, e.g. {path}=1"
+            ) from None
+        return path, value
+
+
+def _refuse_constant(text: str) -> Callable[[str], Any]:
+    def refuse(constant: str) -> Any:
+        raise InputError(f"--set {text}: {constant} is no finite number; give one")
+
+    return refuse
+
+
+def with_assignments(settings: S, assignments: Iterable[str]) -> S:
+    """The settings after every "PATH=VALUE", in order. Raises InputError like `changed`."""
+    for text in assignments:
+        settings = settings.changed(*parse_assignment(text))
+    return settings
 
 
 def assignment(path: str, value: Any) -> str:
@@ -40,77 +72,28 @@ def _parsed(text: str) -> Any:
         return None
 
 
-def differences(scene: AnyScene, settings: AnySettings) -> tuple[str, ...]:
+def differences(own: Settings, settings: Settings) -> tuple[str, ...]:
     """The assignments that turn a scene's own settings into others of the same scene.
 
     The controller comes first, so that what else it brings (its rate) is told only where it differs.
 
     Args:
-        scene: as it is loaded.
-        settings: reached from its settings by events.
+        own: of the scene as it is loaded.
+        settings: reached from them by events.
 
     Raises:
         InputError: no assignment can express them.
     """
-    now = scene.settings
-    found: list[str] = []
-    for path in sorted(filter(_is_plain, paths_of(scene)), key=lambda path: path != "controller"):
-        value = _value(settings, path)
-        if value != _value(now, path):
+    now, found = own, list[str]()
+    places = {path: place for path, place in own.places().items() if not place.shorthand}
+    for path in sorted(places, key=lambda path: path != "controller"):
+        value = settings.value_at(path)
+        if value != now.value_at(path):
             found.append(assignment(path, value))
-            now = changed_any(now, *parse_assignment(found[-1]))
-    if isinstance(now, MobileSettings) and isinstance(settings, MobileSettings):
-        now, obstacles = _with_obstacles(now, settings)
-        found += obstacles
+            now = now.changed(*parse_assignment(found[-1]))
+    for path, value in now.special_differences(settings):
+        found.append(assignment(path, value))
+        now = now.changed(*parse_assignment(found[-1]))
     if now != settings:
-        raise InputError(
-            f"these settings of scene '{scene.name}' cannot be told as assignments: reset them and try again"
-        )
+        raise InputError("these settings cannot be told as assignments: reset them and try again")
     return tuple(found)
-
-
-def _is_plain(path: str) -> bool:
-    """Whether it is no second way to what other paths reach."""
-    head, _, rest = path.partition(".")
-    name, _, key = rest.rpartition(".")
-    return path not in _SHORTHANDS and not (head == "levels" and (name.isdigit() or key in ("K_p", "K_v")))
-
-
-def _value(settings: AnySettings, path: str) -> Any:
-    if isinstance(settings, SceneSettings):
-        return value_at(settings, path)
-    return mobile_value_at(settings, path)
-
-
-def _with_obstacles(now: MobileSettings, wanted: MobileSettings) -> tuple[MobileSettings, list[str]]:
-    """Obstacles that appeared or were moved stand at the end, in the order in which that happened."""
-    obstacles = wanted.htmpc.obstacles
-    left = {each.name for each in obstacles}
-    gone = [
-        assignment(f"obstacles.{each.name}", None) for each in now.htmpc.obstacles if each.name not in left
-    ]
-    told = gone
-    result = now
-    for count in range(len(obstacles) + 1):
-        last = obstacles[len(obstacles) - count :]
-        if any(isinstance(each, Floor) for each in last):
-            break
-        told = [
-            *gone,
-            *(
-                assignment(
-                    f"obstacles.{each.name}",
-                    (*each.centre, each.radius) if isinstance(each, Ball) else each.centre,
-                )
-                for each in last
-                if not isinstance(each, Floor)
-            ),
-        ]
-        result = now
-        for each in told:
-            changed = changed_any(result, *parse_assignment(each))
-            assert isinstance(changed, MobileSettings)
-            result = changed
-        if result.htmpc.obstacles == obstacles:
-            break
-    return result, told

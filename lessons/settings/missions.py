@@ -25,7 +25,7 @@ the last one nothing plans for the arm: folded against its limits it may not get
 
 
 @dataclass(frozen=True)
-class MobileOptions:
+class MissionOptions:
     """The choices of a scene; each field is a path of its own (`--set peak=[-2,1]`)."""
 
     parts: ClassVar[tuple[str, ...]] = ()
@@ -56,7 +56,7 @@ class MobileOptions:
 
 
 @dataclass(frozen=True)
-class ArchitectureOptions(MobileOptions):
+class ArchitectureOptions(MissionOptions):
     """Scenes that compare architectures.
 
     Attributes:
@@ -80,7 +80,7 @@ class ArchitectureOptions(MobileOptions):
 
 
 @dataclass(frozen=True)
-class OrderOptions(MobileOptions):
+class OrderOptions(MissionOptions):
     """Scenes whose tasks last for the whole run, so that one may choose which comes first.
 
     Attributes:
@@ -273,7 +273,7 @@ CLUTTER: tuple[Obstacle, ...] = (
 
 
 @dataclass(frozen=True)
-class ClutteredOptions(MobileOptions):
+class ClutteredOptions(MissionOptions):
     """The base is sent past obstacles; the EE goes first to a place beside the way.
 
     Attributes:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, get_type_hints
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
 from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import HTMPCSettings
-from himpc.stack import Level, Stack
+from himpc.stack import Stack
+from lessons.events import Appear, Event
 from lessons.settings.levels import ordered
-from lessons.settings.missions import MobileOptions, Stay
-from lessons.settings.values import fitting, typed, weight
+from lessons.settings.missions import MissionOptions, Stay
+from lessons.settings.settings import LevelKeys, Place, Settings, every_level, field_places, level_places
+from lessons.settings.values import typed, weight
 from robots import InputError, VelocityPlantSettings
 from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
@@ -24,7 +26,7 @@ _RATE_HZ = {"htidkc": 50.0}
 
 
 @dataclass(frozen=True)
-class MobileSettings:
+class VelocitySettings(Settings):
     """Settings of a velocity-level run.
 
     Attributes:
@@ -37,12 +39,14 @@ class MobileSettings:
         options: the scene's own choices.
     """
 
+    controllers: ClassVar[Mapping[str, str]] = VELOCITY_CONTROLLERS
+
     htmpc: HTMPCSettings
     controller: str = "htmpc"
     compensate_delay: bool = True
     delay_measured: bool = False
     plant: VelocityPlantSettings = field(default_factory=VelocityPlantSettings)
-    options: MobileOptions = field(default_factory=Stay)
+    options: MissionOptions = field(default_factory=Stay)
 
     def __post_init__(self) -> None:
         """Raises InputError for a controller that does not exist."""
@@ -56,17 +60,17 @@ class MobileSettings:
         return replace(self.plant, delay_ms=min(self.plant.delay_ms + solve_ms, LONGEST_DELAY))
 
     @property
-    def levels(self) -> Stack:
+    def levels(self) -> Stack:  # pyright: ignore[reportIncompatibleVariableOverride]
         """One level per role."""
         return self.htmpc.stack
 
     @property
-    def horizon(self) -> int:
+    def horizon(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
         """N, knots."""
         return self.htmpc.horizon
 
     @property
-    def T_s(self) -> float:
+    def T_s(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Control period, s."""
         return self.htmpc.period
 
@@ -76,106 +80,128 @@ class MobileSettings:
         by_error = self.controller in ("htmpc", "htmpc_wpt") and self.htmpc.lexicographic == "per_coordinate"
         return self.htmpc.delta_m if by_error else None
 
+    @property
+    def measures_time(self) -> bool:
+        return self.delay_measured
+
+    def takes(self, event: Event) -> bool:
+        return isinstance(event, Appear) or super().takes(event)
+
+    def after(self, event: Event) -> VelocitySettings:
+        return self.with_obstacle(event.ball()) if isinstance(event, Appear) else super().after(event)
+
+    def places(self) -> dict[str, Place]:
+        """A field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
+        "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order"
+        takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation
+        brings its own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r."""
+        htmpc, options = self.htmpc, self.options
+        own = field_places(self, lambda s: s, lambda _, new: new, without=("htmpc", "plant", "options"))
+        found = {
+            **own,
+            "controller": replace(own["controller"], write=_with_controller),
+            **field_places(options, lambda s: s.options, lambda s, new: replace(s, options=new)),
+            **field_places(htmpc, _htmpc, _with_htmpc, without=("stack", "limits", "obstacles", "delay_s")),
+            **field_places(
+                htmpc.limits,
+                lambda s: s.htmpc.limits,
+                lambda s, new: _with_htmpc(s, replace(s.htmpc, limits=new)),
+                "limits.",
+            ),
+            **field_places(self.plant, lambda s: s.plant, lambda s, new: replace(s, plant=new), "plant."),
+            "Q": every_level(htmpc.stack, "Q", _stack, _with_stack),
+            **level_places(htmpc.stack, _LEVEL_KEYS, _stack, _with_stack),
+        }
+        found["formulation"] = replace(found["formulation"], write=_with_formulation)
+        if "order" in found:
+            found["order"] = replace(found["order"], fit=self._order)
+        return found
+
+    def _order(self, path: str, value: Any) -> tuple[str, ...]:
+        return tuple(level.name for level in ordered(self.htmpc.stack, value))
+
+    def special(self, path: str, value: Any) -> VelocitySettings | None:
+        """ "obstacles.NAME": a ball [x, y, z, radius], new or instead of the obstacle of that name, where one
+        is now, [x, y, z], or None to take it away."""
+        head, _, name = path.partition(".")
+        if head != "obstacles" or not name:
+            return None
+        obstacles = self.htmpc.obstacles
+        known = {each.name: each for each in obstacles if not isinstance(each, Floor)}
+        if value is not None:
+            return self.with_obstacle(_obstacle(known, path, name, value))
+        if name not in known:
+            raise unknown_name("obstacle", name, known)
+        return _with_htmpc(self, replace(self.htmpc, obstacles=_without(obstacles, name)))
+
+    def special_differences(self, wanted: VelocitySettings) -> list[tuple[str, Any]]:
+        """Obstacles that went, appeared or were moved: the latter two stand at the end, in the order in which
+        that happened."""
+        left = {each.name for each in wanted.htmpc.obstacles}
+        told = [(f"obstacles.{each.name}", None) for each in self.htmpc.obstacles if each.name not in left]
+        rest = tuple(each for each in self.htmpc.obstacles if each.name in left)
+        for count in range(len(wanted.htmpc.obstacles) + 1):
+            kept, last = _split(wanted.htmpc.obstacles, count)
+            if tuple(each for each in rest if each.name not in {moved.name for moved in last}) == kept:
+                return told + [_as_setting(each) for each in last if not isinstance(each, Floor)]
+        return told
+
+    def with_obstacle(self, obstacle: Obstacle) -> VelocitySettings:
+        """The settings with an obstacle more, or instead of the one of its name."""
+        obstacles = (*_without(self.htmpc.obstacles, obstacle.name), obstacle)
+        return _with_htmpc(self, replace(self.htmpc, obstacles=obstacles))
+
 
 LONGEST_DELAY = 1e3
 """ms between a command and the plant at most."""
-_PARTS = ("limits", "plant")
-_OWN = ("controller", "compensate_delay", "delay_measured")
-_LEVEL_KEYS = ("Q", "enabled")
-_NOT_SETTABLE = ("stack", "limits", "obstacles", "delay_s")
 
 
-def changed(settings: MobileSettings, path: str, value: Any) -> MobileSettings:
-    """The settings with the value at a path replaced.
+def _htmpc(settings: VelocitySettings) -> HTMPCSettings:
+    return settings.htmpc
 
-    Paths: a field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
-    "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order" takes
-    effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation brings its
-    own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r, and "obstacles.NAME" for a ball
-    [x, y, z, radius], new or instead of the obstacle of that name, for where one is now, [x, y, z], or None
-    to take it away.
 
-    Raises:
-        InputError: unknown path (naming the nearest), or a value of the wrong type or range.
-    """
-    head, _, rest = path.partition(".")
-    htmpc = settings.htmpc
-    if head == "obstacles" and rest:
-        known = {each.name: each for each in htmpc.obstacles if not isinstance(each, Floor)}
-        if value is not None:
-            return with_obstacle(settings, _obstacle(known, path, rest, value))
-        if rest not in known:
-            raise unknown_name("obstacle", rest, known)
-        return replace(settings, htmpc=replace(htmpc, obstacles=_without(htmpc.obstacles, rest)))
-    if path not in paths(settings):
-        raise unknown_name("setting", path, paths(settings))
-    if path == "order":
-        value = [level.name for level in ordered(htmpc.stack, value)]
-    if head == "Q":
-        values = value if isinstance(value, (list, tuple)) else [value] * len(htmpc.stack)
-        if len(values) != len(htmpc.stack):
-            raise InputError(f"Q has {len(values)} values: give one number, or one per level")
-        levels = (
-            replace(level, Q=weight(f"Q of level '{level.name}'", each))
-            for level, each in zip(htmpc.stack, values, strict=True)
-        )
-        return replace(settings, htmpc=replace(htmpc, stack=tuple(levels)))
-    if head == "levels":
-        name, _, key = rest.rpartition(".")
-        fitted = typed(path, True, value) if key == "enabled" else weight(path, value)
-        stack = _with_level(htmpc.stack, name, lambda level: replace(level, **{key: fitted}))
-        return replace(settings, htmpc=replace(htmpc, stack=stack))
-    if head == "limits":
-        return replace(settings, htmpc=replace(htmpc, limits=_with(htmpc.limits, rest, path, value)))
-    if head == "plant":
-        return replace(settings, plant=_with(settings.plant, rest, path, value))
-    if head in _OWN:
-        settings = _with(settings, head, path, value)
-        if head != "controller":
-            return settings
-        return replace(settings, htmpc=replace(htmpc, rate_hz=_RATE_HZ.get(settings.controller, 10.0)))
-    if head in _names(settings.options):
-        return replace(settings, options=_with(settings.options, head, path, value))
-    htmpc = _with(htmpc, head, path, value)
-    if head == "formulation":
-        Q = STAGE_WEIGHT[htmpc.formulation]
-        htmpc = replace(htmpc, stack=tuple(replace(level, Q=Q) for level in htmpc.stack))
+def _with_htmpc(settings: VelocitySettings, htmpc: HTMPCSettings) -> VelocitySettings:
     return replace(settings, htmpc=htmpc)
 
 
-def paths(settings: MobileSettings) -> list[str]:
-    """Every path that `changed` takes for these settings."""
-    stack = settings.htmpc.stack
-    names = [*(str(place) for place in range(1, len(stack) + 1)), *(level.name for level in stack)]
-    return [
-        *_OWN,
-        *_names(settings.options),
-        *(name for name in _names(settings.htmpc) if name not in _NOT_SETTABLE),
-        *(f"limits.{name}" for name in _names(settings.htmpc.limits)),
-        *(f"plant.{name}" for name in _names(settings.plant)),
-        "Q",
-        *(f"levels.{name}.{key}" for name in names for key in _LEVEL_KEYS),
-    ]
+def _stack(settings: VelocitySettings) -> Stack:
+    return settings.htmpc.stack
 
 
-def value_at(settings: MobileSettings, path: str) -> Any:
-    """The value at one of `paths`, but for "Q" of all levels."""
-    head, _, rest = path.partition(".")
-    if head == "levels":
-        name, _, key = rest.rpartition(".")
-        return next(getattr(level, key) for level in settings.htmpc.stack if level.name == name)
-    if rest:
-        return getattr(settings.plant if head == "plant" else settings.htmpc.limits, rest)
-    if head in _OWN:
-        return getattr(settings, head)
-    return getattr(settings.options if head in _names(settings.options) else settings.htmpc, head)
+def _with_stack(settings: VelocitySettings, stack: Stack) -> VelocitySettings:
+    return _with_htmpc(settings, replace(settings.htmpc, stack=stack))
 
 
-def with_obstacle(settings: MobileSettings, obstacle: Obstacle) -> MobileSettings:
-    """The settings with an obstacle more, or instead of the one of its name."""
-    htmpc = settings.htmpc
-    obstacles = (*_without(htmpc.obstacles, obstacle.name), obstacle)
-    return replace(settings, htmpc=replace(htmpc, obstacles=obstacles))
+def _with_controller(settings: VelocitySettings, name: str) -> VelocitySettings:
+    htmpc = replace(settings.htmpc, rate_hz=_RATE_HZ.get(name, 10.0))
+    return replace(settings, controller=name, htmpc=htmpc)
+
+
+def _with_formulation(settings: VelocitySettings, name: Any) -> VelocitySettings:
+    htmpc = replace(settings.htmpc, formulation=name)
+    stack = (replace(level, Q=STAGE_WEIGHT[htmpc.formulation]) for level in htmpc.stack)
+    return _with_htmpc(settings, replace(htmpc, stack=tuple(stack)))
+
+
+_LEVEL_KEYS: LevelKeys = {
+    "Q": (lambda level: level.Q, lambda level, value: replace(level, Q=value), weight, False),
+    "enabled": (
+        lambda level: level.enabled,
+        lambda level, value: replace(level, enabled=value),
+        lambda path, value: typed(path, True, value),
+        False,
+    ),
+}
+
+
+def _split(obstacles: tuple[Obstacle, ...], last: int) -> tuple[tuple[Obstacle, ...], tuple[Obstacle, ...]]:
+    at = len(obstacles) - last
+    return obstacles[:at], obstacles[at:]
+
+
+def _as_setting(obstacle: Ball | Box) -> tuple[str, Any]:
+    where = (*obstacle.centre, obstacle.radius) if isinstance(obstacle, Ball) else obstacle.centre
+    return f"obstacles.{obstacle.name}", where
 
 
 def _without(obstacles: tuple[Obstacle, ...], name: str) -> tuple[Obstacle, ...]:
@@ -193,19 +219,4 @@ def _obstacle(known: Mapping[str, Ball | Box], path: str, name: str, value: Any)
     movable = f", or move {', '.join(known)} to [x, y, z], or take one away by null" if known else ""
     raise InputError(
         f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]{movable}"
-    )
-
-
-def _names(part: Any) -> list[str]:
-    return [each.name for each in fields(part)]
-
-
-def _with(part: Any, name: str, path: str, value: Any) -> Any:
-    return replace(part, **{name: fitting(path, get_type_hints(type(part))[name], value)})
-
-
-def _with_level(stack: Stack, name: str, update: Callable[[Level], Level]) -> Stack:
-    return tuple(
-        update(level) if name in (level.name, str(place)) else level
-        for place, level in enumerate(stack, start=1)
     )

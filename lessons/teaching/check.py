@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from lessons.kinds import run_scene
 from lessons.parallel import Failed, Spread, on_cores
-from lessons.recording.run import parse_assignment
+from lessons.recording.run import run
+from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
 from lessons.teaching.lesson import Lesson, Run, Step
@@ -62,10 +62,10 @@ Outcomes = Mapping[Run, Outcome]
 
 def measured(piece: tuple[Run, tuple[Measure, ...]]) -> Outcome:
     """Runs and measures. Raises InputError for what cannot be run."""
-    run, measures = piece
-    recording = run_scene(run.prepared())
+    what, measures = piece
+    recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}
-    due = sum(t < recording.duration - 1e-9 for t, _ in run.events)
+    due = sum(t < recording.duration - 1e-9 for t, _ in what.events)
     return Outcome(values, max(0, due - len(recording.session.log)))
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from lessons.velocity_events import MobileEvent
+from lessons.events import Event
+from lessons.settings.settings import Settings
 
-Script = tuple[tuple[float, MobileEvent], ...]
+Script = tuple[tuple[float, Event], ...]
 """(time in s, event) in order; a torque-level scene takes those of `lessons.events` only."""
 
 
@@ -16,7 +17,7 @@ class Control:
     """A setting that is offered beside a step.
 
     Attributes:
-        path: as in `lessons.settings.torque.changed`.
+        path: as in `lessons.settings.settings.Settings.changed`.
         words: its label.
         low, high: the ends of a slider; for a number only.
         log: the slider is logarithmic; low > 0.
@@ -41,3 +42,16 @@ class Control:
         if self.choices:
             return value in self.choices
         return isinstance(value, (int, float)) and self.low <= value <= self.high
+
+
+def chosen(settings: Settings, control: Control) -> Any:
+    """Which of a control's choices the settings have: the one that would change nothing; None if none is."""
+    fitting = (each for each in control.choices if settings.changed(control.path, each) == settings)
+    return next(fitting, None)
+
+
+def within(settings: Settings, control: Control) -> bool:
+    """Whether a setting stands where its control could have put it."""
+    if control.choices:
+        return chosen(settings, control) is not None
+    return control.takes(settings.value_at(control.path))

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass, replace
 from inspect import cleandoc
 
-from lessons.kinds import AnyScene, find_scene, prepared
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.scene import Scene
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control, Script
@@ -69,9 +70,9 @@ class Run:
     duration: float = 2.0
     urdf: str | None = None
 
-    def prepared(self) -> AnyScene:
+    def prepared(self) -> Scene:
         """The scene with everything in place. Raises InputError for what cannot be."""
-        scene = prepared(find_scene(self.scene, self.urdf), None, self.set)
+        scene = prepared(load_scene(self.scene, self.urdf), None, self.set)
         return replace(scene, events=self.events, duration=self.duration)
 
     def but(self, *assignments: str) -> Run:
@@ -146,7 +147,7 @@ class Lesson:
     Attributes:
         name: its file's name with dashes.
         card: what it is about.
-        scene: name of a scene of `lessons.kinds.find_scene`.
+        scene: name of a scene of `lessons.scenes.catalog.load_scene`.
         steps: in order.
         set: assignments "PATH=VALUE" for all steps.
         challenge: at the end, if there is one.

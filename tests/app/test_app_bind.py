@@ -20,10 +20,9 @@ from app.panels.torque.controller import ControllerPanel
 from app.panels.widgets import mirror as bind
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.window import Window
-from lessons.events import Set
-from lessons.kinds import AnyEvent
-from lessons.scenes.catalog import load_scene
-from lessons.settings.torque import SceneSettings, changed
+from lessons.events import Event, Set
+from lessons.scenes.catalog import torque_scene
+from lessons.settings.torque import TorqueSettings
 from lessons.settings.values import choices_of
 
 
@@ -35,15 +34,15 @@ def viser_server() -> Iterator[viser.ViserServer]:
 
 
 @pytest.fixture
-def settings() -> SceneSettings:
-    return load_scene("planar3-hold").settings
+def settings() -> TorqueSettings:
+    return torque_scene("planar3-hold").settings
 
 
 class Panel:
     """One slider of N with its bindings, and a browser that changes it through viser's own handler."""
 
     def __init__(self, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.posted: list[AnyEvent] = []
+        self.posted: list[Event] = []
         self.gui, self.loop = server.gui, server.get_event_loop()
         monkeypatch.setattr(self.gui, "_resolve_client", lambda _: object())
         self.slider = self.gui.add_slider("N", min=1, max=30, step=1, initial_value=5)
@@ -62,7 +61,7 @@ class Panel:
         message = _messages.GuiUpdateMessage(self.slider._impl.uuid, {"value": value})
         asyncio.run_coroutine_threadsafe(self.gui._handle_gui_updates(0, message), self.loop).result(10)  # pyright: ignore
 
-    def refresh(self, settings: SceneSettings) -> None:
+    def refresh(self, settings: TorqueSettings) -> None:
         """A refresh, and what it left on the loop."""
         self.bindings.refresh(settings)
         done: Future[None] = Future()
@@ -75,7 +74,7 @@ def panel(viser_server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> P
     return Panel(viser_server, monkeypatch)
 
 
-def test_an_edit_is_not_lost_to_a_refresh_at_the_same_moment(panel: Panel, settings: SceneSettings) -> None:
+def test_an_edit_is_not_lost_to_a_refresh_at_the_same_moment(panel: Panel, settings: TorqueSettings) -> None:
     """The page shows the settings of before while the new value has just arrived: the new value is posted."""
     panel.browser_sets(12, meanwhile=lambda: panel.bindings.refresh(settings))
     assert panel.posted == [Set("horizon", 12)]
@@ -90,9 +89,9 @@ def test_a_number_typed_beyond_the_slider_stays_on_its_scale(panel: Panel, typed
 
 
 def test_what_changes_elsewhere_is_shown_and_a_refused_edit_taken_back(
-    panel: Panel, settings: SceneSettings, monkeypatch: pytest.MonkeyPatch
+    panel: Panel, settings: TorqueSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    panel.refresh(changed(settings, "horizon", 9))
+    panel.refresh(settings.changed("horizon", 9))
     assert panel.slider.value == 9 and panel.posted == []
     panel.browser_sets(12)
     monkeypatch.setattr(bind, "HOLD", 0.0)
@@ -101,7 +100,7 @@ def test_what_changes_elsewhere_is_shown_and_a_refused_edit_taken_back(
 
 
 def test_controls_are_reminded_of_what_the_session_has(
-    panel: Panel, settings: SceneSettings, monkeypatch: pytest.MonkeyPatch
+    panel: Panel, settings: TorqueSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A change that the browser never sent must not stay on the screen: unchanged values are sent again."""
     sent: list[Any] = []
@@ -151,7 +150,7 @@ def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
 
 def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> None:
     """A script, a lesson or a code may set what is beyond a slider's usual ends."""
-    scene = load_scene("planar3-hold")
+    scene = torque_scene("planar3-hold")
     far = scene.settings
     for path, value in (
         ("limits.torque_scale", 0.04),
@@ -161,9 +160,9 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
         ("horizon", 60),
         ("M_bar.1", 1e-8),
     ):
-        far = changed(far, path, value)
+        far = far.changed(path, value)
     loop = viser_server.get_event_loop()
-    bindings: Bindings[SceneSettings] = Bindings(lambda _: None, loop)
+    bindings: Bindings[TorqueSettings] = Bindings(lambda _: None, loop)
     ControllerPanel(viser_server.gui, bindings, far, scene.robot)
     values = {handle.value for handle in viser_server.gui._gui_input_handle_from_uuid.values()}
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
@@ -175,13 +174,13 @@ def test_menus_offer_every_word_a_setting_may_hold(
 ) -> None:
     """A code may bring any of them: a menu that does not know its own value is no page."""
     monkeypatch.setattr("himpc.controllers.settings.is_installed", lambda _: True)  # CasADi is an extra
-    scene, bindings = load_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
+    scene, bindings = torque_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
     owner: Any = scene.settings.limits if path.startswith("limits.") else scene.settings
     words = choices_of(type(owner), path.removeprefix("limits."))
     assert len(words) > 1
     for word in words:
         viser_server.gui.reset()
-        ControllerPanel(viser_server.gui, bindings, changed(scene.settings, path, word), scene.robot)
+        ControllerPanel(viser_server.gui, bindings, scene.settings.changed(path, word), scene.robot)
         handles = viser_server.gui._gui_input_handle_from_uuid.values()
         menus = [each for each in handles if isinstance(each, viser.GuiDropdownHandle)]
         assert any(menu.options == words and menu.value == word for menu in menus)

@@ -15,7 +15,7 @@ from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.session.torque import TRUTH_TICKS
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
 
@@ -82,7 +82,7 @@ def test_paused_edits_take_effect_though_no_time_passes(body: Body) -> None:
     body.settle()
     after = body.status()
     assert after.t == before.t and after.ticks == before.ticks
-    assert isinstance(after.settings, SceneSettings) and after.settings.M_bar_scale == 3.0
+    assert isinstance(after.settings, TorqueSettings) and after.settings.M_bar_scale == 3.0
     assert [level.name for level in after.settings.levels] == ["posture", "position", "orientation"]
     assert len(after.notices) == 1 and "horizon" in after.notices[0]
     assert before.gauge is not None and after.gauge is not None and after.gauge != before.gauge

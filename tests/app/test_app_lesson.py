@@ -18,10 +18,11 @@ from app.worker.simulation import Body
 from himpc.telemetry import Layout
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
-from lessons.kinds import changed_any, chosen, find_scene, prepared, setting_at
-from lessons.recording.run import parse_assignment
 from lessons.replay.state import State, decode, encode, state_of
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.settings.assignments import parse_assignment
 from lessons.teaching.check import measured
+from lessons.teaching.control import chosen
 from lessons.teaching.lesson import Step
 from robots import InputError
 
@@ -183,7 +184,7 @@ def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
     challenge, last = lesson.challenge, len(lesson.steps) + 1
     assert challenge is not None
     run = lesson.run_of(challenge)
-    solved = prepared(find_scene(run.scene, run.urdf), None, (*run.set, *challenge.solutions[0]))
+    solved = prepared(load_scene(run.scene, run.urdf), None, (*run.set, *challenge.solutions[0]))
     code = encode(state_of(run.scene, solved.settings, urdf=run.urdf, seed=3, lesson="deadlines", step=last))
     choice = SceneChoice.of_state(decode(code))
     assert choice.exercise == Exercise("deadlines", last - 1) and choice.seed == 3
@@ -237,10 +238,10 @@ def test_every_control_reads_what_it_sets(name: str) -> None:
         settings = lesson.run_of(part).prepared().settings
         for control in part.controls if isinstance(part, Step) else part.knobs:
             for choice in control.choices:
-                assert chosen(changed_any(settings, control.path, choice), control) == choice
+                assert chosen(settings.changed(control.path, choice), control) == choice
             for end in () if control.choices else (control.low, control.high):
-                value = int(end) if type(setting_at(settings, control.path)) is int else end
-                assert setting_at(changed_any(settings, control.path, value), control.path) == value
+                value = int(end) if type(settings.value_at(control.path)) is int else end
+                assert settings.changed(control.path, value).value_at(control.path) == value
 
 
 def test_what_a_script_changes_is_undone_before_the_next_run(learn: Start) -> None:

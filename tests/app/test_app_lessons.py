@@ -17,7 +17,7 @@ from browsing.hands import SELDOM, eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
-from lessons.recording.run import parse_assignment
+from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge
 
 

@@ -25,7 +25,7 @@ from browsing.hands import (
     tab,
     wait_for_scene,
 )
-from lessons.settings.velocity import MobileSettings
+from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
 
@@ -144,7 +144,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Lear
     def adopted() -> bool:
         settings = learner.settings
         return (
-            isinstance(settings, MobileSettings)
+            isinstance(settings, VelocitySettings)
             and (settings.htmpc.delta_m, settings.htmpc.horizon) == (0.025, 6)
             and settings.htmpc.input_effort == (0.1, 0.1, 0.1, *(0.05,) * 6)
         )
@@ -168,7 +168,7 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Lea
 
     def obstacles() -> dict[str, Ball | Box]:
         settings = learner.settings
-        assert isinstance(settings, MobileSettings)
+        assert isinstance(settings, VelocitySettings)
         return {each.name: each for each in settings.htmpc.obstacles if not isinstance(each, Floor)}
 
     before = obstacles()

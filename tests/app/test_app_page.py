@@ -37,7 +37,7 @@ from browsing.hands import (
     wait_for_scene,
     write,
 )
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 from robots import CATALOG
 
 
@@ -146,7 +146,7 @@ def test_N_and_M_bar_change_while_it_runs(page: Page, learner: Learner) -> None:
     assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 10)
     assert eventually(
         page,
-        lambda: isinstance(learner.settings, SceneSettings) and learner.settings.M_bar_scale == 1.5,
+        lambda: isinstance(learner.settings, TorqueSettings) and learner.settings.M_bar_scale == 1.5,
     )
     assert settings is not None and learner.failure is None
     expect(page.get_by_text("spectral radius")).to_be_visible()

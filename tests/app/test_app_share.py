@@ -10,11 +10,11 @@ from app.client.learner import Learner
 from app.server.server import PageServer
 from browsing.hands import eventually, press, row, set_number, tab, write
 from lessons.replay.state import decode
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 
 def horizon(learner: Learner) -> int:
-    assert isinstance(learner.settings, SceneSettings)
+    assert isinstance(learner.settings, TorqueSettings)
     return learner.settings.horizon
 
 

@@ -15,8 +15,7 @@ from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, 
 from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
-from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.velocity_events import InsertTask, Release, RemoveTask
+from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 
 
 def opened(scene: str) -> Iterator[Body]:
@@ -69,7 +68,7 @@ def test_the_robot_moves_between_two_control_steps(body: Body) -> None:
     body.tick(5)
     x, rows = [], body.block.count
     for _ in range(10):
-        assert body.run.step_s == pytest.approx(0.01)
+        assert body.session.step_s == pytest.approx(0.01)
         ended = body.advance()
         body.write_poses()
         x.append(body.block.poses()[2, 0])
@@ -85,7 +84,7 @@ def test_a_pause_stands_between_two_control_steps(body: Body) -> None:
     for _ in range(14):
         body.advance()
     body.handle(Play(False))
-    assert not body.run.between and body.ticks == 2 and body.session.t == pytest.approx(0.2)
+    assert not body.session.between and body.ticks == 2 and body.session.t == pytest.approx(0.2)
     for event in (
         Set("horizon", 4),
         MoveLevel("base", 0),

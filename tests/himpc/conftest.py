@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
 from robots import Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -19,5 +19,5 @@ def iiwa() -> Robot:
 
 
 @pytest.fixture(scope="module")
-def iiwa_scene() -> Scene:
-    return load_scene("iiwa14-hold")
+def iiwa_scene() -> TorqueScene:
+    return torque_scene("iiwa14-hold")

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from himpc import FrameOrientation, FramePosition, Joints, Level, Settings
 from himpc.configuration import Configuration
 from himpc.references import Hold, Preview
-from lessons.session.torque import Session
+from lessons.session.torque import TorqueSession
 from robots import Robot
 
 Array = NDArray[np.float64]
 
 
-def rows_of(session: Session, ticks: int) -> Array:
+def rows_of(session: TorqueSession, ticks: int) -> Array:
     return np.array([session.tick().copy() for _ in range(ticks)])
 
 
-def field(session: Session, rows: Array, name: str) -> Array:
+def field(session: TorqueSession, rows: Array, name: str) -> Array:
     return rows[:, session.layout.fields[name]]
 
 

@@ -15,8 +15,8 @@ from himpc.cascade.compiled import told
 from himpc.cascade.compiling import compile_all, compiled_functions
 from himpc.catalog import CONTROLLERS
 from lessons.events import Set
-from lessons.scenes.catalog import load_scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
 
 ROOT = Path(__file__).parents[2]
 
@@ -145,7 +145,7 @@ def test_everything_compiled_is_counted() -> None:
 def test_no_setting_compiles_in_the_middle_of_a_run() -> None:
     """Other horizons, levels, weights and controllers find what they need compiled."""
     compile_all(lambda *_: None)
-    session = Session(load_scene("iiwa14-hold"), seed=0)
+    session = TorqueSession(torque_scene("iiwa14-hold"), seed=0)
     late: list[str] = []
     changes = [
         *(Set("horizon", 8), Set("levels.1.Q", (100.0, 200.0, 300.0)), Set("R", 3.0)),

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from himpc import HIMPC, Joints, Level, Limits
 from lessons.events import MoveTarget, Set
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
 from robots import Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 @pytest.mark.parametrize("horizon", [1, 2, 20])
 def test_any_horizon_holds_and_follows(name: str, horizon: int) -> None:
     """N = 1 (HIQP) and long horizons keep the arm on its targets and bring it to a moved one."""
-    scene = load_scene(name)
-    session = Session(replace(scene, settings=replace(scene.settings, horizon=horizon)))
+    scene = torque_scene(name)
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=horizon)))
     target = session.target("position")
     assert target is not None
     goal = target.value.copy()
@@ -49,11 +49,11 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
     """A 6-DoF arm under 3+3+1 rows: level 3 has no freedom, changes nothing and breaks nothing."""
     robot = load_robot(example_urdf("ur_description/urdf/ur10_robot.urdf"))
     assert robot.n == 6
-    scene = load_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
+    scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
     third = Level((Joints(name="q1", joints=robot.joint_names[:1]),))
     settings = replace(scene.settings, levels=(*scene.settings.levels[:2], third))
     for route in ("structured", "explicit"):
-        session = Session(replace(scene, settings=replace(settings, route=route)))
+        session = TorqueSession(replace(scene, settings=replace(settings, route=route)))
         start = session.robot.home
         session.post(Set("levels.q1.K_p", 400))
         rows = rows_of(session, 300)
@@ -190,9 +190,9 @@ def test_the_controller_sees_no_mass(iiwa: Robot) -> None:
 # ------------------------------------------------------------------ evidence
 
 
-def test_binding_constraints_are_named(iiwa_scene: Scene) -> None:
+def test_binding_constraints_are_named(iiwa_scene: TorqueScene) -> None:
     """While a fast move presses on a velocity bound the plan names level, joint, kind, side and pressure."""
-    session = Session(iiwa_scene)
+    session = TorqueSession(iiwa_scene)
     session.post(Set("limits.velocity_scale", 0.05))
     session.tick()
     session.post(MoveTarget("position", (0.4, 0.4, 0.5)))

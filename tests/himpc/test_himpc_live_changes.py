@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from himpc import HIMPC, FramePosition, Joints, Level
 from himpc.telemetry import AT_TORQUE
 from lessons.events import Event, MoveLevel, MoveTarget, Set
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
 from robots import InputError, Robot
 
 Array = NDArray[np.float64]
 
 
-def change_events(scene: Scene) -> dict[str, list[Event]]:
+def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
     """Every setting a learner can change, as single changes from the scene's start."""
     names = [level.name for level in scene.settings.levels]
     M_bar = [1.5 * m for m in scene.settings.M_bar]
@@ -58,15 +58,15 @@ def change_events(scene: Scene) -> dict[str, list[Event]]:
 
 
 CASES = [
-    (name, change) for name in ("iiwa14-hold", "planar3-hold") for change in change_events(load_scene(name))
+    (name, change) for name in ("iiwa14-hold", "planar3-hold") for change in change_events(torque_scene(name))
 ]
 
 
 @pytest.mark.parametrize(("name", "change"), CASES)
 def test_changes_at_rest_are_bumpless(name: str, change: str) -> None:
     """On satisfied targets a change moves no torque by 5 % of its limit and the tip by less than 1 mm."""
-    scene = load_scene(name)
-    session = Session(scene)
+    scene = torque_scene(name)
+    session = TorqueSession(scene)
     rows_of(session, 20)
     tau, start = session.plant.tau.copy(), session.plant.frame_pose(session.robot.tip)[1].copy()
     events = change_events(scene)[change]
@@ -85,9 +85,9 @@ def test_changes_at_rest_are_bumpless(name: str, change: str) -> None:
     assert moved < 1e-3
 
 
-def test_a_level_enabled_with_a_large_error_fades_in(iiwa_scene: Scene) -> None:
+def test_a_level_enabled_with_a_large_error_fades_in(iiwa_scene: TorqueScene) -> None:
     """Its Q ramps over half a second: the first torques after the switch are calm, and it gets there."""
-    session = Session(iiwa_scene)
+    session = TorqueSession(iiwa_scene)
     session.post(Set("levels.orientation.enabled", False))
     session.post(Set("levels.posture.enabled", False))
     session.tick()
@@ -102,9 +102,9 @@ def test_a_level_enabled_with_a_large_error_fades_in(iiwa_scene: Scene) -> None:
     assert np.abs(field(session, rows, "error/position")).max() < 1e-2
 
 
-def test_a_torque_limit_tightened_below_the_present_torque_closes_in(iiwa_scene: Scene) -> None:
+def test_a_torque_limit_tightened_below_the_present_torque_closes_in(iiwa_scene: TorqueScene) -> None:
     """The bound starts at the torque of now and falls without a step; the demand stays inside it."""
-    session = Session(iiwa_scene)
+    session = TorqueSession(iiwa_scene)
     rows_of(session, 20)
     present = np.abs(session.plant.tau / session.robot.tau_limit).max()
     assert present > 0.05

@@ -20,8 +20,8 @@ from himpc.plan import Plan
 from himpc.qp import QPSolution
 from himpc.references import Hold, Preview
 from himpc.rotation import log3
-from lessons.scenes.catalog import load_scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
 from robots import InputError, NominalModel, NominalSettings, Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -224,8 +224,8 @@ def test_hqp_meets_its_kkt_conditions(solver: Any, share: float) -> None:
 
 
 def torques(name: str, scene: str = "planar3-circle", ticks: int = 60, **changes: Any) -> Array:
-    loaded = load_scene(scene)
-    session = Session(replace(loaded, settings=replace(loaded.settings, controller=name, **changes)))
+    loaded = torque_scene(scene)
+    session = TorqueSession(replace(loaded, settings=replace(loaded.settings, controller=name, **changes)))
     return np.array([session.tick()[session.layout.fields["tau_demand"]].copy() for _ in range(ticks)])
 
 
@@ -250,7 +250,7 @@ def test_same_start_same_torques(name: str) -> None:
 
 def straight(name: str, **changes: Any) -> Plan:
     """One tick of the planar arm, straight, asked to pull its tip towards the base."""
-    loaded = load_scene("planar3-singular")
+    loaded = torque_scene("planar3-singular")
     chosen = replace(loaded.settings.for_controller(), **changes)
     pulled = {
         "position": Hold(np.array([0.85, 0.0])).preview(0.0, 1e-3, 5),
@@ -271,7 +271,7 @@ def test_near_a_singularity_nothing_is_hidden(name: str) -> None:
 
 def test_a_direction_that_is_gone_is_named() -> None:
     """At the exactly straight arm the lost direction is given up, and the level says so."""
-    loaded = load_scene("planar3-singular")
+    loaded = torque_scene("planar3-singular")
     controller = make_controller("osf", loaded.robot, loaded.settings.for_controller())
     references = loaded.references(loaded.robot, loaded.settings.levels)
     previews = {name: each.preview(0.0, 1e-3, 5) for name, each in references.items()}
@@ -283,7 +283,7 @@ def test_a_direction_that_is_gone_is_named() -> None:
 def test_hqp_passes_the_singularity_inside_its_bounds() -> None:
     """R > 0 keeps the Hessian definite: no level fails, and the torque bounds hold."""
     for R in (10.0, 1e-6):
-        levels = tuple(replace(level, R=R) for level in load_scene("planar3-singular").settings.levels)
+        levels = tuple(replace(level, R=R) for level in torque_scene("planar3-singular").settings.levels)
         plan = straight("hqp", stack=levels)
         assert plan.unsolved == 0 and plan.kkt_residual <= 1e-6
         assert np.abs(plan.tau).max() <= 4.0
@@ -434,8 +434,8 @@ def test_levels_that_are_off_are_still_measured(name: str) -> None:
 @pytest.mark.parametrize("scene", ["planar3-hold", "iiwa14-hold", "panda-hold"])
 @pytest.mark.parametrize("name", RIVALS)
 def test_every_rival_holds_every_catalog_robot(name: str, scene: str) -> None:
-    loaded = load_scene(scene)
-    session = Session(replace(loaded, settings=replace(loaded.settings, controller=name)))
+    loaded = torque_scene(scene)
+    session = TorqueSession(replace(loaded, settings=replace(loaded.settings, controller=name)))
     errors = [session.tick()[session.layout.fields["error/position"]].copy() for _ in range(200)]
     assert session.diverged_at is None
     assert np.abs(errors).max() < 1e-4

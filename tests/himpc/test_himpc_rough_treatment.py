@@ -11,9 +11,9 @@ from control_loop import field, rows_of
 from numpy.typing import NDArray
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Set
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]
 
@@ -28,10 +28,10 @@ JUMPS = {
 
 
 @lru_cache(maxsize=len(JUMPS))
-def after_jump(case: str) -> tuple[Session, Array]:
+def after_jump(case: str) -> tuple[TorqueSession, Array]:
     """Two and a half seconds after the target was put 1 m away at once, reachable or not."""
     name, jump = JUMPS[case]
-    session = Session(load_scene(name))
+    session = TorqueSession(torque_scene(name))
     session.tick()
     target = session.target("position")
     assert target is not None
@@ -70,9 +70,11 @@ SUBSETS = [names for size in range(4) for names in combinations(("position", "or
 
 
 @pytest.mark.parametrize("enabled", SUBSETS, ids=lambda names: "+".join(names) or "none")
-def test_a_push_dies_out_under_every_subset_of_levels(enabled: tuple[str, ...], iiwa_scene: Scene) -> None:
+def test_a_push_dies_out_under_every_subset_of_levels(
+    enabled: tuple[str, ...], iiwa_scene: TorqueScene
+) -> None:
     """5 N·m for 0.1 s on a middle link: whatever is switched on, all joints are slow 3 s later."""
-    session = Session(iiwa_scene)
+    session = TorqueSession(iiwa_scene)
     for name in ("position", "orientation", "posture"):
         session.post(Set(f"levels.{name}.enabled", name in enabled))
     rows_of(session, 20)
@@ -84,7 +86,7 @@ def test_a_push_dies_out_under_every_subset_of_levels(enabled: tuple[str, ...], 
     assert session.diverged_at is None
 
 
-def test_same_events_same_numbers_to_the_bit(iiwa_scene: Scene) -> None:
+def test_same_events_same_numbers_to_the_bit(iiwa_scene: TorqueScene) -> None:
     """Two sessions that are told the same give the same rows, timing aside."""
     script: dict[int, Event] = {
         3: MoveTarget("position", (0.5, 0.2, 0.6)),
@@ -96,7 +98,7 @@ def test_same_events_same_numbers_to_the_bit(iiwa_scene: Scene) -> None:
     }
     results = []
     for _ in range(2):
-        session = Session(iiwa_scene, seed=4)
+        session = TorqueSession(iiwa_scene, seed=4)
         rows = []
         for k in range(250):
             if k in script:

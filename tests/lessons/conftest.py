@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
-    return load_scene("iiwa14-hold")
+def scene() -> TorqueScene:
+    return torque_scene("iiwa14-hold")
 
 
 @pytest.fixture
-def session(scene: Scene) -> Session:
-    return Session(scene)
+def session(scene: TorqueScene) -> TorqueSession:
+    return TorqueSession(scene)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from lessons.session.torque import Session
+from lessons.session.torque import TorqueSession
 
 
-def value(session: Session, row: np.ndarray, name: str) -> np.ndarray:
+def value(session: TorqueSession, row: np.ndarray, name: str) -> np.ndarray:
     return row[session.layout.fields[name]]

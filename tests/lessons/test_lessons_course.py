@@ -15,11 +15,11 @@ from latex2mathml.converter import convert
 from himpc.telemetry import layout_of
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
-from lessons.kinds import AnyScene, changed_any, paths_of
 from lessons.parallel import one_by_one
-from lessons.recording.run import parse_assignment
-from lessons.scenes.torque_scene import Scene
+from lessons.scenes.scene import Scene
+from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.velocity_rows import layout_of as mobile_layout_of
+from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge, Score
 from lessons.teaching.check import Verdict, check
 from lessons.teaching.claim import Claim
@@ -56,9 +56,9 @@ def texts(lesson: Lesson) -> Iterator[str]:
         yield lesson.challenge.text
 
 
-def fields_of(scene: AnyScene) -> dict[str, slice]:
+def fields_of(scene: Scene) -> dict[str, slice]:
     """What the telemetry of a scene records."""
-    if isinstance(scene, Scene):
+    if isinstance(scene, TorqueScene):
         return layout_of(scene.robot, scene.settings.levels).fields
     return mobile_layout_of(scene.robot, scene.settings.levels).fields
 
@@ -113,11 +113,11 @@ def test_controls_and_plots_exist_in_the_scene(name: str) -> None:
         assert len(set(lesson.challenge.solutions)) >= 2
 
 
-def assert_takes(scene: AnyScene, control: Control) -> None:
-    assert control.path in paths_of(scene)
+def assert_takes(scene: Scene, control: Control) -> None:
+    assert control.path in scene.settings.paths()
     for value in control.choices or (control.low, control.high):
         assert control.takes(value)
-        changed_any(scene.settings, control.path, value)
+        scene.settings.changed(control.path, value)
 
 
 def test_lessons_can_be_sent_to_another_process() -> None:

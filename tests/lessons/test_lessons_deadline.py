@@ -9,22 +9,22 @@ import pytest
 from session_rows import value
 
 from lessons.events import MoveTarget, Reset, Set
-from lessons.recording.run import run, with_assignments
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
+from lessons.recording.run import run
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.deadline import Outbox
-from lessons.session.torque import Session
-from lessons.settings.torque import changed
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
 
 ASIDE = ((0.01, MoveTarget("position", (0.6, 0.3))),)
 
 
 @pytest.fixture(scope="module")
-def planar() -> Scene:
-    return replace(load_scene("planar3-hold"), events=ASIDE)
+def planar() -> TorqueScene:
+    return replace(torque_scene("planar3-hold"), events=ASIDE)
 
 
-def with_settings(scene: Scene, *assignments: str) -> Scene:
+def with_settings(scene: TorqueScene, *assignments: str) -> TorqueScene:
     return replace(scene, settings=with_assignments(scene.settings, assignments))
 
 
@@ -49,7 +49,7 @@ def test_a_queue_of_one(late: list[int], applied: list[int]) -> None:
     assert found == applied
 
 
-def test_always_late_is_one_tick_of_delay(planar: Scene) -> None:
+def test_always_late_is_one_tick_of_delay(planar: TorqueScene) -> None:
     """The same torques to the last bit as from a plant whose motors get them 1 ms later."""
     late = run(with_settings(planar, "deadline_ms=1", "solve_ms_per_knot=0.3"), 0.2)
     delayed = run(with_settings(planar, "plant.delay_ms=1"), 0.2)
@@ -59,16 +59,16 @@ def test_always_late_is_one_tick_of_delay(planar: Scene) -> None:
     np.testing.assert_array_equal(late["tau_demand"], delayed["tau_demand"])
 
 
-def test_in_time_is_lockstep(planar: Scene) -> None:
+def test_in_time_is_lockstep(planar: TorqueScene) -> None:
     """A deadline that is met exactly changes nothing."""
     plain, met = run(planar, 0.2), run(with_settings(planar, "deadline_ms=0.5"), 0.2)
     assert not met["late"].any()
     np.testing.assert_array_equal(plain["tau"], met["tau"])
 
 
-def test_the_horizon_decides_what_is_late(planar: Scene) -> None:
+def test_the_horizon_decides_what_is_late(planar: TorqueScene) -> None:
     """A longer horizon set on the way misses the deadline from that tick on; back in time, it does not."""
-    session = Session(with_settings(planar, "deadline_ms=1"))
+    session = TorqueSession(with_settings(planar, "deadline_ms=1"))
     late = []
     for horizon in (10, 11, 10):
         session.post(Set("horizon", horizon))
@@ -76,9 +76,9 @@ def test_the_horizon_decides_what_is_late(planar: Scene) -> None:
     assert late == [False] * 3 + [True] * 3 + [False] * 3
 
 
-def test_a_reset_forgets_what_waits(planar: Scene) -> None:
+def test_a_reset_forgets_what_waits(planar: TorqueScene) -> None:
     scene = with_settings(planar, "deadline_ms=0.1")
-    session = Session(scene)
+    session = TorqueSession(scene)
     first = session.tick().copy()
     for _ in range(60):
         session.tick()
@@ -89,13 +89,13 @@ def test_a_reset_forgets_what_waits(planar: Scene) -> None:
     np.testing.assert_array_equal(value(session, first, "tau"), session_holding(scene))
 
 
-def session_holding(scene: Scene) -> np.ndarray:
-    return Session(scene).plant.tau
+def session_holding(scene: TorqueScene) -> np.ndarray:
+    return TorqueSession(scene).plant.tau
 
 
-def test_the_clock_decides_only_if_asked_to(planar: Scene) -> None:
+def test_the_clock_decides_only_if_asked_to(planar: TorqueScene) -> None:
     """With no assumed time the measured one counts: more than a nanosecond, less than a second."""
-    measured = changed(planar.settings, "solve_ms_per_knot", 0)
+    measured = planar.settings.changed("solve_ms_per_knot", 0)
     assert replace(measured, deadline_ms=1e-6).is_late(0.5)
     assert not replace(measured, deadline_ms=1e3).is_late(0.5)
     assert not measured.is_late(0.5)

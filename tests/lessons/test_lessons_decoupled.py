@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from himpc.htmpc import base_joints
-from lessons.kinds import find_scene, prepared
-from lessons.scenes.velocity_scene import MobileScene
-from lessons.session.velocity import MobileSession
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.velocity import VelocitySession
 
 SETTLED = 12
 """Ticks after a new task in which what must rest may still be braking."""
 
 
 def test_base_and_arm_take_turns() -> None:
-    scene = prepared(find_scene("ridgeback-ur10-delivery"), None, ("architecture=decoupled",))
-    assert isinstance(scene, MobileScene)
-    session = MobileSession(scene)
+    scene = prepared(load_scene("ridgeback-ur10-delivery"), None, ("architecture=decoupled",))
+    assert isinstance(scene, VelocityScene)
+    session = VelocitySession(scene)
     base = list(base_joints(session.robot))
     arm = [joint for joint in range(session.robot.n) if joint not in base]
     since, place, driven, reached = 0, -1, 0.0, 0.0

@@ -11,9 +11,9 @@ import pytest
 from session_rows import value
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set, as_data, from_data
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
 from robots import InputError
 
 EVENTS: list[Event] = [
@@ -38,7 +38,7 @@ def test_what_is_no_event_is_refused(data: dict[str, Any]) -> None:
         from_data(data)
 
 
-def test_an_event_waits_for_the_next_tick(session: Session) -> None:
+def test_an_event_waits_for_the_next_tick(session: TorqueSession) -> None:
     """Nothing changes until the tick that drains the mailbox; then it is in the log with its time."""
     session.tick()
     session.post(Set("horizon", 8))
@@ -50,7 +50,7 @@ def test_an_event_waits_for_the_next_tick(session: Session) -> None:
     assert session.log == [(pytest.approx(1e-3), Set("horizon", 8))]
 
 
-def test_names_stay_when_the_order_changes(session: Session) -> None:
+def test_names_stay_when_the_order_changes(session: TorqueSession) -> None:
     """Levels and tasks are told by name, wherever they stand."""
     session.post(MoveLevel("posture", 0))
     session.post(Set("levels.position.Q", 7))
@@ -88,9 +88,9 @@ REFUSED: list[Event] = [
 
 
 @pytest.mark.parametrize("event", REFUSED, ids=str)
-def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: Scene, event: Event) -> None:
+def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: TorqueScene, event: Event) -> None:
     """The learner reads one sentence; settings, plant and the motion are as if it had not been."""
-    session, quiet = Session(scene), Session(scene)
+    session, quiet = TorqueSession(scene), TorqueSession(scene)
     session.tick()
     quiet.tick()
     session.post(event)
@@ -104,13 +104,13 @@ def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: Scene, event
 
 
 def test_a_fixed_motion_cannot_be_dragged() -> None:
-    session = Session(load_scene("iiwa14-circle"))
+    session = TorqueSession(torque_scene("iiwa14-circle"))
     session.post(MoveTarget("position", (0.0, 0.0, 0.0)))
     session.tick()
     assert "fixed motion" in session.notices[0]
 
 
-def test_reset_goes_back_to_the_start_and_keeps_the_settings(session: Session) -> None:
+def test_reset_goes_back_to_the_start_and_keeps_the_settings(session: TorqueSession) -> None:
     """The same first rows again, under the settings of now."""
     session.post(Set("horizon", 3))
     first = session.tick().copy()
@@ -130,7 +130,7 @@ def test_reset_goes_back_to_the_start_and_keeps_the_settings(session: Session) -
     np.testing.assert_allclose(session.plant.q, session.robot.home, atol=1e-4)
 
 
-def test_a_push_ends(session: Session) -> None:
+def test_a_push_ends(session: TorqueSession) -> None:
     """The force acts for its time and no longer."""
     session.tick()
     session.post(Push(session.robot.joint_names[3], force=(0.0, 20.0, 0.0), seconds=0.05))
@@ -139,7 +139,7 @@ def test_a_push_ends(session: Session) -> None:
     assert speeds[-1] < 0.1 * max(speeds)
 
 
-def test_pushes_of_two_lengths_do_not_add_up(session: Session) -> None:
+def test_pushes_of_two_lengths_do_not_add_up(session: TorqueSession) -> None:
     """A new push replaces the one before, its end included."""
     session.tick()
     session.post(Push(session.robot.joint_names[3], force=(0.0, 5.0, 0.0), seconds=10.0))
@@ -152,10 +152,10 @@ def test_pushes_of_two_lengths_do_not_add_up(session: Session) -> None:
     np.testing.assert_allclose(session.plant.acceleration(session.plant.tau), idle, atol=1e-12)
 
 
-def test_scripted_events_come_in_their_time(scene: Scene) -> None:
+def test_scripted_events_come_in_their_time(scene: TorqueScene) -> None:
     """A scene's own events take effect at the tick of their time, and again after a reset."""
     scripted = replace(scene, events=((0.005, Set("horizon", 2)), (0.01, Set("horizon", 3))))
-    session = Session(scripted)
+    session = TorqueSession(scripted)
     horizons = []
     for _ in range(15):
         session.tick()

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from himpc import CONTROLLERS
+from lessons.recording.recording import Recording
 from lessons.recording.run import run
-from lessons.recording.torque import Recording
-from lessons.scenes.catalog import load_scene
+from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
-from lessons.settings.torque import changed
 from robots import CATALOG, load_robot
 
 SECONDS = 2.0
@@ -20,8 +19,8 @@ ROBOTS = [name for name in CATALOG if f"{name}-hold" in SCENES]
 
 
 def record(robot: str, controller: str) -> Recording:
-    scene = load_scene(f"{robot}-hold")
-    return run(replace(scene, settings=changed(scene.settings, "controller", controller)), SECONDS, seed=1)
+    scene = torque_scene(f"{robot}-hold")
+    return run(replace(scene, settings=scene.settings.changed("controller", controller)), SECONDS, seed=1)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

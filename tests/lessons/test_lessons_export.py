@@ -12,29 +12,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.kinds import prepared
+from lessons.events import Appear, Event, InsertTask, MoveLevel, MoveTarget, Push, Release, Reset, Set
 from lessons.replay.script import script
 from lessons.replay.state import State
-from lessons.scenes.torque_scene import Scene
-from lessons.scenes.velocity_scene import MobileScene
-from lessons.session.torque import Session
-from lessons.session.velocity import MobileSession
-from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release
+from lessons.scenes.catalog import prepared
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.torque import TorqueSession
+from lessons.session.velocity import VelocitySession
 
 ROOT = Path(__file__).parents[2]
-Events = Sequence[tuple[float, MobileEvent]]
+Events = Sequence[tuple[float, Event]]
 
 
 def live(state: State, events: Events, seconds: float) -> tuple[Any, dict[str, np.ndarray]]:
     """A session driven as the page drives one: by its mailbox. Returns it and its rows since the reset."""
     scene = state.prepared()
     session: Any
-    if isinstance(scene, Scene):
-        session = Session(scene, state.seed)
+    if isinstance(scene, TorqueScene):
+        session = TorqueSession(scene, state.seed)
     else:
-        assert isinstance(scene, MobileScene)
-        session = MobileSession(scene, state.seed)
+        assert isinstance(scene, VelocityScene)
+        session = VelocitySession(scene, state.seed)
     waiting = list(events)
     rows: list[np.ndarray] = []
     ran = 0.0

@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 from lessons.events import MoveTarget, Set, from_data
-from lessons.recording.run import run, with_assignments
-from lessons.recording.torque import arrays
-from lessons.scenes.catalog import load_scene
+from lessons.recording.arrays import arrays
+from lessons.recording.run import run
+from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
 from robots import InputError
 
 
 @pytest.fixture(scope="module")
-def recorded(scene: Scene) -> dict[str, Any]:
+def recorded(scene: TorqueScene) -> dict[str, Any]:
     settings = with_assignments(scene.settings, ["horizon=3", "plant.payload_kg=1"])
     events = ((0.02, MoveTarget("position", (0.5, 0.1, 0.6))), (0.05, Set("levels.posture.enabled", False)))
     recording = run(replace(scene, settings=settings, events=events), duration=0.2, seed=5)
@@ -48,7 +49,7 @@ def test_the_settings_beside_it_reproduce_the_run(recorded: dict[str, Any]) -> N
     how = json.loads(str(recorded["settings"]))
     assert [event["event"] for event in how["events"]] == ["MoveTarget", "Set"]
     assert how["in_force"]["horizon"] == 3
-    scene = load_scene(how["scene"])
+    scene = torque_scene(how["scene"])
     events = tuple((event.pop("t"), from_data(event)) for event in how["events"])
     settings = with_assignments(scene.settings, how["set"])
     again = arrays(run(replace(scene, settings=settings, events=events), duration=0.2, seed=how["seed"]), {})
@@ -59,7 +60,7 @@ def test_the_settings_beside_it_reproduce_the_run(recorded: dict[str, Any]) -> N
 def test_every_scene_loads_and_ticks() -> None:
     """The list is what there is; 'hold' takes any robot, also a catalog name."""
     for name in SCENES:
-        session = Session(load_scene(name, "planar3" if name == "hold" else None))
+        session = TorqueSession(torque_scene(name, "planar3" if name == "hold" else None))
         session.tick()
         assert session.plan is not None
         assert np.isfinite(session.plan.tau).all()
@@ -79,11 +80,11 @@ def test_every_scene_loads_and_ticks() -> None:
 )
 def test_scenes_that_cannot_be(name: str, urdf: str | None, tip: str | None) -> None:
     with pytest.raises(InputError) as error:
-        load_scene(name, urdf, tip)
+        torque_scene(name, urdf, tip)
     assert "\n" not in str(error.value)
 
 
-def test_a_run_needs_a_length(scene: Scene) -> None:
+def test_a_run_needs_a_length(scene: TorqueScene) -> None:
     for seconds in (0.0, -1.0, float("nan"), 1e9):
         with pytest.raises(InputError, match="duration"):
             run(scene, seconds)

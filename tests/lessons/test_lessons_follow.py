@@ -6,26 +6,26 @@ import numpy as np
 import pytest
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.follower import Follower, followed, swapped
-from lessons.session.torque import Session
+from lessons.session.torque import TorqueSession
 from robots import InputError
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
-    return load_scene("iiwa14-hold")
+def scene() -> TorqueScene:
+    return torque_scene("iiwa14-hold")
 
 
 class Pair:
     """A leader that is told of events, and a follower that only hears what the leader's log says."""
 
-    def __init__(self, scene: Scene, *own: str) -> None:
-        self.leader = Session(scene)
+    def __init__(self, scene: TorqueScene, *own: str) -> None:
+        self.leader = TorqueSession(scene)
         other = followed(scene, scene.settings, own)
-        assert isinstance(other, Scene)
-        session = Session(other)
+        assert isinstance(other, TorqueScene)
+        session = TorqueSession(other)
         self.follower = Follower(session, scene.settings, own)
         self.rows: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
         self._told = 0
@@ -66,7 +66,7 @@ def hand(pair: Pair) -> np.ndarray:
     return pair.leader.plant.frame_pose(pair.leader.robot.tip)[1]
 
 
-def test_equal_settings_give_equal_rows_whatever_happens(scene: Scene) -> None:
+def test_equal_settings_give_equal_rows_whatever_happens(scene: TorqueScene) -> None:
     """Events of every kind at odd times, heard of in portions of odd sizes, in the middle of pauses too."""
     pair = Pair(scene)
     rng = np.random.default_rng(3)
@@ -98,7 +98,7 @@ def test_equal_settings_give_equal_rows_whatever_happens(scene: Scene) -> None:
     assert pair.follower.session.settings == pair.leader.settings and pair.follower.behind == 0.0
 
 
-def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: Scene) -> None:
+def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: TorqueScene) -> None:
     pair = Pair(scene, "controller=weighted", "levels.position.Q=50")
     for event in (
         Set("controller", "osf"),
@@ -120,7 +120,7 @@ def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: Scene)
     assert pair.follower.session.t == pair.leader.t
 
 
-def test_a_change_of_the_difference_itself_is_not_even_noticed(scene: Scene) -> None:
+def test_a_change_of_the_difference_itself_is_not_even_noticed(scene: TorqueScene) -> None:
     """The leader turns N up and down: a follower with its own N runs as if nothing had happened."""
     moved, left = Pair(scene, "horizon=2"), Pair(scene, "horizon=2")
     for N in (7, 9, 3):
@@ -131,7 +131,7 @@ def test_a_change_of_the_difference_itself_is_not_even_noticed(scene: Scene) -> 
     assert np.array_equal(moved.compare()[1], left.compare()[1], equal_nan=True)
 
 
-def test_another_period_runs_to_the_same_time_and_takes_events_then(scene: Scene) -> None:
+def test_another_period_runs_to_the_same_time_and_takes_events_then(scene: TorqueScene) -> None:
     pair = Pair(scene, "T_s=0.002")
     pair.lead(7)
     pair.post(Push(scene.robot.joint_names[3], (0.0, 40.0, 0.0), seconds=0.01))
@@ -144,7 +144,7 @@ def test_another_period_runs_to_the_same_time_and_takes_events_then(scene: Scene
     assert pair.follower.session.t == pytest.approx(0.016) and pair.follower.behind == 0.0
 
 
-def test_it_never_runs_ahead_and_a_reset_brings_it_back_at_once(scene: Scene) -> None:
+def test_it_never_runs_ahead_and_a_reset_brings_it_back_at_once(scene: TorqueScene) -> None:
     pair = Pair(scene)
     assert not pair.follower.due
     pair.lead(50)
@@ -161,16 +161,16 @@ def test_it_never_runs_ahead_and_a_reset_brings_it_back_at_once(scene: Scene) ->
     assert np.array_equal(led[-4:], followed[-4:], equal_nan=True)
 
 
-def test_own_settings_that_do_not_fit_are_refused(scene: Scene) -> None:
+def test_own_settings_that_do_not_fit_are_refused(scene: TorqueScene) -> None:
     with pytest.raises(InputError, match="horizon"):
         followed(scene, scene.settings, ("horizn=3",))
 
 
-def test_changing_sides_gives_each_what_the_other_had(scene: Scene) -> None:
+def test_changing_sides_gives_each_what_the_other_had(scene: TorqueScene) -> None:
     own = ("controller=hqp", "levels.position.Q=50", "plant.payload_kg=2")
     kept, events = swapped(scene.settings, own)
     assert kept == ("controller=himpc", "levels.position.Q=200.0", "plant.payload_kg=0.0")
-    session = Session(scene)
+    session = TorqueSession(scene)
     for event in events:
         session.post(event)
     session.drain()

@@ -11,19 +11,32 @@ import pytest
 
 from himpc.htmpc.clearance import CollisionModel
 from himpc.missions import Go
-from lessons.events import MoveLevel, MoveTarget, Push, Reset, Set
-from lessons.kinds import find_scene, prepared, run_scene, summary_of
+from lessons.events import (
+    Appear,
+    Event,
+    InsertTask,
+    MoveLevel,
+    MoveTarget,
+    Push,
+    Release,
+    RemoveTask,
+    Reset,
+    Set,
+    as_data,
+    from_data,
+)
 from lessons.papers import ITEMS
 from lessons.papers.htmpc_paper.runs import square
 from lessons.papers.htmpc_paper.squares import collinear
 from lessons.papers.printed import printed
-from lessons.recording.velocity import MobileRecording, mobile_arrays
-from lessons.recording.velocity_run import mobile_run
-from lessons.scenes.velocity_scene import MobileScene
-from lessons.session.velocity import MobileSession
+from lessons.recording.arrays import arrays
+from lessons.recording.recording import Recording
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.velocity import VelocitySession
 from lessons.settings.missions import random_peaks
-from lessons.settings.velocity import changed, paths
-from lessons.velocity_events import Appear, InsertTask, MobileEvent, Release, RemoveTask, as_data, from_data
 from robots import InputError
 from robots.collision import Ball
 
@@ -31,9 +44,9 @@ TIMING = ("step_ms", "real_time_factor")
 HOME = np.array([1.48962656, 0.173941])
 
 
-def scene(name: str, *assignments: str, controller: str | None = None) -> MobileScene:
-    found = prepared(find_scene(name), controller, assignments)
-    assert isinstance(found, MobileScene)
+def scene(name: str, *assignments: str, controller: str | None = None) -> VelocityScene:
+    found = prepared(load_scene(name), controller, assignments)
+    assert isinstance(found, VelocityScene)
     return found
 
 
@@ -41,7 +54,7 @@ def scene(name: str, *assignments: str, controller: str | None = None) -> Mobile
 def result(
     name: str, *assignments: str, controller: str | None = None, duration: float | None = None
 ) -> dict[str, Any]:
-    return summary_of(mobile_run(scene(name, *assignments, controller=controller), duration))
+    return summary(run(scene(name, *assignments, controller=controller), duration))
 
 
 def assert_sound(summary: dict[str, Any]) -> None:
@@ -94,9 +107,9 @@ def test_a_single_task_controller_leaves_the_base_where_it_is() -> None:
 def test_the_same_run_gives_the_same_numbers_and_another_seed_other_noise() -> None:
     """To the bit; the seed is of the noise."""
     noisy = scene("ridgeback-ur10-square", "plant.position_noise=0.001")
-    first, again, other = (mobile_run(noisy, 2.0, seed) for seed in (1, 1, 2))
+    first, again, other = (run(noisy, 2.0, seed) for seed in (1, 1, 2))
     summaries = [
-        {key: value for key, value in summary_of(run).items() if key not in TIMING} for run in (first, again)
+        {key: value for key, value in summary(run).items() if key not in TIMING} for run in (first, again)
     ]
     assert summaries[0] == summaries[1]
     np.testing.assert_array_equal(first["q"], again["q"])
@@ -125,21 +138,21 @@ def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
         result("ridgeback-ur10-delivery", "rounds=1", f"architecture={architecture}")
         for architecture in ("hierarchical", "single_task")
     ]
-    for summary in both:
-        assert_sound(summary)
-        assert summary["completed"] is True
+    for told in both:
+        assert_sound(told)
+        assert told["completed"] is True
     assert both[1]["completion_time_s"] >= 1.9 * both[0]["completion_time_s"]
     assert both[0]["base_path_m"] < both[1]["base_path_m"]
 
 
 def test_the_hand_waits_for_a_person_and_the_base_does_not_leave_it() -> None:
     """The hold ends with the release, not before; meanwhile the base goes on and the hand stays."""
-    recording = mobile_run(scene("ridgeback-ur10-handover"))
-    summary = summary_of(recording)
-    assert_sound(summary)
-    done = {each["task"]: each["completed_s"] for each in summary["mission"]}
+    recording = run(scene("ridgeback-ur10-handover"))
+    told = summary(recording)
+    assert_sound(told)
+    done = {each["task"]: each["completed_s"] for each in told["mission"]}
     assert done["ee 1"] == pytest.approx(14.0)
-    assert summary["completed"] is True
+    assert told["completed"] is True
     t = recording["t"][:, 0]
     waiting = (t > 5.0) & (t < 14.0)
     assert np.linalg.norm(recording["error/ee"][waiting], axis=1).max() <= 0.01
@@ -151,7 +164,7 @@ def test_the_hand_waits_for_a_person_and_the_base_does_not_leave_it() -> None:
 
 def test_a_running_task_that_is_moved_is_taken_up_at_the_next_step() -> None:
     """The reference of that very tick is the new one."""
-    session = MobileSession(scene("ridgeback-ur10-drag"))
+    session = VelocitySession(scene("ridgeback-ur10-drag"))
     session.tick()
     session.post(MoveTarget("base", (-0.5, 0.3)))
     row = session.tick()
@@ -168,7 +181,7 @@ def test_a_running_task_that_is_moved_is_taken_up_at_the_next_step() -> None:
 def test_swapping_the_priorities_lets_the_base_go() -> None:
     """Out of reach the base stops and the hand stays; swapped, the base goes and the hand is dragged."""
     target = np.array([-1.5, 0.0])
-    session = MobileSession(scene("ridgeback-ur10-drag"))
+    session = VelocitySession(scene("ridgeback-ur10-drag"))
     fields = session.layout.fields
     session.post(MoveTarget("base", (-1.5, 0.0)))
     stopped = np.array([session.tick().copy() for _ in range(60)])
@@ -187,15 +200,15 @@ def test_swapping_the_priorities_lets_the_base_go() -> None:
 
 def test_obstacles_are_kept_clear_of() -> None:
     """The distance never falls below the margin by more than 1 cm, all the way."""
-    summary = result("ridgeback-ur10-cluttered")
-    assert_sound(summary)
-    assert summary["completed"] is True
-    assert summary["clearance_min_m"] >= 0.05 - 0.01
+    told = result("ridgeback-ur10-cluttered")
+    assert_sound(told)
+    assert told["completed"] is True
+    assert told["clearance_min_m"] >= 0.05 - 0.01
 
 
 def test_an_obstacle_is_taken_away() -> None:
     """By its name, live as headless; what is not there cannot be."""
-    session = MobileSession(scene("ridgeback-ur10-cluttered"))
+    session = VelocitySession(scene("ridgeback-ur10-cluttered"))
     session.post(Appear("surprise", (9.0, 9.0, 1.0), 0.2))
     session.tick()
     before = [each.name for each in session.settings.htmpc.obstacles]
@@ -203,15 +216,15 @@ def test_an_obstacle_is_taken_away() -> None:
     session.tick()
     assert [each.name for each in session.settings.htmpc.obstacles] == before[:-1]
     alone = prepared(scene("ridgeback-ur10-cluttered"), None, ["obstacles.table=null"])
-    assert isinstance(alone, MobileScene)
+    assert isinstance(alone, VelocityScene)
     assert "table" not in [each.name for each in alone.settings.htmpc.obstacles]
     with pytest.raises(InputError, match=r"no obstacle 'tabel': did you mean 'table'\?"):
-        changed(session.settings, "obstacles.tabel", None)
+        session.settings.changed("obstacles.tabel", None)
 
 
 def test_a_ball_that_appears_ahead_is_not_run_into() -> None:
     """At full speed, 1 m from the nearest point of the robot, right on its way."""
-    session = MobileSession(scene("ridgeback-ur10-cluttered"))
+    session = VelocitySession(scene("ridgeback-ur10-cluttered"))
     fields = session.layout.fields
     ahead = np.zeros(3)
     for _ in range(11):
@@ -236,26 +249,26 @@ def test_a_ball_that_appears_ahead_is_not_run_into() -> None:
 def test_arms_settle_on_a_target_that_jumps(robot: str) -> None:
     """A step of 0.3 m ends below 1 mm, orientation kept, no bound left."""
     found = scene(f"{robot}-htmpc")
-    session = MobileSession(found)
+    session = VelocitySession(found)
     start = session.tick()[session.layout.fields["x/position"]].copy()
     goal = start + np.array([-0.15, 0.2, -0.1658])
     jump = replace(found, events=((0.1, MoveTarget("position", tuple(goal.tolist()))),))
-    recording = mobile_run(jump, 4.0)
-    summary = summary_of(recording)
-    assert_sound(summary)
-    assert summary["limits"]["position"]["max_ratio"] <= 1.0
+    recording = run(jump, 4.0)
+    told = summary(recording)
+    assert_sound(told)
+    assert told["limits"]["position"]["max_ratio"] <= 1.0
     assert np.linalg.norm(recording["error/position"][-1]) <= 1e-3
 
 
 def test_the_same_robot_under_the_torque_controller_holds_its_hand_too() -> None:
     """HIMPC: the base target is dragged 0.5 m; EE RMSE within 2 mm, torques and speeds in their bounds."""
-    found = find_scene("ridgeback-ur10-hold")
-    summary = summary_of(run_scene(replace(found, events=((0.2, MoveTarget("base", (-0.3, 0.4))),)), 1.5))
-    assert summary["diverged"] is False
-    assert summary["solver"]["unsolved"] == 0
-    assert np.linalg.norm(summary["tasks"][0]["rmse"]) <= 2e-3
-    assert summary["limits"]["torque"]["max_ratio"] < 1.0
-    assert summary["limits"]["velocity"]["max_ratio"] <= 1.0
+    found = load_scene("ridgeback-ur10-hold")
+    told = summary(run(replace(found, events=((0.2, MoveTarget("base", (-0.3, 0.4))),)), 1.5))
+    assert told["diverged"] is False
+    assert told["solver"]["unsolved"] == 0
+    assert np.linalg.norm(told["tasks"][0]["rmse"]) <= 2e-3
+    assert told["limits"]["torque"]["max_ratio"] < 1.0
+    assert told["limits"]["velocity"]["max_ratio"] <= 1.0
 
 
 # ---------------------------------------------------------------- settings, events, output
@@ -275,9 +288,9 @@ def test_every_setting_can_be_set_and_a_typo_names_the_nearest() -> None:
         ("architecture", "single_task", lambda s: s.options.architecture),
         ("input_effort", [0.1] * 9, lambda s: list(s.htmpc.input_effort)),
     ):
-        assert found(changed(settings, path, value)) == value
-    assert len(set(paths(settings))) == len(paths(settings)), "no path means two things"
-    assert set(paths(settings)) >= {"seats", "rounds", "formulation", "lexicographic", "rate_hz", "Q"}
+        assert found(settings.changed(path, value)) == value
+    assert len(set(settings.paths())) == len(settings.paths()), "no path means two things"
+    assert set(settings.paths()) >= {"seats", "rounds", "formulation", "lexicographic", "rate_hz", "Q"}
     for path, value, says in (
         ("delta", 1.0, "'delta_m'"),
         ("seats", [7], "0 to 5"),
@@ -289,26 +302,26 @@ def test_every_setting_can_be_set_and_a_typo_names_the_nearest() -> None:
         ("plant.mode", "srvo", "'servo'"),
     ):
         with pytest.raises(InputError, match=says):
-            changed(settings, path, value)
+            settings.changed(path, value)
 
 
 def test_a_formulation_and_a_controller_bring_what_they_were_tuned_with() -> None:
     """Formulation A has stage weight 1, the default 10; HTIDKC runs at 50 Hz."""
     settings = scene("ridgeback-ur10-square").settings
-    paper = changed(settings, "formulation", "paper")
+    paper = settings.changed("formulation", "paper")
     assert [level.Q for level in settings.htmpc.stack] == [10.0, 10.0]
     assert [level.Q for level in paper.htmpc.stack] == [1.0, 1.0]
-    assert changed(settings, "controller", "htidkc").htmpc.rate_hz == 50.0
+    assert settings.changed("controller", "htidkc").htmpc.rate_hz == 50.0
 
 
 def test_a_controller_of_the_other_kind_is_refused_with_a_way_out() -> None:
     for name, controller in (("ridgeback-ur10-square", "himpc"), ("iiwa14-hold", "htmpc")):
         with pytest.raises(InputError, match="choose one of"):
-            prepared(find_scene(name), controller, ())
+            prepared(load_scene(name), controller, ())
 
 
 def test_what_is_wrong_with_an_event_is_a_notice_and_the_run_goes_on() -> None:
-    session = MobileSession(scene("ridgeback-ur10-drag"))
+    session = VelocitySession(scene("ridgeback-ur10-drag"))
     for event in (
         MoveTarget("bse", (0.0, 0.0)),
         MoveTarget("base", (float("nan"), 0.0)),
@@ -339,20 +352,20 @@ def test_what_is_wrong_with_an_event_is_a_notice_and_the_run_goes_on() -> None:
         Set("delta_m", 0.1),
     ],
 )
-def test_events_survive_as_data(event: MobileEvent) -> None:
+def test_events_survive_as_data(event: Event) -> None:
     """What a recording stores is the event."""
     assert from_data(as_data(event)) == event
 
 
 def test_the_arrays_hold_one_row_per_tick_and_how_to_repeat_the_run() -> None:
-    recording = run_scene(scene("ridgeback-ur10-square"), 1.0)
-    assert isinstance(recording, MobileRecording)
-    arrays = mobile_arrays(recording, {"scene": "ridgeback-ur10-square"})
+    recording = run(scene("ridgeback-ur10-square"), 1.0)
+    assert isinstance(recording, Recording)
+    data = arrays(recording, {"scene": "ridgeback-ur10-square"})
     for name in ("t", "q", "v", "tau", "v_limit", "x/ee", "x_d/base", "v_d/base", "a_d/ee", "error/base"):
-        assert len(arrays[name]) == 10
-    assert list(arrays["level/base"]) == [2.0] * 10
-    assert arrays["joint_names"].size == 9
-    np.testing.assert_allclose(np.diff(arrays["t"]), 0.1)
+        assert len(data[name]) == 10
+    assert list(data["level/base"]) == [2.0] * 10
+    assert data["joint_names"].size == 9
+    np.testing.assert_allclose(np.diff(data["t"]), 0.1)
 
 
 def test_a_waypoint_is_a_goal_without_a_speed() -> None:
@@ -396,7 +409,7 @@ def test_collinear_waves_are_those_on_the_line_through_hand_and_home() -> None:
 def test_priorities_can_be_a_setting() -> None:
     """`order` is taken up when a run starts; what it must be is said."""
     drag = scene("ridgeback-ur10-drag", "order=base,ee")
-    session = MobileSession(drag)
+    session = VelocitySession(drag)
     session.tick()
     assert [active.task.role for active in session.progress.window] == ["base", "ee"]
     session.post(Set("order", ["ee", "base"]))
@@ -407,6 +420,6 @@ def test_priorities_can_be_a_setting() -> None:
     assert [active.task.role for active in session.progress.window] == ["ee", "base"]
     for wrong in ("base", "base,base", "base,nose", 3):
         with pytest.raises(InputError, match="every level once"):
-            changed(drag.settings, "order", wrong)
+            drag.settings.changed("order", wrong)
     with pytest.raises(InputError, match="order"):
-        changed(scene("ridgeback-ur10-delivery").settings, "order", "base,ee")
+        scene("ridgeback-ur10-delivery").settings.changed("order", "base,ee")

@@ -9,16 +9,15 @@ import pinocchio as pin
 import pytest
 
 from himpc.htmpc import HTMPC, VelocityPlan
-from lessons.events import MoveLevel, MoveTarget, Reset, Set
-from lessons.kinds import find_scene, prepared
-from lessons.scenes.velocity_scene import MobileScene
-from lessons.session.velocity import MobileSession
+from lessons.events import Event, MoveLevel, MoveTarget, Reset, Set
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.velocity import VelocitySession
 from lessons.session.velocity_rows import AT_ACCELERATION, AT_VELOCITY
-from lessons.velocity_events import MobileEvent
 from robots.stretch import horizontal_reach
 
 OUT_OF_REACH = MoveTarget("base", (-1.5, 0.0))
-EVENTS: dict[int, MobileEvent] = {
+EVENTS: dict[int, Event] = {
     1: OUT_OF_REACH,
     5: Set("horizon", 6),
     9: MoveLevel("base", 0),
@@ -27,13 +26,13 @@ EVENTS: dict[int, MobileEvent] = {
 }
 
 
-def session(name: str, *assignments: str) -> MobileSession:
-    scene = prepared(find_scene(name), None, assignments)
-    assert isinstance(scene, MobileScene)
-    return MobileSession(scene, seed=3)
+def session(name: str, *assignments: str) -> VelocitySession:
+    scene = prepared(load_scene(name), None, assignments)
+    assert isinstance(scene, VelocityScene)
+    return VelocitySession(scene, seed=3)
 
 
-def timeless(made: MobileSession, row: np.ndarray) -> np.ndarray:
+def timeless(made: VelocitySession, row: np.ndarray) -> np.ndarray:
     """A row without what a clock measured."""
     kept = row.copy()
     for name, where in made.layout.fields.items():

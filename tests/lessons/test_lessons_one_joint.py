@@ -12,7 +12,6 @@ from himpc.htmpc.clearance import CollisionModel
 from lessons.events import MoveTarget
 from lessons.recording.run import run
 from lessons.scenes.catalog import load_scene
-from lessons.settings.torque import changed
 from robots.collision import Ball
 from robots.reach import solve_posture
 
@@ -28,7 +27,7 @@ KINDS = ("revolute", "prismatic")
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_one_joint_holds_under_every_controller(controller: str, kind: str) -> None:
     scene = load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind))
-    recording = run(replace(scene, settings=changed(scene.settings, "controller", controller)), 0.3)
+    recording = run(replace(scene, settings=scene.settings.changed("controller", controller)), 0.3)
     assert np.isfinite(recording["tau"]).all()
     assert np.abs(recording["q"] - scene.robot.home).max() < 1e-3
 

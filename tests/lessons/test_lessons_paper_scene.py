@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lessons.recording.run import run, with_assignments
-from lessons.recording.torque import Recording, summary
-from lessons.scenes.catalog import load_scene
-from lessons.session.torque import Session
-from lessons.settings.torque import changed
+from lessons.recording.recording import Recording
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
 from robots import InputError
 
 Array = NDArray[np.float64]
@@ -27,8 +28,8 @@ TABLE_V = "[0.8,0.8,1.2,1.2,0.8,1.2,1.2]"
 
 @lru_cache(maxsize=32)
 def record(scene: str, *assignments: str, controller: str = "himpc", duration: float = 4.0) -> Recording:
-    loaded = load_scene(scene)
-    settings = with_assignments(changed(loaded.settings, "controller", controller), assignments)
+    loaded = torque_scene(scene)
+    settings = with_assignments(loaded.settings.changed("controller", controller), assignments)
     return run(replace(loaded, settings=settings), duration)
 
 
@@ -38,7 +39,7 @@ def result(*assignments: str, controller: str = "himpc") -> dict[str, Any]:
 
 def test_it_starts_on_the_reference() -> None:
     """Position and velocity of levels 1 and 2 are the reference's, and no joint accelerates."""
-    session = Session(load_scene(NAME))
+    session = TorqueSession(torque_scene(NAME))
     row = session.tick()
     at = session.layout.fields
     for task in ("position", "orientation"):

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from lessons.experiments.jobs import Job, Results, Run, perform_all
-from lessons.kinds import paths_of
 from lessons.papers import ITEMS
 from lessons.papers.himpc_paper.accuracy import model_errors
 from lessons.papers.himpc_paper.effort import EffortJob
@@ -60,7 +59,7 @@ def test_every_job_can_be_set_up(name: str, quick: bool) -> None:
     for job in ITEMS[name].jobs(quick):
         scene = job.prepared()
         assert scene.settings.controller == job.controller
-        assert {text.partition("=")[0] for text in job.set} <= set(paths_of(scene))
+        assert {text.partition("=")[0] for text in job.set} <= set(scene.settings.paths())
 
 
 @pytest.mark.parametrize("quick", QUICK)

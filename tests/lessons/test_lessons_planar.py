@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from himpc.configuration import Configuration
-from lessons.recording.run import run, with_assignments
-from lessons.recording.torque import Recording, summary
-from lessons.scenes.catalog import load_scene
+from lessons.recording.recording import Recording
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import torque_scene
 from lessons.scenes.planar import OMEGA, SingularOptions
-from lessons.session.torque import Session
-from lessons.settings.torque import changed, paths
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
 from robots import InputError
 
 SCENES = ("planar3-circle", "planar3-conflict", "planar3-singular")
@@ -31,8 +32,8 @@ def record(scene: str, controller: str, *assignments: str, duration: float | Non
 
 @cache
 def _record(scene: str, controller: str, assignments: tuple[str, ...], duration: float | None) -> Recording:
-    loaded = load_scene(scene)
-    settings = with_assignments(changed(loaded.settings, "controller", controller), assignments)
+    loaded = torque_scene(scene)
+    settings = with_assignments(loaded.settings.changed("controller", controller), assignments)
     return run(replace(loaded, settings=settings), duration)
 
 
@@ -194,7 +195,7 @@ def test_rt3_what_happens_between_saturated_motors(controller: str) -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_reference_starts_where_the_arm_is(name: str) -> None:
-    scene = load_scene(name)
+    scene = torque_scene(name)
     start = Configuration(scene.robot, scene.robot.model.createData(), scene.q_0, scene.v_0)
     references = scene.references(scene.robot, scene.settings.levels)
     for level in scene.settings.levels:
@@ -213,7 +214,7 @@ def test_the_reference_starts_where_the_arm_is(name: str) -> None:
 )
 def test_velocity_and_acceleration_belong_to_the_path(name: str, assignments: tuple[str, ...]) -> None:
     """ẋ_d and ẍ_d are the derivatives of x_d, away from the switch of RT3 at 8 s."""
-    scene = load_scene(name)
+    scene = torque_scene(name)
     scene = replace(scene, settings=with_assignments(scene.settings, assignments))
     h = 1e-4
     for reference in scene.references(scene.robot, scene.settings.levels).values():
@@ -226,7 +227,7 @@ def test_velocity_and_acceleration_belong_to_the_path(name: str, assignments: tu
 
 def test_rt3_switches_circles_in_the_singular_point() -> None:
     """Through (0.9, 0) at 0, 8 and 16 s, the only point on the straight arm; the speed doubles there."""
-    scene = load_scene("planar3-singular")
+    scene = torque_scene("planar3-singular")
     position = scene.references(scene.robot, scene.settings.levels)["position"]
     for t in (0.0, 8.0, 16.0):
         np.testing.assert_allclose(position.preview(t, 1e-3, 1).value, [0.9, 0.0], atol=1e-12)
@@ -234,7 +235,7 @@ def test_rt3_switches_circles_in_the_singular_point() -> None:
     speed = np.linalg.norm(across.velocity, axis=1)
     np.testing.assert_allclose(speed, OMEGA * np.array([0.1, 0.1, 0.2, 0.2, 0.2]), rtol=1e-9)
     assert np.linalg.norm(across.displacement, axis=1).max() < 1e-3
-    smooth = replace(scene, settings=changed(scene.settings, "smooth", True))
+    smooth = replace(scene, settings=scene.settings.changed("smooth", True))
     position = smooth.references(smooth.robot, smooth.settings.levels)["position"]
     assert np.abs(position.preview(7.998, 1e-3, 4).velocity).max() < 1e-5
     reach = [np.linalg.norm(position.preview(t, 1e-3, 1).value) for t in np.linspace(0.0, 16.0, 801)]
@@ -243,9 +244,9 @@ def test_rt3_switches_circles_in_the_singular_point() -> None:
 
 def test_options_are_settings() -> None:
     """They stand among the paths, take their own type only, and a typo names the nearest."""
-    circle, singular = (load_scene(name).settings for name in ("planar3-circle", "planar3-singular"))
-    assert "q1_amplitude_deg" in paths(circle) and "smooth" not in paths(circle)
-    assert changed(singular, "smooth", True).options == SingularOptions(smooth=True)
+    circle, singular = (torque_scene(name).settings for name in ("planar3-circle", "planar3-singular"))
+    assert "q1_amplitude_deg" in circle.paths() and "smooth" not in circle.paths()
+    assert singular.changed("smooth", True).options == SingularOptions(smooth=True)
     for settings, path, value, message in (
         (circle, "q1_amplitude", 3.0, "did you mean 'q1_amplitude_deg'"),
         (circle, "smooth", True, "There is no setting 'smooth'"),
@@ -255,7 +256,7 @@ def test_options_are_settings() -> None:
         (singular, "smooth", 1, "give true or false"),
     ):
         with pytest.raises(InputError, match=message):
-            changed(settings, path, value)
+            settings.changed(path, value)
 
 
 def test_the_amplitude_reaches_the_reference() -> None:
@@ -268,8 +269,8 @@ def test_the_amplitude_reaches_the_reference() -> None:
 @pytest.mark.parametrize("controller", ["osf", "tdeosf"])
 def test_who_loses_control_goes_on_with_numbers(controller: str) -> None:
     """Far beyond any robot's speed the plant gives up, where it is, and nothing becomes NaN."""
-    scene = load_scene("planar3-conflict")
-    session = Session(replace(scene, settings=changed(scene.settings, "controller", controller)))
+    scene = torque_scene("planar3-conflict")
+    session = TorqueSession(replace(scene, settings=scene.settings.changed("controller", controller)))
     fields = session.layout.fields
     for _ in range(2500):
         row = session.tick()

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from lessons.events import Event, MoveTarget, Push
-from lessons.recording.run import run, with_assignments
-from lessons.recording.torque import Recording, summary
-from lessons.scenes.catalog import load_scene
+from lessons.recording.recording import Recording
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import torque_scene
+from lessons.settings.assignments import with_assignments
 
 
 def record(
@@ -24,7 +26,7 @@ def record(
     seed: int = 0,
     events: tuple[tuple[float, Event], ...] = (),
 ) -> Recording:
-    scene = load_scene(name, urdf)
+    scene = torque_scene(name, urdf)
     settings = with_assignments(scene.settings, assignments)
     return run(replace(scene, settings=settings, events=events), duration, seed)
 

@@ -10,13 +10,14 @@ import pytest
 from session_rows import value
 
 from lessons.events import MoveTarget, Push, Set
-from lessons.recording.run import run, with_assignments
-from lessons.recording.torque import summary
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
 
 
-def test_rows_tell_the_filtered_target(session: Session) -> None:
+def test_rows_tell_the_filtered_target(session: TorqueSession) -> None:
     """x_d and its derivatives in the row are those of the dragged target, and fit together over ticks."""
     session.tick()
     start = value(session, session.tick(), "x_d/position").copy()
@@ -33,7 +34,7 @@ def test_rows_tell_the_filtered_target(session: Session) -> None:
     assert np.linalg.norm(quaternion) == pytest.approx(1)
 
 
-def test_a_row_tells_the_truth(session: Session) -> None:
+def test_a_row_tells_the_truth(session: TorqueSession) -> None:
     """Torque applied, true joint state, bounds and both leaks are what plant and plan say."""
     for _ in range(5):
         session.tick()
@@ -51,7 +52,7 @@ def test_a_row_tells_the_truth(session: Session) -> None:
     assert value(session, row, "gauge_radius")[0] > 0
 
 
-def test_the_gauge_follows_M_bar(session: Session) -> None:
+def test_the_gauge_follows_M_bar(session: TorqueSession) -> None:
     """With M̄ = 0 nearly, ‖I − M⁻¹M̄‖ is 1; a ten times larger M̄ shows at once in both numbers."""
     before = session.tick().copy()
     session.post(Set("M_bar_scale", 10))
@@ -61,7 +62,7 @@ def test_the_gauge_follows_M_bar(session: Session) -> None:
     assert value(session, row, "gauge_norm")[0] > value(session, before, "gauge_norm")[0]
 
 
-def test_losing_control_is_said(scene: Scene) -> None:
+def test_losing_control_is_said(scene: TorqueScene) -> None:
     """A hopeless setting ends a run honestly: diverged, a notice, and a finite summary."""
     unlimited = ["limits.velocity=false", "limits.torque=false", "plant.saturate=false"]
     assignments = ["M_bar_scale=20", "R=0.01", *unlimited]

@@ -10,20 +10,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lessons.recording.run import parse_assignment, with_assignments
-from lessons.scenes.catalog import load_scene
-from lessons.settings.torque import SceneSettings, changed, paths, value_at
+from lessons.scenes.catalog import torque_scene
+from lessons.settings.assignments import parse_assignment, with_assignments
+from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
-START = load_scene("iiwa14-circle").settings
+START = torque_scene("iiwa14-circle").settings
 
 
 @pytest.fixture
-def start() -> SceneSettings:
+def start() -> TorqueSettings:
     return START
 
 
-def test_a_path_reaches_its_field_and_nothing_else(start: SceneSettings) -> None:
+def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> None:
     """Each change is what was asked for, and all the rest stays."""
     expected: dict[str, tuple[Any, Any]] = {
         "horizon": (10, lambda s: s.horizon),
@@ -51,19 +51,19 @@ def test_a_path_reaches_its_field_and_nothing_else(start: SceneSettings) -> None
         "tasks.orientation.K_p": (80.0, lambda s: s.levels[1].tasks[0].K_p),
     }
     for path, (value, read) in expected.items():
-        new = changed(start, path, value)
+        new = start.changed(path, value)
         assert read(new) == value != read(start)
-        touched = [f.name for f in fields(SceneSettings) if getattr(new, f.name) != getattr(start, f.name)]
+        touched = [f.name for f in fields(TorqueSettings) if getattr(new, f.name) != getattr(start, f.name)]
         assert touched == [path.split(".")[0].replace("tasks", "levels")]
 
 
-def test_one_joint_of_many(start: SceneSettings) -> None:
+def test_one_joint_of_many(start: TorqueSettings) -> None:
     """A place behind a per-joint path changes that joint alone; one number first spreads to all."""
-    scaled = changed(start, "plant.inertia_scale.2", 0.5)
+    scaled = start.changed("plant.inertia_scale.2", 0.5)
     assert scaled.plant.inertia_scale == (1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0)
-    again = changed(scaled, "plant.inertia_scale.7", 2.0).plant.inertia_scale
+    again = scaled.changed("plant.inertia_scale.7", 2.0).plant.inertia_scale
     assert again == (1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 2.0)
-    assert changed(start, "M_bar.1", 0.25).M_bar == (0.25, *start.M_bar[1:])
+    assert start.changed("M_bar.1", 0.25).M_bar == (0.25, *start.M_bar[1:])
     for path, value, says in (
         ("M_bar.8", 1.0, "from 1 to 7"),
         ("M_bar.0", 1.0, "from 1 to 7"),
@@ -71,28 +71,28 @@ def test_one_joint_of_many(start: SceneSettings) -> None:
         ("plant.payload_kg.1", 1.0, "plant.payload_kg"),
     ):
         with pytest.raises(InputError, match=says):
-            changed(start, path, value)
+            start.changed(path, value)
 
 
-def test_every_listed_path_is_taken(start: SceneSettings) -> None:
+def test_every_listed_path_is_taken(start: TorqueSettings) -> None:
     """`paths` lists exactly what `changed` accepts: the present value fits back in."""
-    assert len(paths(start)) == len(set(paths(start))) > 40
-    for path in paths(start):
+    assert len(start.paths()) == len(set(start.paths())) > 40
+    for path in start.paths():
         head, _, rest = path.partition(".")
         if head in ("levels", "tasks", "Q", "R"):
             value: Any = {"enabled": True, "horizon": 3}.get(rest.rpartition(".")[2], 7.0)
         else:
-            value = value_at(start, path)
-        assert isinstance(changed(start, path, value), SceneSettings)
+            value = start.value_at(path)
+        assert isinstance(start.changed(path, value), TorqueSettings)
 
 
-def test_weights_of_all_levels_at_once(start: SceneSettings) -> None:
+def test_weights_of_all_levels_at_once(start: TorqueSettings) -> None:
     """Q and R take one number, or one per level; a level's own may have one entry per coordinate."""
-    assert [level.Q for level in changed(start, "Q", 5).levels] == [5.0, 5.0, 5.0]
-    assert [level.R for level in changed(start, "R", [1, 2, 3]).levels] == [1.0, 2.0, 3.0]
-    assert changed(start, "levels.1.Q", [1, 2, 3]).levels[0].Q == (1.0, 2.0, 3.0)
+    assert [level.Q for level in start.changed("Q", 5).levels] == [5.0, 5.0, 5.0]
+    assert [level.R for level in start.changed("R", [1, 2, 3]).levels] == [1.0, 2.0, 3.0]
+    assert start.changed("levels.1.Q", [1, 2, 3]).levels[0].Q == (1.0, 2.0, 3.0)
     with pytest.raises(InputError, match="one per level"):
-        changed(start, "Q", [1, 2])
+        start.changed("Q", [1, 2])
 
 
 @pytest.mark.parametrize(
@@ -108,10 +108,10 @@ def test_weights_of_all_levels_at_once(start: SceneSettings) -> None:
         ("mbar_scale", "M_bar_scale"),
     ],
 )
-def test_a_typo_names_the_nearest_path(start: SceneSettings, wrong: str, right: str) -> None:
+def test_a_typo_names_the_nearest_path(start: TorqueSettings, wrong: str, right: str) -> None:
     """One sentence with the name that was probably meant."""
     with pytest.raises(InputError) as error:
-        changed(start, wrong, 1)
+        start.changed(wrong, 1)
     suggestion = str(error.value).split("did you mean '")[1].split("'")[0]
     assert suggestion == right or suggestion.split(".")[0::2] == right.split(".")[0::2]
     assert "\n" not in str(error.value)
@@ -152,16 +152,16 @@ def test_a_typo_names_the_nearest_path(start: SceneSettings, wrong: str, right: 
         ("plant.friction", "high"),
     ],
 )
-def test_a_value_that_cannot_be_is_refused(start: SceneSettings, path: str, value: Any) -> None:
+def test_a_value_that_cannot_be_is_refused(start: TorqueSettings, path: str, value: Any) -> None:
     """Wrong type or range: one sentence, never another exception."""
     with pytest.raises(InputError) as error:
-        changed(start, path, value)
+        start.changed(path, value)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) > 15
 
 
 @given(
-    path=st.sampled_from(paths(START)) | st.text(max_size=20),
+    path=st.sampled_from(START.paths()) | st.text(max_size=20),
     value=st.one_of(
         st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.lists(st.floats())
     ),
@@ -169,11 +169,11 @@ def test_a_value_that_cannot_be_is_refused(start: SceneSettings, path: str, valu
 def test_any_value_is_taken_or_refused_in_words(path: str, value: Any) -> None:
     """Whatever is written into a field: settings a controller can use, or an InputError."""
     try:
-        new = changed(START, path, value)
+        new = START.changed(path, value)
     except InputError as error:
         assert str(error)
     else:
-        assert isinstance(new, SceneSettings)
+        assert isinstance(new, TorqueSettings)
 
 
 def test_assignments_are_json_or_words() -> None:
@@ -192,19 +192,19 @@ def test_assignments_that_are_none(text: str) -> None:
         parse_assignment(text)
 
 
-def test_later_assignments_build_on_earlier_ones(start: SceneSettings) -> None:
+def test_later_assignments_build_on_earlier_ones(start: TorqueSettings) -> None:
     new = with_assignments(start, ["Q=5", "levels.2.Q=7", "limits.velocity_scale=2", "limits.position=off"])
     assert [level.Q for level in new.levels] == [5.0, 7.0, 5.0]
     assert (new.limits.velocity_scale, new.limits.position) == (2.0, "off")
     np.testing.assert_array_equal(new.for_controller().M_bar, start.M_bar)
 
 
-def test_the_order_is_a_setting_of_its_own(start: SceneSettings) -> None:
+def test_the_order_is_a_setting_of_its_own(start: TorqueSettings) -> None:
     """All levels by name, in one word or a list; anything else names what it should be."""
     names = [level.name for level in start.levels]
-    turned = changed(start, "order", ",".join(reversed(names)))
+    turned = start.changed("order", ",".join(reversed(names)))
     assert [level.name for level in turned.levels] == names[::-1]
-    assert changed(turned, "order", names) == start
+    assert turned.changed("order", names) == start
     for wrong in ("", names[0], [*names, names[0]], names[:2], 3, None):
         with pytest.raises(InputError, match="every level once"):
-            changed(start, "order", wrong)
+            start.changed("order", wrong)

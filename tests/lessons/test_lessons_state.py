@@ -16,18 +16,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lessons.events import MoveLevel, Set
-from lessons.kinds import AnyScene, changed_any, find_scene, paths_of, prepared, run_scene, settings_after
-from lessons.replay.state import MAX_CODE, State, command_line, decode, encode, settings_now, state_of
-from lessons.scenes.torque_scene import Scene
-from lessons.scenes.velocity_scene import MobileScene
-from lessons.session.torque import Session
-from lessons.session.velocity import MobileSession
+from lessons.events import Appear, Event, MoveLevel, Set
+from lessons.recording.run import run
+from lessons.replay.state import MAX_CODE, State, command_line, decode, encode, state_of
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.scene import Scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.torque import TorqueSession
+from lessons.session.velocity import VelocitySession
 from lessons.settings.assignments import differences
-from lessons.velocity_events import Appear, MobileEvent
+from lessons.settings.settings import settings_after
 from robots import InputError
 
-find = cache(find_scene)
+find = cache(load_scene)
 
 NUMBERS = st.one_of(
     st.integers(0, 30),
@@ -45,10 +47,9 @@ def values(n: int) -> st.SearchStrategy[Any]:
 
 
 @st.composite
-def events(draw: st.DrawFn, scene: AnyScene) -> MobileEvent:
+def events(draw: st.DrawFn, scene: Scene) -> Event:
     kind = draw(st.sampled_from(["Set", "Set", "Set", "Set", "MoveLevel", "order", "Appear", "moved"]))
-    stack = scene.settings.levels if isinstance(scene, Scene) else scene.settings.htmpc.stack
-    names = [level.name for level in stack]
+    names = [level.name for level in scene.settings.levels]
     if kind == "MoveLevel":
         return MoveLevel(draw(st.sampled_from(names)), draw(st.integers(0, len(names) - 1)))
     if kind == "order":
@@ -59,7 +60,7 @@ def events(draw: st.DrawFn, scene: AnyScene) -> MobileEvent:
     if kind == "moved":
         place = draw(st.none() | st.tuples(NUMBERS, NUMBERS, NUMBERS).map(list))
         return Set(f"obstacles.{draw(st.sampled_from(['table', 'bin', 'visitor', 'floor']))}", place)
-    return Set(draw(st.sampled_from(paths_of(scene))), draw(values(scene.robot.n)))
+    return Set(draw(st.sampled_from(scene.settings.paths())), draw(values(scene.robot.n)))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
         except InputError:
             continue
     seed = data.draw(st.integers(0, 2**40))
-    state = State(name, set=differences(scene, reached), seed=seed, lesson="two-tasks", step=2)
+    state = State(name, set=differences(scene.settings, reached), seed=seed, lesson="two-tasks", step=2)
     assert decode(encode(state)) == state
     assert prepared(scene, None, decode(encode(state)).set).settings == reached
     words = shlex.split(command_line(state))
@@ -93,9 +94,7 @@ def test_a_code_says_only_what_differs() -> None:
     assert plain.set == ()
     assert len(encode(plain)) < 50
     scene = find("ridgeback-ur10-square")
-    assert state_of(scene.name, changed_any(scene.settings, "controller", "htidkc")).set == (
-        "controller=htidkc",
-    )
+    assert state_of(scene.name, scene.settings.changed("controller", "htidkc")).set == ("controller=htidkc",)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +114,7 @@ def test_a_run_from_a_code_is_equal_to_the_last_bit(name: str, changes: tuple[st
     scene = prepared(find(name), None, changes)
     state = state_of(name, scene.settings, seed=5)
     again = decode(encode(state))
-    recording, repeated = run_scene(scene, 0.4, 5), run_scene(again.prepared(), 0.4, again.seed)
+    recording, repeated = run(scene, 0.4, 5), run(again.prepared(), 0.4, again.seed)
     for field in ("t", "q", "v", "tau"):
         np.testing.assert_array_equal(recording[field], repeated[field])
     assert np.abs(np.diff(recording["q"], axis=0)).max() > 0
@@ -183,7 +182,7 @@ def test_bad_codes_are_refused_in_one_sentence(case: str) -> None:
     with pytest.raises(InputError, match=says) as caught:
         decode(code)
     assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 400 + 40 * len(paths_of(find("planar3-hold")))
+    assert len(str(caught.value)) < 400 + 40 * len(find("planar3-hold").settings.paths())
 
 
 @pytest.mark.parametrize(
@@ -230,7 +229,7 @@ def test_what_a_code_cannot_carry_is_said() -> None:
     with pytest.raises(InputError, match="too long"):
         encode(State("planar3-hold", set=tuple(f"M_bar.1={k}" for k in range(501))))
     hold = find("planar3-hold")
-    assert isinstance(hold, Scene)
+    assert isinstance(hold, TorqueScene)
     first, *others = hold.settings.levels
     narrow = replace(first, tasks=(replace(first.tasks[0], axes="x"),))  # pyright: ignore[reportCallIssue]
     other = replace(hold.settings, levels=(narrow, *others))
@@ -248,17 +247,17 @@ def test_the_command_line_is_quoted_for_a_shell() -> None:
 def test_priorities_of_now_are_part_of_a_state() -> None:
     """Swapped by a hand at velocity level they belong to the run; a code passes them on all the same."""
     scene = find("ridgeback-ur10-drag")
-    assert isinstance(scene, MobileScene)
-    session = MobileSession(scene)
+    assert isinstance(scene, VelocityScene)
+    session = VelocitySession(scene)
     session.tick()
-    assert settings_now(session) == scene.settings
+    assert session.settings_now == scene.settings
     session.post(MoveLevel("base", 0))
     session.tick()
-    state = state_of(scene.name, settings_now(session))
+    state = state_of(scene.name, session.settings_now)
     assert state.set == ("order=base,ee",)
-    again = MobileSession(prepared(scene, None, decode(encode(state)).set))  # pyright: ignore[reportArgumentType]
+    again = VelocitySession(prepared(scene, None, decode(encode(state)).set))  # pyright: ignore[reportArgumentType]
     again.tick()
     assert [active.task.role for active in again.progress.window] == ["base", "ee"]
-    assert settings_now(again) == again.settings
-    torque = Session(find("planar3-hold"))  # pyright: ignore[reportArgumentType]
-    assert settings_now(torque) is torque.settings
+    assert again.settings_now == again.settings
+    torque = TorqueSession(find("planar3-hold"))  # pyright: ignore[reportArgumentType]
+    assert torque.settings_now is torque.settings

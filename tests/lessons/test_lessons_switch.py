@@ -8,30 +8,30 @@ from numpy.typing import NDArray
 
 from himpc import CONTROLLERS
 from lessons.events import MoveTarget, Reset, Set
-from lessons.scenes.catalog import load_scene
-from lessons.scenes.torque_scene import Scene
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import HANDOVER_SECONDS, Handover
-from lessons.session.torque import Session
+from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]
 
-SCENE = load_scene("iiwa14-hold")
+SCENE = torque_scene("iiwa14-hold")
 TICKS = round(HANDOVER_SECONDS / SCENE.settings.T_s)
 
 
-def tip(session: Session) -> Array:
+def tip(session: TorqueSession) -> Array:
     return session.plant.frame_pose(session.robot.tip)[1].copy()
 
 
-def at_rest(controller: str, scene: Scene = SCENE) -> Session:
-    session = Session(scene)
+def at_rest(controller: str, scene: TorqueScene = SCENE) -> TorqueSession:
+    session = TorqueSession(scene)
     session.post(Set("controller", controller))
     for _ in range(TICKS + 50):
         session.tick()
     return session
 
 
-def switch(session: Session, name: str, start: Array) -> None:
+def switch(session: TorqueSession, name: str, start: Array) -> None:
     """Hands over: no tick moves a torque by 5 % of its limit, nor the tip as far as 1 mm from start."""
     session.post(Set("controller", name))
     before = session.plant.tau

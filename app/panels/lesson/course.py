@@ -14,7 +14,7 @@ from app.link.exercise import Exercise, Lecture
 from app.panels.lesson.cards import add_cards, add_invitation
 from app.panels.lesson.step import LessonPanel
 from app.panels.widgets.window import Window
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 
 
 class Course:
@@ -27,7 +27,7 @@ class Course:
         exercise: Exercise | None,
         notebook: Notebook,
         choose: Callable[[SceneChoice], None],
-        settings: Callable[[], AnySettings],
+        settings: Callable[[], Settings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
         """exercise: the one that is on, if any."""
@@ -72,7 +72,7 @@ class Course:
         self._list.close()
         self._choose(choice)
 
-    def follow(self, lecture: Lecture | None, settings: AnySettings) -> None:
+    def follow(self, lecture: Lecture | None, settings: Settings) -> None:
         """Shows how far the lesson is."""
         if self._panel is not None:
             self._panel.follow(lecture, settings)

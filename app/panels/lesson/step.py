@@ -19,7 +19,8 @@ from app.panels.lesson.prediction import Asking
 from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.path_control import add_control
-from lessons.kinds import AnyEvent, AnySettings
+from lessons.events import Event
+from lessons.settings.settings import Settings
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Step
 
@@ -40,7 +41,7 @@ class LessonPanel:
         choose: Callable[[SceneChoice], None],
         all_lessons: Callable[[], None],
         notebook: Notebook,
-        settings: Callable[[], AnySettings],
+        settings: Callable[[], Settings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
         """pictures: where the curves of the run are drawn."""
@@ -56,7 +57,7 @@ class LessonPanel:
         ):
             add_command(gui, label, key, does)
 
-    def _post(self, event: AnyEvent) -> None:
+    def _post(self, event: Event) -> None:
         self._send(Post(event))
 
     # ---------------------------------------------------------------- building
@@ -65,7 +66,7 @@ class LessonPanel:
         self._exercise, self._part = exercise, exercise.part
         self._lecture: Lecture | None = None
         self._shown: dict[str, str] = {}
-        self._bindings: Bindings[AnySettings] = Bindings(self._post, self._loop)
+        self._bindings: Bindings[Settings] = Bindings(self._post, self._loop)
         with self._tab:
             self._all = self._gui.add_folder(None)
         with self._all:
@@ -179,7 +180,7 @@ class LessonPanel:
 
     # ---------------------------------------------------------------- showing
 
-    def follow(self, lecture: Lecture | None, settings: AnySettings) -> None:
+    def follow(self, lecture: Lecture | None, settings: Settings) -> None:
         """Shows how far the exercise is."""
         if lecture is None:
             return

@@ -13,9 +13,9 @@ from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
 from app.panels.widgets.snapshot import Snapshot
-from lessons.kinds import AnySettings
 from lessons.session.follower import swapped
-from lessons.settings.presets import controllers_for, usual_settings
+from lessons.settings.presets import usual_settings
+from lessons.settings.settings import Settings
 from lessons.teaching.lesson import Ghost
 from robots import InputError
 
@@ -32,14 +32,14 @@ class ComparePanel:
         self,
         gui: viser.GuiApi,
         learner: Learner,
-        settings: AnySettings,
+        settings: Settings,
         colours: dict[str, RGB],
     ) -> None:
         self._learner, self._colours = learner, colours
         self._choices = {choice.words: choice for choice in usual_settings(settings)}
         self._intro = gui.add_html(_INTRO)
         self._controller = gui.add_dropdown(
-            "Ghost's controller", (_SAME, *controllers_for(settings)), initial_value=_SAME
+            "Ghost's controller", (_SAME, *settings.controllers), initial_value=_SAME
         )
         self._folders: list[viser.GuiFolderHandle] = []
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
@@ -114,7 +114,7 @@ class ComparePanel:
             learner.send(Post(event))
         learner.start_ghost(Ghost(", ".join(own), own))
 
-    def update(self, now: Snapshot[AnySettings]) -> None:
+    def update(self, now: Snapshot[Settings]) -> None:
         """Shows what is."""
         ghost = self._learner.ghost
         on = ghost is not None
@@ -130,7 +130,7 @@ class ComparePanel:
             return
         self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
 
-    def _results(self, now: Snapshot[AnySettings], mine: Result, its: Result) -> str:
+    def _results(self, now: Snapshot[Settings], mine: Result, its: Result) -> str:
         places = {level.name: place for place, level in enumerate(now.settings.levels, start=1)}
         tasks = sorted(now.ready.layout.tasks, key=lambda task: places.get(task.level, 99))
         rows = [
@@ -162,7 +162,7 @@ class ComparePanel:
         )
 
 
-def _legend(words: str, now: Snapshot[AnySettings]) -> str:
+def _legend(words: str, now: Snapshot[Settings]) -> str:
     slow = ""
     if now.status.capped:
         slow = (

@@ -19,7 +19,7 @@ from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import Reset
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 
@@ -107,7 +107,7 @@ class PlaybackPanel:
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 
-    def update(self, now: Snapshot[AnySettings]) -> None:
+    def update(self, now: Snapshot[Settings]) -> None:
         status = now.status
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:

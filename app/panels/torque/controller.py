@@ -13,7 +13,7 @@ from app.panels.widgets.snapshot import Snapshot
 from himpc.catalog import CONTROLLERS
 from lessons.events import Set
 from lessons.session.bumpless import HANDOVER_SECONDS
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 from lessons.settings.values import choices_of
 from robots import Robot
 
@@ -22,7 +22,7 @@ class ControllerPanel:
     """Everything about the controller that can be changed while it runs."""
 
     def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings, robot: Robot
     ) -> None:
         self._choice(gui, bindings, settings)
         self._horizon(gui, bindings, settings)
@@ -31,7 +31,9 @@ class ControllerPanel:
         self._limits(gui, bindings, settings)
         self._solver(gui, bindings, settings)
 
-    def _choice(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
+    def _choice(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
+    ) -> None:
         with gui.add_folder("Which controller"):
             menu = gui.add_dropdown(
                 "Controller",
@@ -44,7 +46,9 @@ class ControllerPanel:
         self._shown = settings.controller
         bindings.bind(menu, lambda s: s.controller, lambda name: Set("controller", str(name)))
 
-    def _horizon(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
+    def _horizon(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
+    ) -> None:
         with gui.add_folder("Horizon"):
             knots = gui.add_slider(
                 "N",
@@ -68,7 +72,7 @@ class ControllerPanel:
         bindings.bind(knots, lambda s: s.horizon, lambda value: Set("horizon", int(value)))
 
     def _inertia(
-        self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings, robot: Robot
     ) -> None:
         with gui.add_folder("Inertia guess M̄"):
             self._gauge = gui.add_html("")
@@ -95,7 +99,9 @@ class ControllerPanel:
                         lambda value, joint=joint: Set(f"M_bar.{joint + 1}", float(value)),
                     )
 
-    def _limits(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
+    def _limits(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
+    ) -> None:
         limits = settings.limits
         with gui.add_folder("Limits"):
             torque = gui.add_checkbox("Torque", limits.torque)
@@ -122,7 +128,9 @@ class ControllerPanel:
         bindings.bind(velocity, lambda s: s.limits.velocity, lambda on: Set("limits.velocity", bool(on)))
         bindings.bind(position, lambda s: s.limits.position, lambda mode: Set("limits.position", str(mode)))
 
-    def _solver(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
+    def _solver(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
+    ) -> None:
         with gui.add_folder("Solver", expand_by_default=False):
             for label, path, hint in (
                 ("Route", "route", "Two ways to the same torque"),
@@ -149,7 +157,7 @@ class ControllerPanel:
                 + formula(r"\rho(I - M^{-1} \bar M) < 1")
             )  # fmt: skip
 
-    def update(self, now: Snapshot[SceneSettings]) -> None:
+    def update(self, now: Snapshot[TorqueSettings]) -> None:
         self._deadline.update(now)
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller

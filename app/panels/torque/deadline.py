@@ -10,7 +10,7 @@ from app.html.text import block
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import Set
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 _LOOKS = 9
 """Looks at the counters over which the share of late ticks is taken: about two seconds."""
@@ -19,7 +19,9 @@ _LOOKS = 9
 class DeadlineFolder:
     """Two sliders and one line."""
 
-    def __init__(self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
+    ) -> None:
         with gui.add_folder("Deadline"):
             deadline = gui.add_slider(
                 "Due after [ms]",
@@ -50,7 +52,7 @@ class DeadlineFolder:
             lambda value: Set("solve_ms_per_knot", float(value)),
         )
 
-    def update(self, now: Snapshot[SceneSettings]) -> None:
+    def update(self, now: Snapshot[TorqueSettings]) -> None:
         ticks, late = now.status.ticks, now.status.late
         if self._counts and ticks < self._counts[-1][0]:
             self._counts.clear()

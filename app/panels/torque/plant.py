@@ -7,7 +7,7 @@ import viser
 from app.html.text import block
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
 _SLIDERS = (
@@ -45,7 +45,7 @@ class PlantPanel:
     """Sliders of the plant's settings."""
 
     def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[SceneSettings], settings: SceneSettings, robot: Robot
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings, robot: Robot
     ) -> None:
         gui.add_html(block("This is the truth in the simulation. The controller sees none of it."))
         for label, field, low, high, step, hint in _SLIDERS:
@@ -75,8 +75,8 @@ class PlantPanel:
 
 def _per_link(
     gui: viser.GuiApi,
-    bindings: Bindings[SceneSettings],
-    settings: SceneSettings,
+    bindings: Bindings[TorqueSettings],
+    settings: TorqueSettings,
     robot: Robot,
     field: str,
     low: float,
@@ -85,7 +85,7 @@ def _per_link(
 ) -> None:
     """The same factor link by link, named by the joint that moves it."""
 
-    def shown(settings: SceneSettings, joint: int) -> float:
+    def shown(settings: TorqueSettings, joint: int) -> float:
         values = getattr(settings.plant, field)
         return float(values[joint] if isinstance(values, tuple) else values)
 
@@ -100,5 +100,5 @@ def _per_link(
             )
 
 
-def _shown(settings: SceneSettings, field: str, unit: float) -> float:
+def _shown(settings: TorqueSettings, field: str, unit: float) -> float:
     return round(scalar(getattr(settings.plant, field)) * unit, 9)

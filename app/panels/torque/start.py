@@ -14,7 +14,7 @@ from app.panels.widgets.command import add_command
 from app.panels.widgets.snapshot import Snapshot
 from app.view.reachability import Verdict
 from lessons.events import Push, Set
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 _DIRECTIONS = {
     "→ +x": (1, 0, 0),
@@ -116,7 +116,7 @@ class StartPanel:
             text += " This orientation cannot be met there: the lower level gives way."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: Snapshot[SceneSettings]) -> None:
+    def update(self, now: Snapshot[TorqueSettings]) -> None:
         """The button offers what is not the case."""
         label = _DROP if now.settings.plant.payload_kg > 0 else _PICK_UP
         if self._load.label != label:

@@ -14,7 +14,7 @@ from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
 from himpc.telemetry import RUNGS
 from lessons.events import MoveLevel, Set
-from lessons.settings.torque import SceneSettings
+from lessons.settings.torque import TorqueSettings
 
 _UP, _DOWN = "▲ Up", "▼ Down"
 
@@ -25,10 +25,10 @@ class TasksPanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings[SceneSettings],
-        settings: SceneSettings,
+        bindings: Bindings[TorqueSettings],
+        settings: TorqueSettings,
         colours: dict[str, RGB],
-        current: Callable[[], SceneSettings],
+        current: Callable[[], TorqueSettings],
     ) -> None:
         self._current = current
         self._post = bindings.post
@@ -77,7 +77,7 @@ class TasksPanel:
             self._order.ask(tuple(names))
             self._post(MoveLevel(name, to))
 
-    def update(self, now: Snapshot[SceneSettings]) -> None:
+    def update(self, now: Snapshot[TorqueSettings]) -> None:
         for place, level in enumerate(now.settings.levels):
             for card in self._cards:
                 if card.name == level.name:
@@ -102,7 +102,7 @@ class _Card:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings[SceneSettings],
+        bindings: Bindings[TorqueSettings],
         level: Level,
         colours: dict[str, RGB],
         place: int,
@@ -154,12 +154,12 @@ class _Card:
     @staticmethod
     def _slider(
         gui: viser.GuiApi,
-        bindings: Bindings[SceneSettings],
+        bindings: Bindings[TorqueSettings],
         label: str,
         path: str,
         span: tuple[float, float, float],
         value: float,
-        read: Callable[[SceneSettings], float],
+        read: Callable[[TorqueSettings], float],
         hint: str,
     ) -> None:
         low, high, step = span
@@ -168,7 +168,7 @@ class _Card:
         )
         bindings.bind(slider, read, lambda number: Set(path, float(number)))
 
-    def update(self, now: Snapshot[SceneSettings], level: Level, place: int) -> None:
+    def update(self, now: Snapshot[TorqueSettings], level: Level, place: int) -> None:
         title = _title(place, level.name)
         if self._folder.label != title:
             self._folder.label = title
@@ -191,16 +191,16 @@ def _title(place: int, name: str) -> str:
     return f"{place + 1} · {name}"
 
 
-def _find(settings: SceneSettings, name: str) -> Level:
+def _find(settings: TorqueSettings, name: str) -> Level:
     return next(level for level in settings.levels if level.name == name)
 
 
-def _weight(level: str, field: str) -> Callable[[SceneSettings], float]:
+def _weight(level: str, field: str) -> Callable[[TorqueSettings], float]:
     return lambda settings: scalar(getattr(_find(settings, level), field))
 
 
-def _gain(level: str, task: str, field: str) -> Callable[[SceneSettings], float]:
-    def read(settings: SceneSettings) -> float:
+def _gain(level: str, task: str, field: str) -> Callable[[TorqueSettings], float]:
+    def read(settings: TorqueSettings) -> float:
         found = next(each for each in _find(settings, level).tasks if each.name == task)
         return scalar(getattr(found, field))
 

@@ -15,7 +15,7 @@ from app.panels.widgets.snapshot import Snapshot
 from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import FORMULATIONS, LEXICOGRAPHIC, base_joints
 from himpc.htmpc.settings import MAX_HORIZON, efforts
-from lessons.settings.velocity import MobileSettings
+from lessons.settings.velocity import VelocitySettings
 from robots import Robot
 
 _GAINS = ("Gain of level 1 [1/s]", "Gain of level 2 [1/s]")
@@ -27,10 +27,10 @@ class HtmpcPanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings[MobileSettings],
-        settings: MobileSettings,
+        bindings: Bindings[VelocitySettings],
+        settings: VelocitySettings,
         robot: Robot,
-        current: Callable[[], MobileSettings],
+        current: Callable[[], VelocitySettings],
     ) -> None:
         self._gui, self._bindings, self._settings = gui, bindings, settings
         self._robot, self._current = robot, current
@@ -153,10 +153,10 @@ class HtmpcPanel:
         arm = [joint for joint in range(robot.n) if joint not in base]
         joints = {"base": base, "arm": arm, "all": [*base, *arm]}[part]
 
-        def now(settings: MobileSettings) -> np.ndarray:
+        def now(settings: VelocitySettings) -> np.ndarray:
             return np.array(getattr(efforts(robot, settings.htmpc), symbol), float)
 
-        def made(settings: MobileSettings, value: float) -> list[float]:
+        def made(settings: VelocitySettings, value: float) -> list[float]:
             weights = now(settings)
             weights[joints] = value
             return weights.tolist()
@@ -207,7 +207,7 @@ class HtmpcPanel:
                 lambda s: s.htmpc.self_collision,
             )
 
-    def update(self, now: Snapshot[MobileSettings]) -> None:
+    def update(self, now: Snapshot[VelocitySettings]) -> None:
         settings = now.settings
         if settings.controller != self._shown:
             self._shown = settings.controller
@@ -224,13 +224,13 @@ class HtmpcPanel:
         )
 
 
-def _compensated(settings: MobileSettings) -> str:
+def _compensated(settings: VelocitySettings) -> str:
     if settings.plant.latency_ms == 0.0 and not settings.delay_measured:
         return ""
     return ", predicted away" if settings.compensate_delay else ", not compensated"
 
 
-def _of_htmpc(name: str) -> Callable[[MobileSettings], Any]:
+def _of_htmpc(name: str) -> Callable[[VelocitySettings], Any]:
     return lambda settings: getattr(settings.htmpc, name)
 
 

@@ -12,9 +12,8 @@ from app.html.palette import GOOD, RGB, css
 from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import MissionRow, Status, TaskView
 from app.panels.widgets.snapshot import Snapshot
-from lessons.events import MoveLevel
-from lessons.settings.velocity import MobileSettings
-from lessons.velocity_events import InsertTask, Release, RemoveTask
+from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
+from lessons.settings.velocity import VelocitySettings
 
 _EARLIER, _LATER, _REMOVE = "▲ Earlier", "▼ Later", "Remove"
 _END, _NOTHING = "at the end", "–"
@@ -102,7 +101,7 @@ class MissionPanel:
             InsertTask(name, role, goal, None if before == _END else before, hold=None if hold else 0.0)
         )
 
-    def update(self, now: Snapshot[MobileSettings]) -> None:
+    def update(self, now: Snapshot[VelocitySettings]) -> None:
         mission = now.status.mission
         if mission is None:
             return

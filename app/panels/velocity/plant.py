@@ -7,7 +7,7 @@ import viser
 from app.html.text import block
 from app.panels.widgets.mirror import Bindings, scalar
 from app.panels.widgets.sliders import add_box, add_menu, add_slider
-from lessons.settings.velocity import MobileSettings
+from lessons.settings.velocity import VelocitySettings
 from robots.servo import MODES
 
 _SLIDERS = (
@@ -27,7 +27,7 @@ class ServoPanel:
     """Controls of the plant's settings."""
 
     def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[MobileSettings], settings: MobileSettings
+        self, gui: viser.GuiApi, bindings: Bindings[VelocitySettings], settings: VelocitySettings
     ) -> None:
         gui.add_html(
             block("This is the truth in the simulation. Of it the controller knows the lag at most.")

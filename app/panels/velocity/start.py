@@ -9,7 +9,7 @@ import viser
 from app.html.palette import RGB
 from app.html.text import badge, block, esc, quantity, swatch
 from app.panels.widgets.snapshot import Snapshot
-from lessons.settings.velocity import MobileSettings
+from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball
 
 _STILL = 0.02
@@ -78,7 +78,7 @@ class BeginPanel:
             self._dragged = True
             self._guide.content = _guide(self._next)
 
-    def update(self, now: Snapshot[MobileSettings]) -> None:
+    def update(self, now: Snapshot[VelocitySettings]) -> None:
         lines = [self._line(now, level.name, level.tasks[0].unit) for level in now.settings.levels]
         mission = now.status.mission
         if mission is not None and mission.done:
@@ -88,7 +88,7 @@ class BeginPanel:
             self._clear.visible = there
         self._live.content = block("<br>".join(lines))
 
-    def _line(self, now: Snapshot[MobileSettings], role: str, unit: str) -> str:
+    def _line(self, now: Snapshot[VelocitySettings], role: str, unit: str) -> str:
         head = f"{swatch(self._colours[role])}<b>{esc(role)}</b>"
         place, error = now.number(f"level/{role}"), now.error(role)
         if place != place:
@@ -99,7 +99,7 @@ class BeginPanel:
         return text
 
 
-def last_ball(settings: MobileSettings) -> Ball | None:
+def last_ball(settings: VelocitySettings) -> Ball | None:
     """The ball that came last among what the robot keeps clear of."""
     return next((each for each in reversed(settings.htmpc.obstacles) if isinstance(each, Ball)), None)
 

@@ -15,7 +15,7 @@ from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
 from lessons.events import Set
 from lessons.session.velocity_rows import RUNGS
-from lessons.settings.velocity import MobileSettings
+from lessons.settings.velocity import VelocitySettings
 
 
 class RolesPanel:
@@ -24,10 +24,10 @@ class RolesPanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings[MobileSettings],
-        settings: MobileSettings,
+        bindings: Bindings[VelocitySettings],
+        settings: VelocitySettings,
         colours: dict[str, RGB],
-        current: Callable[[], MobileSettings],
+        current: Callable[[], VelocitySettings],
     ) -> None:
         self._current = current
         self._order = tuple(level.name for level in settings.levels)
@@ -50,7 +50,7 @@ class RolesPanel:
         wish = self._enabled[name]
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(enabled)))
 
-    def update(self, now: Snapshot[MobileSettings]) -> None:
+    def update(self, now: Snapshot[VelocitySettings]) -> None:
         places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
         inside = sorted((name for name in places if places[name] == places[name]), key=places.__getitem__)
         self._order = (*inside, *(name for name in places if name not in inside))
@@ -65,8 +65,8 @@ class _Card:
     def __init__(
         self,
         gui: viser.GuiApi,
-        bindings: Bindings[MobileSettings],
-        settings: MobileSettings,
+        bindings: Bindings[VelocitySettings],
+        settings: VelocitySettings,
         level: Level,
         colour: RGB,
         place: int,
@@ -91,7 +91,7 @@ class _Card:
             on, lambda s: _find(s, name).enabled, lambda value: Set(f"levels.{name}.enabled", bool(value))
         )
 
-    def update(self, now: Snapshot[MobileSettings], level: Level, place: int, inside: bool) -> None:
+    def update(self, now: Snapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
         title = _title(place, level.name)
         if self._folder.label != title:
             self._folder.label = title
@@ -116,5 +116,5 @@ def _title(place: int, name: str) -> str:
     return f"{place + 1} · {esc(name)}"
 
 
-def _find(settings: MobileSettings, name: str) -> Level:
+def _find(settings: VelocitySettings, name: str) -> Level:
     return next(level for level in settings.levels if level.name == name)

@@ -12,14 +12,15 @@ import viser
 
 from app.adapter.private import send_again
 from app.client.wish import HOLD, Send
-from lessons.kinds import AnyEvent, AnySettings
+from lessons.events import Event
+from lessons.settings.settings import Settings
 
 REMIND = 2.0
 """s between two reminders of what every control must show. viser sends at most one change per 50 ms and
 tab and drops all but the latest: of two controls changed at once (or while the browser stutters) one may
 never arrive, and would go on showing what the session does not have."""
 
-S = TypeVar("S", bound=AnySettings)
+S = TypeVar("S", bound=Settings)
 
 
 @dataclass
@@ -50,7 +51,7 @@ class Bindings(Generic[S]):
         self,
         handle: viser.GuiInputHandle[Any],
         read: Callable[[S], Any],
-        event: Callable[[Any], AnyEvent],
+        event: Callable[[Any], Event],
     ) -> None:
         """`read` gives the control's value for some settings, `event` the event for a value."""
         mirror = _Mirror(handle, read)

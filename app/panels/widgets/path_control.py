@@ -11,8 +11,8 @@ from app.adapter.private import dom_id
 from app.html.text import figure
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
-from lessons.kinds import AnySettings, chosen, setting_at
-from lessons.teaching.control import Control
+from lessons.settings.settings import Settings
+from lessons.teaching.control import Control, chosen
 
 STEPS = 200
 """Places of a logarithmic slider."""
@@ -36,15 +36,15 @@ def only_track(slider: viser.GuiSliderHandle[Any]) -> str:
 
 
 def add_control(
-    gui: viser.GuiApi, bindings: Bindings[AnySettings], control: Control, settings: AnySettings
+    gui: viser.GuiApi, bindings: Bindings[Settings], control: Control, settings: Settings
 ) -> None:
     """The control, showing what the settings have and posting what the learner sets."""
-    now = setting_at(settings, control.path)
+    now = settings.value_at(control.path)
     if control.choices == (False, True):
         switch = gui.add_checkbox(control.words, bool(now))
         bindings.bind(
             switch,
-            lambda s: bool(setting_at(s, control.path)),
+            lambda s: bool(s.value_at(control.path)),
             lambda value: Set(control.path, bool(value)),
         )
     elif control.choices:
@@ -72,7 +72,7 @@ def add_control(
         )
         bindings.bind(
             slider,
-            lambda s: _inside(scalar(setting_at(s, control.path)), control),
+            lambda s: _inside(scalar(s.value_at(control.path)), control),
             lambda value: Set(control.path, int(value) if whole else float(value)),
         )
 
@@ -84,7 +84,7 @@ def _words(value: Any) -> str:
     return figure(value) if isinstance(value, float) else str(value)
 
 
-def _shown(settings: AnySettings, control: Control, otherwise: str) -> str:
+def _shown(settings: Settings, control: Control, otherwise: str) -> str:
     found = chosen(settings, control)
     return otherwise if found is None else _words(found)
 
@@ -100,7 +100,7 @@ def _step(low: float, high: float) -> float:
     return float(f"{(5 if rough >= 5 * power else 1) * power:.3g}")
 
 
-def _logarithmic(gui: viser.GuiApi, bindings: Bindings[AnySettings], control: Control, now: float) -> None:
+def _logarithmic(gui: viser.GuiApi, bindings: Bindings[Settings], control: Control, now: float) -> None:
     low, high = control.low, control.high
 
     def label(value: float) -> str:
@@ -117,8 +117,8 @@ def _logarithmic(gui: viser.GuiApi, bindings: Bindings[AnySettings], control: Co
     )
     gui.add_html(only_track(slider))
 
-    def read(settings: AnySettings) -> int:
-        value = scalar(setting_at(settings, control.path))
+    def read(settings: Settings) -> int:
+        value = scalar(settings.value_at(control.path))
         if slider.label != label(value):
             slider.label = label(value)
         return place_of(value, low, high)

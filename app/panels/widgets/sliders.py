@@ -9,9 +9,9 @@ import viser
 
 from app.panels.widgets.mirror import Bindings
 from lessons.events import Set
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 
-S = TypeVar("S", bound=AnySettings)
+S = TypeVar("S", bound=Settings)
 Span = tuple[float, float, float]
 """Least, greatest, step."""
 

@@ -8,9 +8,9 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from app.link.messages import Ready, Status
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 
-S_co = TypeVar("S_co", bound=AnySettings, covariant=True)
+S_co = TypeVar("S_co", bound=Settings, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)

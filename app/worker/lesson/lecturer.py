@@ -15,17 +15,11 @@ import numpy as np
 from app.link.exercise import Answer, Curve, Exercise, Lecture, Phase, signals_of
 from app.worker.lesson.reference_run import ghost_of
 from app.worker.lesson.rows import Record, thinned
-from lessons.kinds import (
-    AnyEvent,
-    AnySession,
-    AnySettings,
-    changed_any,
-    mission_over,
-    setting_at,
-    settings_after,
-    within,
-)
+from lessons.events import Event
+from lessons.session.session import Session
+from lessons.settings.settings import Settings, settings_after
 from lessons.teaching.challenge import Challenge
+from lessons.teaching.control import within
 from lessons.teaching.lesson import Step
 from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, Grade, Sketch, Value
@@ -42,7 +36,7 @@ Array = np.ndarray
 class Lecturer:
     """Of one exercise. A session is handed over at t = 0, before its first tick."""
 
-    def __init__(self, exercise: Exercise, session: AnySession, seed: int = 0) -> None:
+    def __init__(self, exercise: Exercise, session: Session, seed: int = 0) -> None:
         self.exercise = exercise
         self.answer: Answer | None = None
         self.fast = False
@@ -53,12 +47,12 @@ class Lecturer:
         self._grade: Grade | None = None
         self._truth = math.nan
         self._sketched: Curve | None = None
-        self._posted: list[AnyEvent] = []
+        self._posted: list[Event] = []
         self._own = session.settings
         self._phase: Phase = "waiting"
         self._enter(session)
 
-    def _enter(self, session: AnySession) -> None:
+    def _enter(self, session: Session) -> None:
         self._session = session
         self._record = self._empty_record()
         self._before = -math.inf
@@ -98,14 +92,14 @@ class Lecturer:
             and self.answer is None
         )
 
-    def settings(self, own: bool) -> AnySettings:
+    def settings(self, own: bool) -> Settings:
         """What a run begins with: the lesson's own settings, or those the learner made of them. What the
         script changed in the last run is undone either way."""
         if own and isinstance(self._part, Step):
             self._posted.clear()
         return settings_after(self._own, self._posted)
 
-    def begin(self, session: AnySession, fast: bool) -> bool:
+    def begin(self, session: Session, fast: bool) -> bool:
         """Asked to run a fresh session: whether it can, or the ghost must be finished first."""
         self._enter(session)
         self.fast = fast
@@ -125,7 +119,7 @@ class Lecturer:
         self._phase, self._last = "running", None
         return True
 
-    def touch(self, event: AnyEvent) -> None:
+    def touch(self, event: Event) -> None:
         """The learner changed something, or pushed or dragged."""
         self._touched = self._touched or self._phase == "running"
         with contextlib.suppress(InputError):  # what the session refuses changes nothing
@@ -143,7 +137,7 @@ class Lecturer:
         self._before = t
         self._record.add(row)
         self._lost_at = session.diverged_at
-        ended = self._lost_at is not None or mission_over(session)
+        ended = self._lost_at is not None or session.over
         if not ended and session.t < self._part.duration - 0.5 * session.settings.T_s:
             return False
         self._phase, self._last, self.fast = "done", None, False
@@ -158,11 +152,11 @@ class Lecturer:
         now = self._session.settings
         allowed = self._own
         for knob in self._part.knobs:
-            value: Any = setting_at(now, knob.path)
-            if value != setting_at(self._own, knob.path):
+            value: Any = now.value_at(knob.path)
+            if value != self._own.value_at(knob.path):
                 if not within(now, knob):
                     return f"{knob.words} is outside the range this challenge allows."
-                allowed = changed_any(allowed, knob.path, value)
+                allowed = allowed.changed(knob.path, value)
         return "" if allowed == now else "A setting was changed that is none of this challenge's."
 
     # ---------------------------------------------------------------- reports

@@ -6,22 +6,23 @@ from time import perf_counter
 
 from app.link.exercise import Exercise
 from app.worker.lesson.rows import Record
-from lessons.kinds import AnyScene, mission_over, session_of
+from lessons.scenes.scene import Scene
+from lessons.session.start import begin
 from lessons.teaching.lesson import Step
 
 
 class GhostRun:
     """A run in small pieces. It is finished when nothing of it is left to be computed."""
 
-    def __init__(self, scene: AnyScene, seed: int) -> None:
-        self._session = session_of(scene, seed)
+    def __init__(self, scene: Scene, seed: int) -> None:
+        self._session = begin(scene, seed)
         self._ticks = max(1, round(scene.duration / self._session.settings.T_s))
         self.record = Record(self._session.layout, self._ticks)
 
     @property
     def finished(self) -> bool:
         session = self._session
-        return len(self.record) >= self._ticks or session.diverged_at is not None or mission_over(session)
+        return len(self.record) >= self._ticks or session.diverged_at is not None or session.over
 
     def work(self, seconds: float) -> None:
         """Goes on for about so long (wall time)."""

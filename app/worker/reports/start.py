@@ -1,14 +1,22 @@
-"""Both kinds of sessions as the simulation process drives them; the scene's kind chooses."""
+"""What the page is told of a session, whatever its kind."""
+
+from collections.abc import Mapping
 
 from app.worker.reports.report import Run
 from app.worker.reports.torque import TorqueRun
 from app.worker.reports.velocity import VelocityRun
-from lessons.kinds import AnyScene
-from lessons.scenes.torque_scene import Scene
+from lessons.scenes.scene import Scene
+from lessons.session.session import Session
+from lessons.session.start import begin
+from lessons.session.torque import TorqueSession
+from lessons.session.velocity import VelocitySession
 
 __all__ = ["Run", "TorqueRun", "VelocityRun", "start"]
 
+_REPORTS: Mapping[type[Session], type[Run]] = {TorqueSession: TorqueRun, VelocitySession: VelocityRun}
 
-def start(scene: AnyScene, seed: int) -> Run:
+
+def start(scene: Scene, seed: int) -> Run:
     """A scene from its beginning. Raises InputError if its settings do not fit its robot."""
-    return TorqueRun(scene, seed) if isinstance(scene, Scene) else VelocityRun(scene, seed)
+    session = begin(scene, seed)
+    return _REPORTS[type(session)](session)

@@ -1,41 +1,23 @@
-"""A torque-level session as the simulation process drives it: every step is a control tick."""
+"""What there is to see of a torque-level session."""
 
 from __future__ import annotations
 
+from typing import final
+
 import numpy as np
 
-from app.link.messages import BindingRow, TaskView
-from app.worker.reports.report import LISTED
+from app.link.messages import TaskView
+from app.worker.reports.report import Run
 from himpc.tasks import Task
-from lessons.events import Event
-from lessons.kinds import AnyEvent
-from lessons.scenes.torque_scene import Scene
-from lessons.session.torque import Session
+from lessons.session.torque import TorqueSession
 from robots import convergence_gauge
 
 
-class TorqueRun:
+@final
+class TorqueRun(Run):
     """See `app.worker.reports.report.Run`."""
 
-    def __init__(self, scene: Scene, seed: int) -> None:
-        self.session = Session(scene, seed)
-
-    @property
-    def step_s(self) -> float:
-        return self.session.settings.T_s
-
-    @property
-    def between(self) -> bool:
-        return False
-
-    def post(self, event: AnyEvent) -> None:
-        if isinstance(event, Event):
-            self.session.post(event)
-        else:
-            self.session.notices.append("This scene has no mission: choose one of the HTMPC scenes.")
-
-    def advance(self) -> np.ndarray:
-        return self.session.tick()
+    session: TorqueSession
 
     def tasks(self) -> tuple[TaskView, ...]:
         levels = self.session.settings.levels
@@ -64,18 +46,9 @@ class TorqueRun:
     def path(self) -> np.ndarray:
         return np.array(self.session.predicted_path())
 
-    def room(self) -> np.ndarray:
-        return np.zeros((0, 3))
-
-    def binding(self) -> tuple[BindingRow, ...]:
-        return tuple(BindingRow(*row) for row in self.session.binding()[:LISTED])
-
     def gauge(self) -> tuple[float, float] | None:
         session = self.session
         if not np.isfinite(session.plant.q).all():
             return None
         M_bar = np.array(session.settings.M_bar) * session.settings.M_bar_scale
         return convergence_gauge(session.plant.mass_matrix(), M_bar)
-
-    def mission(self) -> None:
-        return None

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from typing import final
+
 import numpy as np
 
-from app.link.messages import BindingRow, MissionRow, MissionView, Person, TaskView
-from app.worker.reports.report import LISTED
+from app.link.messages import MissionRow, MissionView, Person, TaskView
+from app.worker.reports.report import Run
 from himpc.htmpc import base_joints
 from himpc.missions import Go, MissionTask
 from himpc.tasks import FramePosition, Task
-from lessons.kinds import AnyEvent
-from lessons.scenes.velocity_scene import MobileScene
-from lessons.session.velocity import MobileSession
+from lessons.session.velocity import VelocitySession
 
 _ABOVE = np.array([0.0, 0.0, 0.015])
 """m, of predicted paths above the floor, so that it does not hide them."""
@@ -21,27 +21,13 @@ _AROUND = 1.9
 """m about a mobile base that the camera should show at least."""
 
 
-class VelocityRun:
+@final
+class VelocityRun(Run):
     """See `app.worker.reports.report.Run`.
 
     A target belongs to a role: it is the goal of the role's first open task."""
 
-    def __init__(self, scene: MobileScene, seed: int) -> None:
-        self.session = MobileSession(scene, seed)
-
-    @property
-    def step_s(self) -> float:
-        return self.session.step_s
-
-    @property
-    def between(self) -> bool:
-        return self.session.between
-
-    def post(self, event: AnyEvent) -> None:
-        self.session.post(event)
-
-    def advance(self) -> np.ndarray | None:
-        return self.session.advance()
+    session: VelocitySession
 
     def tasks(self) -> tuple[TaskView, ...]:
         targets = self.targets()
@@ -86,12 +72,6 @@ class VelocityRun:
         goals = [_point(task.motion.goal) for task in tasks if isinstance(task.motion, Go)]
         corners = [np.array([x, y, 0.0]) for x in (-_AROUND, _AROUND) for y in (-_AROUND, _AROUND)]
         return np.array([*goals, *corners])
-
-    def binding(self) -> tuple[BindingRow, ...]:
-        return tuple(BindingRow(*row) for row in self.session.binding()[:LISTED])
-
-    def gauge(self) -> None:
-        return None
 
     def mission(self) -> MissionView:
         session, progress = self.session, self.session.progress

@@ -10,7 +10,7 @@ from typing import Any
 from lessons.experiments.jobs import TIMING_KEYS, Job
 from lessons.experiments.sweep.grid import Sweep
 from lessons.recording.run import run
-from lessons.recording.torque import summary
+from lessons.recording.summary import summary
 from robots.errors import unknown_name
 
 

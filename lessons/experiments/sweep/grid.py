@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lessons.experiments.jobs import Job
-from lessons.settings.torque import SceneSettings, changed
+from lessons.settings.settings import Settings
 from robots import InputError
 
 MAX_CELLS = 100_000
@@ -81,7 +81,7 @@ def make_sweep(base: Job, over: Sequence[str]) -> Sweep:
     return Sweep(base, axes)
 
 
-def _axis(text: str, settings: SceneSettings) -> Axis:
+def _axis(text: str, settings: Settings) -> Axis:
     path, equals, span = text.partition("=")
     parts = span.split(":")
     try:
@@ -106,14 +106,14 @@ def _axis(text: str, settings: SceneSettings) -> Axis:
     if len(set(values)) < count:
         raise InputError(f"--over {text}: {path} takes whole numbers, and {count} do not fit between them")
     for value in values:
-        changed(settings, path, value)
+        settings.changed(path, value)
     return Axis(path, values, log)
 
 
-def _takes_whole_numbers(settings: SceneSettings, path: str, low: float) -> bool:
-    changed(settings, path, round(low) if low == round(low) else low)
+def _takes_whole_numbers(settings: Settings, path: str, low: float) -> bool:
+    settings.changed(path, round(low) if low == round(low) else low)
     try:
-        changed(settings, path, math.floor(low) + 0.5)
+        settings.changed(path, math.floor(low) + 0.5)
     except InputError as error:
         return "whole number" in str(error)
     return False

@@ -14,6 +14,7 @@ from lessons.papers.himpc_paper.planar import RT1
 from lessons.papers.item import Item, Section, Table, at_least
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
+from lessons.scenes.catalog import prepared, torque_scene
 from robots import NominalModel
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ def model_errors(run: Run) -> ModelErrors:
     """
     if not run.completed:
         return ModelErrors(math.nan, math.nan, math.nan, math.nan)
-    scene = run.job.prepared()
+    scene = prepared(torque_scene(run.job.scene), run.job.controller, run.job.set)
     settings, robot = scene.settings, scene.robot
     M_bar = np.array(settings.M_bar) * settings.M_bar_scale
     nominal = NominalModel(robot, settings.nominal)

@@ -14,6 +14,7 @@ from himpc.controllers.forms import StackForm, measure, stack_form
 from himpc.references import Preview
 from himpc.references.hold import still
 from lessons.experiments.jobs import Job, Run
+from lessons.scenes.catalog import prepared, torque_scene
 from robots import Plant
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ class EffortJob(Job):
 
     def do(self) -> Run:
         """The run; see `Job.do`."""
-        scene = self.prepared()
+        scene = prepared(torque_scene(self.scene), self.controller, self.set)
         robot, T_s = scene.robot, scene.settings.T_s
         form = stack_form(robot, scene.settings.levels, replace(scene.settings.for_controller(), horizon=1))
         gain = np.concatenate([level.C[0, :, 0] for level in form.levels])

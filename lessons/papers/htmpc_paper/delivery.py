@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.htmpc_paper.runs import SOURCE, MobileJob
+from lessons.papers.htmpc_paper.runs import SOURCE
 from lessons.papers.item import Check, Item, Row, Section, Table, at_least, at_most
 from lessons.papers.printed import printed
 from lessons.papers.words import number
@@ -23,7 +23,7 @@ def _layouts(quick: bool) -> list[tuple[int, ...]]:
 
 def _job(seats: tuple[int, ...], architecture: str) -> Job:
     listed = ",".join(map(str, seats))
-    return MobileJob("ridgeback-ur10-delivery", set=(f"architecture={architecture}", f"seats=[{listed}]"))
+    return Job("ridgeback-ur10-delivery", set=(f"architecture={architecture}", f"seats=[{listed}]"))
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:

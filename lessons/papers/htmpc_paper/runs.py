@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, Run
-from lessons.kinds import find_scene, prepared
-from lessons.recording.velocity import mobile_summary
-from lessons.recording.velocity_run import mobile_run
-from lessons.scenes.velocity_scene import MobileScene
 from lessons.settings.missions import random_peaks
 
 Array = NDArray[np.float64]
@@ -23,28 +18,6 @@ PEAKS_SEED = 0
 EE_HOME = np.array([1.490, 0.174])
 """m: about it the peaks lie."""
 METHODS = {"htmpc": "HTMPC", "htmpc_wpt": "HTMPC_WPT", "htidkc": "HTIDKC"}
-_KEPT = ("t", "q", "v", "tau", "step_us")
-
-
-@dataclass(frozen=True)
-class MobileJob(Job):
-    """A run of a velocity-level scene."""
-
-    controller: str = "htmpc"
-
-    def prepared(self) -> MobileScene:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The scene with controller and assignments. Raises InputError for what cannot be."""
-        scene = prepared(find_scene(self.scene), self.controller, self.set)
-        assert isinstance(scene, MobileScene)
-        return scene
-
-    def do(self) -> Run:
-        """The run. Raises InputError for what cannot be."""
-        recording = mobile_run(self.prepared(), self.duration, self.seed)
-        fields = recording.session.layout.fields
-        kept = [*_KEPT, *(name for name in fields if name.startswith(("x/", "x_d/", "error/", "step/")))]
-        arrays = {name: np.ascontiguousarray(recording[name]) for name in kept}
-        return Run(self, mobile_summary(recording), arrays)
 
 
 def peaks(quick: bool) -> list[tuple[float, float]]:
@@ -52,14 +25,14 @@ def peaks(quick: bool) -> list[tuple[float, float]]:
     return random_peaks(PEAKS_SEED, 4 if quick else 25, EE_HOME)
 
 
-def square(controller: str, peak: tuple[float, float], *assignments: str) -> MobileJob:
+def square(controller: str, peak: tuple[float, float], *assignments: str) -> Job:
     """One square wave."""
-    return MobileJob(SQUARE, controller, (f"peak=[{peak[0]:.9f},{peak[1]:.9f}]", *assignments))
+    return Job(SQUARE, controller, (f"peak=[{peak[0]:.9f},{peak[1]:.9f}]", *assignments))
 
 
-def example(controller: str, *assignments: str) -> MobileJob:
+def example(controller: str, *assignments: str) -> Job:
     """The square wave with the scene's own peak; the paper does not print the coordinates of its example."""
-    return MobileJob(SQUARE, controller, assignments)
+    return Job(SQUARE, controller, assignments)
 
 
 def part(runs: Sequence[Run], place: int, key: str = "normalised_base_error") -> Array:

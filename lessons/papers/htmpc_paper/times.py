@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, MobileJob, example
+from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, example
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.printed import printed
 from lessons.papers.words import trouble
@@ -15,7 +15,7 @@ _WHY = "another machine and another solver (the paper: CasADi and Gurobi)"
 
 def _cases() -> dict[str, Job]:
     found: dict[str, Job] = {words: replace(example(c), timed=True) for c, words in METHODS.items()}
-    found["HTMPC with obstacles"] = MobileJob("ridgeback-ur10-cluttered", duration=8.0, timed=True)
+    found["HTMPC with obstacles"] = Job("ridgeback-ur10-cluttered", duration=8.0, timed=True)
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.htmpc_paper.runs import SOURCE, MobileJob
+from lessons.papers.htmpc_paper.runs import SOURCE
 from lessons.papers.item import Item, Section, Table
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
@@ -14,9 +14,9 @@ HEIGHTS = (0.5, 0.8, 1.2)
 def _cases() -> dict[str, Job]:
     scene = "ridgeback-ur10-waypoints"
     found: dict[str, Job] = {
-        f"HT, h = {height} m": MobileJob(scene, set=(f"height={height}",)) for height in HEIGHTS
+        f"HT, h = {height} m": Job(scene, set=(f"height={height}",)) for height in HEIGHTS
     }
-    found["ST, h = 0.8 m"] = MobileJob(scene, set=("architecture=single_task",))
+    found["ST, h = 0.8 m"] = Job(scene, set=("architecture=single_task",))
     return found
 
 

@@ -1,0 +1,92 @@
+"""Whether all scenes under all controllers still give what they gave at another commit.
+
+python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, headless,
+here and in a checkout of COMMIT, and compares the results of `himpc-lab run --json`, timing keys apart.
+Exit code 1 if any differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+TIMING = ("step_ms", "real_time_factor", "late_ticks")
+"""Keys that differ from run to run."""
+NEW: tuple[str, ...] = ()
+"""Keys that COMMIT may not have had."""
+
+_RUNS = """
+import json, sys
+from app.__main__ import main
+folder, seconds = sys.argv[1], sys.argv[2]
+for name in sys.argv[3:]:
+    scene, controller = name.split("/")
+    file = f"{folder}/{scene}+{controller}.json"
+    what = ["run", scene, "--controller", controller, "--duration", seconds, "--seed", "3"]
+    code = main([*what, "--json", file])
+    if code:
+        open(file, "w").write(json.dumps({"exit": code}))
+"""
+
+
+def main() -> int:
+    """Prints a line per difference."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("commit")
+    parser.add_argument("--seconds", type=float, default=0.5)
+    given = parser.parse_args()
+    names = _names()
+    with tempfile.TemporaryDirectory() as folder:
+        then, now, before = (Path(folder) / name for name in ("then", "now", "before"))
+        then.mkdir()
+        now.mkdir()
+        subprocess.run(
+            ["git", "worktree", "add", "-q", "--detach", before, given.commit], cwd=ROOT, check=True
+        )
+        try:
+            for tree, out in ((before, then), (ROOT, now)):
+                command = [sys.executable, "-c", _RUNS, str(out), str(given.seconds), *names]
+                subprocess.run(command, cwd=tree, env=_environment(tree), check=True)
+        finally:
+            subprocess.run(["git", "worktree", "remove", "--force", before], cwd=ROOT, check=True)
+        different = sum(_differs(name, then, now) for name in names)
+    print(f"{len(names)} runs compared, {different} differ")
+    return 1 if different else 0
+
+
+def _names() -> list[str]:
+    """SCENE/CONTROLLER for all that fit."""
+    from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
+    from lessons.scenes.names import SCENES, VELOCITY_SCENES
+
+    torque = [f"{scene}/{each}" for scene in SCENES if scene != "hold" for each in CONTROLLERS]
+    return torque + [f"{scene}/{each}" for scene in VELOCITY_SCENES for each in VELOCITY_CONTROLLERS]
+
+
+def _environment(tree: Path) -> dict[str, str]:
+    import os
+
+    return {**os.environ, "PYTHONPATH": str(tree)}
+
+
+def _differs(name: str, then: Path, now: Path) -> bool:
+    file = name.replace("/", "+") + ".json"
+    before, after = (_plain(json.loads((folder / file).read_text())) for folder in (then, now))
+    for key in sorted(before.keys() | after.keys() - set(NEW)):
+        if before.get(key) != after.get(key):
+            print(f"{name}: {key} was {before.get(key)} and is {after.get(key)}")
+    return any(before.get(key) != after.get(key) for key in before.keys() | after.keys() - set(NEW))
+
+
+def _plain(result: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in result.items() if key not in TIMING}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,38 @@
+"""What a run starts from, as data: what scenes of both kinds share."""
+
+from __future__ import annotations
+
+from abc import ABC
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lessons.events import Event
+from lessons.settings.settings import Settings
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scene(ABC):
+    """Everything a run starts from.
+
+    Attributes:
+        name: identity.
+        title: one line for lists and the page.
+        robot: the robot.
+        settings: controller, limits, plant and levels at the start; their class is the scene's kind.
+        q_0: initial positions, (n,) rad or m.
+        duration: default length of a headless run, s; one with a mission ends earlier when that is done.
+        events: (time in s, event) in order, for scripted scenes.
+    """
+
+    name: str
+    title: str
+    robot: Robot
+    settings: Settings
+    q_0: Array
+    duration: float = 4.0
+    events: tuple[tuple[float, Event], ...] = ()

@@ -1,0 +1,146 @@
+"""The headless loop, whatever its kind: one scene, one controller, one plant, one mailbox."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.plan import Binding
+from himpc.telemetry import Layout
+from lessons.events import Event, Reset, Set
+from lessons.scenes.scene import Scene
+from lessons.settings.settings import Settings
+from robots import InputError, Robot
+
+Array = NDArray[np.float64]
+
+LOST_SPEED = 20.0
+"""A joint faster than this many times its limit counts as divergence."""
+
+
+class Session(ABC):
+    """One learner's run. `tick` advances one control period, `advance` the smallest step there is; events
+    wait in the mailbox until a period begins.
+
+    Attributes:
+        scene: what it started from.
+        seed: seed of the run; all randomness comes from it.
+        robot: the scene's robot.
+        settings: the settings in force.
+        layout: where the fields of a row lie.
+        diverged_at: simulated time at which control was lost, s; None if it was not.
+        notices: sentences for the learner (refused events, divergence); drain them.
+        log: (time, event) of every event that took effect.
+    """
+
+    settings: Any
+    layout: Layout
+    plant: Any
+
+    def __init__(self, scene: Scene, seed: int) -> None:
+        self.scene = scene
+        self.seed = seed
+        self.robot: Robot = scene.robot
+        self.diverged_at: float | None = None
+        self.notices: list[str] = []
+        self.log: list[tuple[float, Event]] = []
+        self._mailbox: deque[Event] = deque()
+        self._script: deque[tuple[float, Event]] = deque()
+
+    # ---------------------------------------------------------------- time
+
+    @property
+    @abstractmethod
+    def t(self) -> float:
+        """Simulated time since the last reset, s."""
+
+    @property
+    @abstractmethod
+    def step_s(self) -> float:
+        """Simulated time of the next `advance`, s."""
+
+    @property
+    @abstractmethod
+    def between(self) -> bool:
+        """Whether a control period has begun and is not over: what is posted now has to wait for its end."""
+
+    @property
+    @abstractmethod
+    def over(self) -> bool:
+        """Whether there is nothing left to do, which ends a headless run."""
+
+    @abstractmethod
+    def advance(self) -> Array | None:
+        """One step; the row of `tick` if a control period ended with it, else None."""
+
+    def tick(self) -> Array:
+        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it)."""
+        row = self.advance()
+        while row is None:
+            row = self.advance()
+        return row
+
+    def reset(self) -> None:
+        """Back to the scene's start with the settings as they are."""
+        self.diverged_at = None
+        self._script = deque(self.scene.events)
+
+    def _lost(self, t: float, notice: bool = True) -> None:
+        """Control was lost at t."""
+        if notice:
+            self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+        self.diverged_at = t
+
+    # ---------------------------------------------------------------- events
+
+    def post(self, event: Event) -> None:
+        """Puts an event in the mailbox; it takes effect when a control period begins, or leaves a notice."""
+        self._mailbox.append(event)
+
+    def drain(self) -> None:
+        """Lets what waits in the mailbox take effect now, without time passing. A control period does it by
+        itself; a page that is paused does it to show a change at once."""
+        while self._script and self._script[0][0] <= self.t + 1e-9:
+            self._mailbox.append(self._script.popleft()[1])
+        while self._mailbox:
+            event = self._mailbox.popleft()
+            try:
+                self._take(event)
+                self.log.append((self.t, event))
+            except InputError as error:
+                self.notices.append(str(error))
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Reset():
+                self.reset()
+            case Set(path, value):
+                self.adopt(self.settings.changed(path, value))
+            case _ if self.settings.takes(event):
+                self.adopt(self.settings.after(event))
+            case _:
+                self._happen(event)
+
+    @abstractmethod
+    def _happen(self, event: Event) -> None:
+        """An event that changes no settings. Raises InputError for one that this kind does not know."""
+
+    @abstractmethod
+    def adopt(self, settings: Any) -> None:
+        """Takes over settings of the scene's kind at once, as an event that changed them would. Raises
+        InputError if they do not fit."""
+
+    # ---------------------------------------------------------------- what is there to see
+
+    @property
+    def settings_now(self) -> Settings:
+        """The settings in force, and what else of the run a scene can begin with."""
+        return self.settings
+
+    @abstractmethod
+    def binding(self) -> list[Binding]:
+        """The constraints that bind in the last plan."""

@@ -1,0 +1,23 @@
+"""A session for a scene of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lessons.scenes.scene import Scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.session import Session
+from lessons.session.torque import TorqueSession
+from lessons.session.velocity import VelocitySession
+
+SESSIONS: Mapping[type[Scene], type[TorqueSession] | type[VelocitySession]] = {
+    TorqueScene: TorqueSession,
+    VelocityScene: VelocitySession,
+}
+"""What runs a scene of each kind."""
+
+
+def begin(scene: Scene, seed: int = 0) -> Session:
+    """A scene from its beginning. Raises InputError if its settings do not fit its robot."""
+    return SESSIONS[type(scene)](scene, seed)  # pyright: ignore[reportArgumentType]
