@@ -72,10 +72,7 @@ import numpy as np
 _CAUTION = """
 Measured computing times took part in it, so every repetition comes out a little different."""
 
-_IMPORTS = """from lessons.recording.arrays import arrays
-from lessons.recording.run import run
-from lessons.recording.summary import summary
-from lessons.scenes.catalog import load_scene, prepared
+_IMPORTS = """from lessons.headless import arrays, load_scene, prepared, run, summary
 """
 
 _TAIL = """

@@ -1,0 +1,8 @@
+"""What a script of one's own needs, by one import: scenes, their runs, and what came out."""
+
+from lessons.recording.arrays import arrays
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import load_scene, prepared
+
+__all__ = ["arrays", "load_scene", "prepared", "run", "summary"]
