@@ -26,8 +26,8 @@ HERE = Path(__file__).parents[1]
 TURN = 10
 """Control steps."""
 PLACES = (
-    ("lessons.session.velocity", "lessons.scenes.missions"),
-    ("lessons.mobile.session", "lessons.scenes.mobile"),
+    ("lessons.session.velocity", "VelocitySession", "lessons.scenes.missions", "velocity_scene"),
+    ("lessons.mobile.session", "MobileSession", "lessons.scenes.mobile", "mobile_scene"),
 )
 """Where session and scenes are, now and in older checkouts."""
 
@@ -35,9 +35,9 @@ PLACES = (
 def child(scene: str) -> None:
     """Steps a scene for every line on stdin; prints the times, µs, of that many steps."""
     time.perf_counter_ns = time.thread_time_ns
-    for session, scenes in PLACES:
+    for session, kind, scenes, scene_of in PLACES:
         try:
-            make, load = import_module(session).MobileSession, import_module(scenes).mobile_scene
+            make, load = getattr(import_module(session), kind), getattr(import_module(scenes), scene_of)
             break
         except ModuleNotFoundError:
             continue

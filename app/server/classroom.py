@@ -19,7 +19,7 @@ from app.link.messages import Command, Ready, Status, Told
 from app.link.ring import Block
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
-from lessons.kinds import AnySettings
+from lessons.settings.settings import Settings
 from lessons.teaching import lesson
 
 STEERING = "The instructor steers: this page only watches."
@@ -47,7 +47,7 @@ class Watcher:
         return self._shown.status
 
     @property
-    def settings(self) -> AnySettings | None:
+    def settings(self) -> Settings | None:
         return self._shown.settings
 
     @property
@@ -93,7 +93,7 @@ class Watcher:
     def trouble(self) -> Trouble | None:
         return self._shown.trouble()
 
-    def settings_of(self, ready: Ready) -> AnySettings:
+    def settings_of(self, ready: Ready) -> Settings:
         return self._shown.settings_of(ready)
 
     def choice_of(self, ready: Ready) -> SceneChoice:
