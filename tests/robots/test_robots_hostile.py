@@ -12,7 +12,6 @@ from arms import INERTIAL, link, two_joint_arm
 
 from lessons.events import MoveTarget
 from lessons.scenes.hold import _hold
-from lessons.session.torque import Session
 from robots import InputError, PlantSettings, Robot
 from robots.importing import import_robot
 from robots.shapes import MAX_TOTAL, link_shapes
@@ -43,7 +42,7 @@ def test_every_kind_runs_or_is_refused_in_one_sentence(group: int) -> None:
 
 
 def runs(robot: Robot, kind: str) -> None:
-    session = Session(_hold(robot, PlantSettings()))
+    session = TorqueSession(_hold(robot, PlantSettings()))
     for k in range(4):
         if k == 2:
             _, place = session.plant.frame_pose(robot.tip)
