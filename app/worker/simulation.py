@@ -57,8 +57,7 @@ class Body:
 
     def __init__(self, choice: SceneChoice) -> None:
         """Raises InputError for a scene or robot that cannot be loaded."""
-        self.running = True
-        self.speed = 1.0
+        self.running, self.speed = True, 1.0
         self.ticks = self.over_budget = self.late = self._steps = 0
         self.resets = 0
         self._sent: Settings | None = None
@@ -151,8 +150,8 @@ class Body:
                 return Told(self.choice, self.session.settings_now, tuple(self.session.log), self.session.t)
             case Lead(on):
                 self._lead(on)
-            case Leash(until):
-                self.leader.leash = until if self.leader.on else self.leader.leash
+            case Leash(until) if self.leader.on:
+                self.leader.leash = until
             case _:
                 pass
         return None

@@ -12,6 +12,7 @@ from arms import INERTIAL, link, two_joint_arm
 
 from lessons.events import MoveTarget
 from lessons.scenes.hold import _hold
+from lessons.session.torque import TorqueSession
 from robots import InputError, PlantSettings, Robot
 from robots.importing import import_robot
 from robots.shapes import MAX_TOTAL, link_shapes
