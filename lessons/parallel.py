@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 from urllib.parse import urlsplit
 
+from lessons.orphans import end_with_parent
 from robots import InputError
 
 T = TypeVar("T")
@@ -144,9 +145,9 @@ def _alone(function: Callable[[T], U], item: T) -> U | Failed:
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Spawned processes that end at once if their owner is interrupted."""
+    """Spawned processes that end at once if their owner is interrupted, killed or gone."""
     others = set(mp.active_children())
-    pool = ProcessPoolExecutor(workers, mp.get_context("spawn"), initializer=_ignore_interrupts)
+    pool = ProcessPoolExecutor(workers, mp.get_context("spawn"), initializer=_obey_the_owner)
     try:
         with _one_thread_each():
             yield pool
@@ -158,9 +159,11 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _ignore_interrupts() -> None:
+def _obey_the_owner() -> None:
     # Ctrl-C in a terminal reaches the whole process group; the owner ends its children itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent()
 
 
 @contextmanager

@@ -1,0 +1,37 @@
+"""A simulation process that does not do what it should: which way, says the name of the scene."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from app.link.choice import SceneChoice
+from app.link.messages import Load, Loading, Quit, Tell, Told
+from app.link.wire import Wire
+from lessons.kinds import find_scene
+
+
+def warm(say: Callable[[str], None]) -> None:
+    say("nothing to be done")
+
+
+def main(wire: Wire) -> None:
+    choice = SceneChoice("planar3-hold")
+    settings = find_scene("planar3-hold").settings
+    while True:
+        command = wire.recv()
+        match command:
+            case Load(choice) if choice.name == "asleep":
+                time.sleep(1e6)
+            case Load(choice) if choice.name == "busy":
+                while True:
+                    pass
+            case Load(choice) if choice.name == "loads":
+                wire.send(Loading())
+                time.sleep(1e6)
+            case Tell():
+                wire.send(Told(choice, settings, (), 0.0))
+            case Quit():
+                return
+            case _:
+                pass

@@ -1,0 +1,321 @@
+"""Simulations that hang, are stopped or killed, and pages that are: nobody waits, nothing is left behind."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.client import trouble
+from app.client.learner import Learner
+from app.link import forkserver
+from app.link.choice import SceneChoice
+from app.link.forkserver import ForkServer
+from app.link.messages import Load, Play, Post, Told
+from app.link.outbox import MOST
+from app.link.process import wait_until
+from app.link.ring import MAX_ROWS, MIN_ROWS, Block
+from app.link.spares import Spares
+from app.server.sessions import WORKER
+from lessons.events import MoveTarget
+from lessons.teaching.lesson import Ghost
+
+LONG = 60.0  # s
+HERE = Path(__file__).parent
+Start = Callable[..., Learner]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Learners of one worker, and what it holds."""
+    made: list[Spares] = []
+    started: list[Learner] = []
+
+    def run(scene: str, worker: str = WORKER, own: bool = False) -> Learner:
+        if own or not made:
+            made.append(Spares(worker))
+        learner = Learner(f"token{len(started)}", SceneChoice(scene), made[-1])
+        started.append(learner)
+        return learner
+
+    yield run
+    for learner in started:
+        learner.close()
+    for spares in made:
+        spares.close()
+
+
+def running(learner: Learner) -> bool:
+    status = learner.status
+    return learner.trouble() is None and status is not None and status.ticks > 20
+
+
+def gone(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
+def server_of(learner: Learner) -> ForkServer:
+    server = learner._spares.server
+    assert server is not None
+    return server
+
+
+def born(learner: Learner) -> int:
+    assert wait_until(lambda: learner.pid is not None, LONG)
+    assert learner.pid is not None
+    return learner.pid
+
+
+# ---------------------------------------------------------------- the fork server
+
+
+def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
+    """What a second thread holds at that moment would stay locked in the child for ever."""
+    learner = start("iiwa14-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    server = psutil.Process(server_of(learner).pid)
+    assert psutil.Process(born(learner)).ppid() == server.pid
+    assert server.num_threads() == 1
+    assert psutil.Process(born(learner)).memory_full_info().uss < 25e6  # its own memory, bytes
+
+
+@pytest.mark.parametrize("worker", ["broken", "threaded"])
+def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -> None:
+    learner = start("planar3-hold", worker)
+    assert wait_until(lambda: running(learner), LONG)
+    assert psutil.Process(born(learner)).ppid() == os.getpid()
+    another = start("planar3-hold")
+    assert wait_until(lambda: running(another), LONG)
+
+
+def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
+    learner = start("planar3-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    server = server_of(learner)
+    os.kill(server.pid, signal.SIGKILL)
+    assert wait_until(lambda: not server.alive, LONG)
+    another = start("planar3-hold")
+    assert wait_until(lambda: running(another), LONG)
+    assert server_of(another) is not server and running(learner)
+    os.kill(born(learner), signal.SIGKILL)
+    assert wait_until(lambda: learner.failure is not None, LONG)
+    learner.reset_all()
+    assert wait_until(lambda: running(learner), LONG)
+
+
+def test_a_fork_server_that_hangs_is_replaced(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    learner = start("planar3-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    monkeypatch.setattr(forkserver, "PATIENCE", 0.2)
+    before = server_of(learner).pid
+    os.kill(before, signal.SIGSTOP)
+    another = start("planar3-hold")
+    assert wait_until(lambda: server_of(another).stuck, LONG)
+    monkeypatch.setattr(trouble, "SILENCE", 0.0)
+    another.restart()
+    monkeypatch.undo()
+    assert wait_until(lambda: running(another), LONG)
+    assert gone(before) and running(learner)
+
+
+# ---------------------------------------------------------------- silence
+
+
+def test_nobody_waits_for_a_stopped_child(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither for its pipe, which is full, nor when it is started again; and who gave a command is told."""
+    learner, other = start("planar3-hold"), start("planar3-hold")
+    assert wait_until(lambda: running(learner) and running(other), LONG)
+    pid = born(learner)
+    os.kill(pid, signal.SIGSTOP)
+    calls = threading.Thread(target=lambda: flood(learner), daemon=True)
+    calls.start()
+    calls.join(LONG)
+    assert not calls.is_alive()
+    assert any("is lost" in notice for notice in learner.take_messages()[1])
+    assert wait_until(lambda: learner.trouble() is not None, LONG)
+    said = learner.trouble()
+    assert said is not None and said.state == "SILENT" and "not said a word" in said.sentence
+    assert running(other)
+    learner.reset_all()
+    assert wait_until(lambda: running(learner), LONG)
+    assert wait_until(lambda: gone(pid), LONG)
+
+
+def flood(learner: Learner) -> None:
+    for _ in range(20 * MOST):
+        learner.send(Post(MoveTarget("position", (0.5, 0.1, 0.0))))
+
+
+def test_a_child_that_goes_on_is_no_trouble_any_more(start: Start) -> None:
+    learner = start("planar3-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    os.kill(born(learner), signal.SIGSTOP)
+    assert wait_until(lambda: learner.trouble() is not None, LONG)
+    os.kill(born(learner), signal.SIGCONT)
+    assert wait_until(lambda: learner.trouble() is None, LONG)
+
+
+def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    learner = start("planar3-hold", "stubborn")
+    pid = born(learner)
+    learner.send(Load(SceneChoice("loads")))
+    assert wait_until(lambda: learner.trouble() is not None, LONG)
+    said = learner.trouble()
+    assert (
+        said is not None
+        and (said.state, said.offer) == ("LOADING", "Cancel")
+        and "of at most 30 s" in said.sentence
+    )
+    monkeypatch.setattr(trouble, "DEADLINE", 3.5)
+    assert wait_until(lambda: getattr(learner.trouble(), "state", "") == "SILENT", LONG)
+    assert not gone(pid)  # the machine may only be slow: people decide
+    learner.restart()
+    assert wait_until(lambda: gone(pid), LONG)
+    assert learner.choice.name == "planar3-hold"
+    assert learner.ask() is not None
+
+
+def test_a_ghost_that_hangs_is_started_again_with_its_robot(start: Start) -> None:
+    learner = start("planar3-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
+    ghost = learner.ghost
+    assert ghost is not None and wait_until(lambda: ghost.status is not None, LONG)
+    pid = ghost.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    assert wait_until(lambda: learner.trouble() is not None, LONG)
+    said = learner.trouble()
+    assert said is not None and said.sentence.startswith("The ghost")
+    learner.reset_all()
+    assert wait_until(lambda: gone(pid) and running(learner), LONG)
+    now = learner.ghost
+    assert now is not None and wait_until(lambda: now.status is not None and now.status.t > 0.2, LONG)
+
+
+def test_quick_questions_are_all_answered(start: Start) -> None:
+    learner = start("planar3-hold", "stubborn")
+    answers: list[Told | None] = []
+    asking = [threading.Thread(target=lambda: answers.append(learner.ask(LONG))) for _ in range(8)]
+    for each in asking:
+        each.start()
+    for each in asking:
+        each.join(LONG)
+    assert len(answers) == 8 and all(isinstance(answer, Told) for answer in answers)
+
+
+def test_a_question_to_who_dies_is_answered_at_once(start: Start) -> None:
+    learner = start("asleep", "stubborn")
+    pid = born(learner)
+    answers: list[Told | None] = []
+    asking = threading.Thread(target=lambda: answers.append(learner.ask(10 * LONG)))
+    asking.start()
+    assert wait_until(lambda: bool(learner._asking), LONG)
+    os.kill(pid, signal.SIGKILL)
+    asking.join(LONG)
+    assert answers == [None]
+
+
+# ---------------------------------------------------------------- ends
+
+PAGE = """
+import sys, time, os, signal
+sys.path[:0] = {paths!r}
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.link.spares import Spares
+spares = Spares("stubborn")
+if {spawn}:
+    spares._forks = False
+learners = [Learner(name, SceneChoice(name), spares) for name in ("asleep", "busy", "idle", "stopped")]
+assert wait_until(lambda: all(each.pid for each in learners), 60.0)
+print(*(each.pid for each in learners), *([] if {spawn} else [spares.server.pid]), flush=True)
+time.sleep(1e6)
+"""
+
+
+@pytest.mark.parametrize("spawn", [False, True])
+def test_a_page_that_is_killed_leaves_nobody_behind(spawn: bool) -> None:
+    """Whatever its children are doing: computing, asleep, waiting, or stopped."""
+    code = PAGE.format(paths=[str(HERE), str(HERE.parents[1])], spawn=spawn)
+    page = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert page.stdout is not None
+    pids = [int(word) for word in page.stdout.readline().split()]
+    assert len(pids) == (4 if spawn else 5)
+    busy = psutil.Process(pids[1])
+    assert wait_until(lambda: busy.status() == psutil.STATUS_RUNNING, LONG)
+    if not spawn:  # one that has yet to import everything could not be told to end so early
+        os.kill(pids[3], signal.SIGSTOP)
+    page.kill()
+    page.communicate()
+    assert wait_until(lambda: all(gone(pid) for pid in pids), LONG), [pid for pid in pids if not gone(pid)]
+
+
+@pytest.mark.parametrize("scene", ["asleep", "busy", "idle"])
+def test_a_child_takes_sigterm(start: Start, scene: str) -> None:
+    learner = start(scene, "stubborn")
+    pid = born(learner)
+    os.kill(pid, signal.SIGTERM)
+    assert wait_until(lambda: gone(pid), LONG)
+    assert wait_until(lambda: "signal 15" in str(learner.failure), LONG)
+
+
+# ---------------------------------------------------------------- memory
+
+
+def test_a_ring_is_as_large_as_there_is_memory() -> None:
+    """On a machine without room it is smaller, then one sentence; never a crash in the middle of a run."""
+    width = 180
+    assert measured(width, None) == f"{min(MAX_ROWS, 12_000_000 // (8 * width))}"
+    assert int(measured(width, 4_000_000)) in range(MIN_ROWS, 2800)
+    assert "There is no memory for the telemetry" in measured(width, 100_000)
+
+
+def measured(width: int, limit: int | None) -> str:
+    """Rows of a ring, written to the last, in a process whose files may not be larger; or the sentence."""
+    code = (
+        "import numpy as np; from app.link.ring import Block; from robots import InputError\n"
+        "try:\n"
+        f"    block = Block({width}, 8)\n"
+        "except InputError as error:\n"
+        "    print(error)\n"
+        "else:\n"
+        f"    [block.write(np.ones({width})) for _ in range(block.rows)]\n"
+        "    print(block.rows)\n"
+    )
+    smaller = None if limit is None else (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=HERE.parents[1],
+        env={**os.environ, "PYTHONPATH": str(HERE.parents[1])},
+        preexec_fn=smaller,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+
+
+def test_files_arrive_with_their_message(start: Start) -> None:
+    """A ring has no name: the page holds it, and the child's death takes nothing away."""
+    learner = start("planar3-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    open_before = len(os.listdir("/proc/self/fd"))
+    for _ in range(5):
+        learner.send(Load(SceneChoice("panda-hold")))
+        learner.send(Load(SceneChoice("planar3-hold")))
+    learner.send(Play(False))
+    assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
+    assert len(os.listdir("/proc/self/fd")) <= open_before
+    assert isinstance(learner.read(lambda block, _: block), Block)
