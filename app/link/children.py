@@ -124,24 +124,20 @@ class Spawned:
                     del os.environ[name]
                 else:
                     os.environ[name] = value
-
-    @property
-    def pid(self) -> int | None:
-        return self._process.pid
-
-    @property
-    def exitcode(self) -> int | None:
-        return self._process.exitcode
+        self.pid = self._process.pid
+        self.exitcode: int | None = None
 
     def fileno(self) -> int:
         return self._process.sentinel
 
     def look(self) -> bool:
         self._process.join(1.0)
+        self.exitcode = self._process.exitcode
         return True
 
     def kill(self) -> None:
-        self._process.kill()
+        with contextlib.suppress(ValueError):  # closed, because it has ended
+            self._process.kill()
 
     def close(self) -> None:
         with contextlib.suppress(ValueError):  # killed, but not yet gone

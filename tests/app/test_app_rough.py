@@ -25,6 +25,7 @@ from app.link.process import wait_until
 from app.link.ring import MAX_ROWS, MIN_ROWS, Block
 from app.link.spares import Spares
 from app.server.sessions import WORKER
+from benchmarks.rough import treat
 from lessons.events import MoveTarget
 from lessons.teaching.lesson import Ghost
 
@@ -319,3 +320,12 @@ def test_files_arrive_with_their_message(start: Start) -> None:
     assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
     assert len(os.listdir("/proc/self/fd")) <= open_before
     assert isinstance(learner.read(lambda block, _: block), Block)
+
+
+# ---------------------------------------------------------------- all of it
+
+
+def test_pages_get_over_a_rough_day() -> None:
+    """In short what `python -m benchmarks.rough` does at length: the buttons bring every page back."""
+    found = treat(kills=4, stops=2)
+    assert found["recovered"] == found["treated"] and not found["left behind"], found

@@ -1,0 +1,212 @@
+"""What a rough day leaves of the page: killed, stopped and hanging simulations, large uploads, little memory.
+
+    python -m benchmarks.rough [--kills 100] [--stops 20] [--shm 8]
+
+Two pages without a browser are treated roughly through the server they share, a third only watches. As root,
+with `--shm` MB of shared memory (a mount of its own). Prints JSON: how often a page recovered by its button,
+the longest the watching page heard nothing, the longest answer to a GET, and what was left behind. Exit 0 if
+every page recovered and nothing was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import psutil
+from viser import _messages
+from websockets.exceptions import ConnectionClosed
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+
+LONG = 60.0  # s
+UPLOAD = 40_000_000  # bytes
+_PART = 500_000
+_INSIDE = "HIMPC_LAB_ROUGH_INSIDE"
+
+
+def main() -> int:
+    """Treats a server roughly, as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--stops", type=int, default=20)
+    parser.add_argument("--shm", type=int, default=8)
+    given = parser.parse_args()
+    if _INSIDE not in os.environ and os.geteuid() == 0 and shutil.which("unshare"):
+        mount = f"mount -t tmpfs -o size={given.shm}m tmpfs /dev/shm"
+        command = ["unshare", "--mount", "sh", "-c", f'{mount} && exec "$@"', "sh", sys.executable, "-m"]
+        return subprocess.call(
+            [*command, "benchmarks.rough", *sys.argv[1:]], env={**os.environ, _INSIDE: "1"}
+        )
+    found = treat(given.kills, given.stops)
+    print(json.dumps(found, indent=1))
+    sound = found["recovered"] == found["treated"] and not found["left behind"]
+    return 0 if sound else 1
+
+
+def treat(kills: int, stops: int) -> dict[str, object]:
+    """Everything in a row; see the module."""
+    shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
+    before = _memory_left()
+    server = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=3)
+    counts: dict[str, str] = {}
+    treated = recovered = 0
+    try:
+        with Wire(server.url) as witness, Wire(server.url) as one, Wire(server.url) as two:
+            learners = [_learner(server, place) for place in range(3)]
+            assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
+            pages = list(zip(learners[1:], (one, two), strict=True))
+            with _watch(server.url, witness) as watched:
+                for name, times, harm in (
+                    ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),
+                    ("stopped", stops, lambda each: _hurt(each, signal.SIGSTOP)),
+                    ("load that hangs", 2, _hang),
+                ):
+                    good = 0
+                    for round_ in range(times):
+                        learner, page = pages[round_ % 2]
+                        good += _recovers(learner, page, harm, by_reset=bool(round_ // 2 % 2))
+                    counts[name] = f"{good} of {times} recovered"
+                    treated, recovered = treated + times, recovered + good
+                answers: list[str] = []
+                uploads = [threading.Thread(target=_upload, args=(page, answers)) for _, page in pages]
+                for each in uploads:
+                    each.start()
+                for each in uploads:
+                    each.join(LONG)
+                counts["uploads of 40 MB"] = ", ".join(answers)
+                treated, recovered = treated + 1, recovered + _runs(learners[0])
+    finally:
+        server.close()
+    eventually(lambda: not psutil.Process().children(recursive=True), 5.0)
+    left = [f"process {child.pid}" for child in psutil.Process().children(recursive=True)]
+    left += sorted(_memory_left() - before)
+    return {
+        "shared memory MB": round(shared / 1e6, 1),
+        **counts,
+        "treated": treated,
+        "recovered": recovered,
+        "longest silence of the watching page s": round(watched[0], 2),
+        "longest GET s": round(watched[1], 2),
+        "left behind": left,
+    }
+
+
+def _learner(server: PageServer, place: int) -> Learner:
+    assert eventually(lambda: len(server.sessions.learners) > place, LONG)
+    return server.sessions.learners[place]
+
+
+def _runs(learner: Learner) -> bool:
+    status = learner.status
+    return learner.trouble() is None and status is not None and status.ticks > 5
+
+
+def _hurt(learner: Learner, number: signal.Signals) -> None:
+    pid = learner.pid
+    assert pid is not None
+    os.kill(pid, number)
+
+
+def _hang(learner: Learner) -> None:
+    """A scene is asked for that will never be there: its process stops while it loads."""
+    _hurt(learner, signal.SIGSTOP)
+    learner.load(SceneChoice("panda-hold"))
+
+
+def _recovers(learner: Learner, page: Wire, harm: Callable[[Learner], None], by_reset: bool) -> bool:
+    """Whether the page says what is the matter, and its button brings a running robot back."""
+    pid = learner.pid
+    harm(learner)
+    badges = ("STOPPED", "SILENT", "LOADING")
+    if not eventually(lambda: any(page.shows(badge) for badge in badges), LONG):
+        return False
+    label, value = ("Playback", "Reset all") if by_reset else ("Start again", True)
+    button = page.find(label)
+    if button is None:
+        return False
+    page.write(button, value=value)
+    return eventually(lambda: learner.pid not in (None, pid) and _runs(learner), LONG)
+
+
+def _upload(page: Wire, answers: list[str]) -> None:
+    """A file nobody wants, as fast as it goes; the server may well hang up. Its answer goes to `answers`."""
+    button = page.find("Upload a URDF")
+    assert button is not None
+    count = UPLOAD // _PART
+    name = f"large-{id(page)}"
+    try:
+        page.say(_messages.FileTransferStartUpload(button, name, "large.urdf", "text/xml", count, UPLOAD))
+        for place in range(count):
+            page.say(_messages.FileTransferPart(button, name, place, bytes(_PART)))
+    except (ConnectionClosed, OSError):
+        answers.append("connection ended")
+        return
+    answered = eventually(lambda: page.shows("more than 10 MB"), LONG)
+    answers.append("refused in a sentence" if answered else "no answer")
+
+
+@contextmanager
+def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
+    """(longest silence of a page, longest answer to a GET), s, while it lasts."""
+    worst, over = [0.0, 0.0], threading.Event()
+    seen: dict[str, object] = {}
+
+    def look() -> None:
+        changed = time.monotonic()
+        while not over.wait(0.05):
+            now = {
+                uuid: str(each["props"].get("content", "")) for uuid, each in list(witness.controls.items())
+            }
+            if now != seen:
+                seen.clear()
+                seen.update(now)
+                changed = time.monotonic()
+            worst[0] = max(worst[0], time.monotonic() - changed)
+
+    def get() -> None:
+        while not over.wait(0.5):
+            began = time.monotonic()
+            urllib.request.urlopen(url, timeout=LONG).close()
+            worst[1] = max(worst[1], time.monotonic() - began)
+
+    threads = [threading.Thread(target=each, daemon=True) for each in (look, get)]
+    for each in threads:
+        each.start()
+    try:
+        yield worst
+    finally:
+        over.set()
+        for each in threads:
+            each.join(LONG)
+
+
+def _memory_left() -> set[str]:
+    """What has a name in shared memory, and rings that this process still looks at."""
+    named = {f"/dev/shm/{path.name}" for path in Path("/dev/shm").glob("*")}
+    return named | {line.strip() for line in _maps() if "himpc-lab" in line}
+
+
+def _maps() -> list[str]:
+    maps = Path("/proc/self/maps")
+    return maps.read_text().splitlines() if maps.exists() else []
+
+
+if __name__ == "__main__":
+    sys.exit(main())
