@@ -11,6 +11,7 @@ every page recovered and nothing was.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import shutil
@@ -21,7 +22,6 @@ import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -121,7 +121,8 @@ def _runs(learner: Learner) -> bool:
 def _hurt(learner: Learner, number: signal.Signals) -> None:
     pid = learner.pid
     assert pid is not None
-    os.kill(pid, number)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, number)
 
 
 def _hang(learner: Learner) -> None:
@@ -132,17 +133,22 @@ def _hang(learner: Learner) -> None:
 
 def _recovers(learner: Learner, page: Wire, harm: Callable[[Learner], None], by_reset: bool) -> bool:
     """Whether the page says what is the matter, and its button brings a running robot back."""
-    pid = learner.pid
+
+    def says() -> bool:
+        return any(page.shows(badge) for badge in ("STOPPED", "SILENT", "LOADING"))
+
+    if not eventually(lambda: not says() and _runs(learner), LONG):
+        return False
+    pid, ready = learner.pid, learner.ready
     harm(learner)
-    badges = ("STOPPED", "SILENT", "LOADING")
-    if not eventually(lambda: any(page.shows(badge) for badge in badges), LONG):
+    if not eventually(says, LONG):
         return False
     label, value = ("Playback", "Reset all") if by_reset else ("Start again", True)
     button = page.find(label)
     if button is None:
         return False
     page.write(button, value=value)
-    return eventually(lambda: learner.pid not in (None, pid) and _runs(learner), LONG)
+    return eventually(lambda: learner.pid != pid and learner.ready is not ready and _runs(learner), LONG)
 
 
 def _upload(page: Wire, answers: list[str]) -> None:
@@ -162,7 +168,7 @@ def _upload(page: Wire, answers: list[str]) -> None:
     answers.append("refused in a sentence" if answered else "no answer")
 
 
-@contextmanager
+@contextlib.contextmanager
 def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
     """(longest silence of a page, longest answer to a GET), s, while it lasts."""
     worst, over = [0.0, 0.0], threading.Event()
