@@ -164,7 +164,7 @@ def _upload(page: Wire, answers: list[str]) -> None:
     except (ConnectionClosed, OSError):
         answers.append("connection ended")
         return
-    answered = eventually(lambda: page.shows("more than 10 MB"), LONG)
+    answered = eventually(lambda: any(title == "Not uploaded" for title, _ in page.notices), LONG)
     answers.append("refused in a sentence" if answered else "no answer")
 
 
