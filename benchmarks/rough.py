@@ -153,8 +153,9 @@ def _recovers(learner: Learner, page: Wire, harm: Callable[[Learner], None], by_
 
 def _upload(page: Wire, answers: list[str]) -> None:
     """A file nobody wants, as fast as it goes; the server may well hang up. Its answer goes to `answers`."""
+    eventually(lambda: page.find("Upload a URDF") is not None, LONG)
     button = page.find("Upload a URDF")
-    assert button is not None
+    assert button is not None, "the page has no button to upload a robot"
     count = UPLOAD // _PART
     name = f"large-{id(page)}"
     try:
