@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from importlib import import_module
 
-from robots.errors import InputError, unknown_name
+from app.commands.interrupts import interruptible
 
 COMMANDS: dict[str, str] = {
     "serve": "open the page (also what himpc-lab does without a command)",
@@ -29,41 +26,32 @@ COMMANDS: dict[str, str] = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code: 0 sound, 1 a claim failed, 2 wrong input."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    with interruptible() as interrupted:
+        try:
+            return _run(list(sys.argv[1:] if argv is None else argv))
+        except BrokenPipeError:
+            # The reader of our output has gone (e.g. `| head`): nothing is left to say.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        except BaseException:
+            if interrupted.is_set():
+                return 130
+            raise
+
+
+def _run(arguments: list[str]) -> int:
+    from robots.errors import InputError, unknown_name
+
     name = arguments.pop(0) if arguments and not arguments[0].startswith("-") else "serve"
     try:
         if name not in COMMANDS:
             raise unknown_name("command", name, COMMANDS, "see himpc-lab --help")
         if name == "serve" and arguments[:1] in (["-h"], ["--help"]):
             _print_commands()
-        with _terminated_is_interrupted():
-            return _call(name, arguments)
+        return _call(name, arguments)
     except InputError as error:
         print(f"himpc-lab: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        # The reader of our output has gone (e.g. `| head`): nothing is left to say.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-
-
-@contextmanager
-def _terminated_is_interrupted() -> Iterator[None]:
-    """SIGTERM ends a command as Ctrl-C does: what is done is kept, and no process is left behind."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _call(name: str, arguments: list[str]) -> int:

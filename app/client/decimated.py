@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.link.ring import Block
-from himpc.telemetry import Layout
+
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
 
 WINDOW = 8.0  # s of simulated time in the plots
 BUCKETS = 160  # in a window

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.client.decimated import KEPT
-from himpc.telemetry import Layout
+
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
 
 RATE = 100.0
 """Rows kept per simulated second."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from himpc.telemetry import Layout
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from lessons.events import Event
+if TYPE_CHECKING:
+    from lessons.events import Event
 
 HOLD = 0.8
 """s during which a control that was just touched is not overwritten: the session's answer is on its way."""
 
-Send = Callable[[Event], None]
+Send = Callable[["Event"], None]
 """Puts an event into the session's mailbox."""
 
 T = TypeVar("T")

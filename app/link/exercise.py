@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from lessons.course import load_lesson
-from lessons.teaching.challenge import Challenge, Result
-from lessons.teaching.lesson import Lesson, Run, Step
-from lessons.teaching.measure import Signal
-from lessons.teaching.prediction import Grade
 from robots import InputError
+
+if TYPE_CHECKING:
+    from lessons.teaching.challenge import Challenge, Result
+    from lessons.teaching.lesson import Lesson, Run, Step
+    from lessons.teaching.measure import Signal
+    from lessons.teaching.prediction import Grade
 
 Answer = int | float | tuple[tuple[float, float], ...]
 """A prediction: place of an option, a value, or the points (t in s, value) of a sketch."""
@@ -83,6 +85,8 @@ def parts_of(lesson: Lesson) -> tuple[Step | Challenge, ...]:
 
 def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
     """What to look at while it runs."""
+    from lessons.teaching.lesson import Step
+
     if isinstance(part, Step):
         return part.plots
     return tuple(dict.fromkeys(measure.signal for measure in part.measures))

@@ -67,7 +67,7 @@ class Body:
     def _loaded(self, choice: SceneChoice, scene: Scene) -> Loaded:
         run = start(scene, choice.seed)
         mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
-        return Loaded(choice, scene, run, self._lecturer(choice, run), mine)
+        return Loaded(choice.resolved(), scene, run, self._lecturer(choice, run), mine)
 
     def _enter(self, loaded: Loaded) -> None:
         session = loaded.run.session

@@ -1,0 +1,87 @@
+"""Ctrl-C and SIGTERM end a command soon, whatever it is doing, and without a traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
+PATIENCE = 4.5
+"""s that a command has to come to its end by itself."""
+_AGAIN = 0.05  # s after which an interrupt that somebody swallowed comes back
+
+Interrupted = threading.Event
+"""Set once a signal has come."""
+
+
+@contextmanager
+def interruptible() -> Iterator[Interrupted]:
+    """While it is open both signals raise KeyboardInterrupt in the main thread: what is done is kept, and no
+    process is left behind. A library that takes long or swallows the exception (a compiler does both) does
+    not hold it up: it comes again, and after PATIENCE the process ends at once. Children end with it.
+
+    Yields whether a signal has come: an import that is cut short may then fail in any way.
+    """
+    interrupted = Interrupted()
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupted
+        return
+
+    def interrupt(*_: object) -> None:
+        interrupted.set()
+        raise KeyboardInterrupt
+
+    def unraisable(report: UnraisableHookArgs) -> None:
+        if interrupted.is_set():
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        else:
+            hook(report)
+
+    numbers = [signal.SIGTERM, signal.SIGALRM]
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        numbers.append(signal.SIGINT)
+    before = [signal.signal(number, interrupt) for number in numbers]
+    hook, sys.unraisablehook = sys.unraisablehook, unraisable
+    with _deadline():
+        try:
+            yield interrupted
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            sys.unraisablehook = hook
+            for number, handler in zip(numbers, before, strict=True):
+                signal.signal(number, handler)
+
+
+@contextmanager
+def _deadline() -> Iterator[None]:
+    """A thread that hears of signals even while the main one is deep in a library, and ends the process when
+    that lasts too long."""
+    heard, told = os.pipe()
+    os.set_blocking(told, False)
+    done = threading.Event()
+
+    def watch() -> None:
+        while number := os.read(heard, 1):
+            if number[0] in (signal.SIGINT, signal.SIGTERM):
+                if not done.wait(PATIENCE):
+                    os._exit(130)
+                return
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    outer = signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        done.set()
+        signal.set_wakeup_fd(outer)
+        os.close(told)
+        watcher.join()
+        os.close(heard)
