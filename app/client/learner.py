@@ -6,6 +6,7 @@ import time
 from collections import deque
 from dataclasses import replace
 from queue import Empty, Queue
+from typing import TYPE_CHECKING
 
 from app.client.ghost import Ghost
 from app.client.simulation import Simulation, aside
@@ -15,7 +16,9 @@ from app.link.exercise import Lecture
 from app.link.messages import Failed, Lead, Leash, Load, Ready, Report, ResetAll, Script, Status, Tell, Told
 from app.link.process import Process
 from app.link.spares import Spares
-from lessons.teaching import lesson
+
+if TYPE_CHECKING:
+    from lessons.teaching import lesson
 
 
 class Learner(Simulation):

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from app.client.decimated import History
 from app.client.poses import Frame, Tape
@@ -17,7 +17,9 @@ from app.link.messages import Command, Failed, Loading, Ready, Refused, Report, 
 from app.link.process import Process
 from app.link.ring import Block
 from app.link.spares import Spares
-from lessons.settings.settings import Settings
+
+if TYPE_CHECKING:
+    from lessons.settings.settings import Settings
 
 T = TypeVar("T")
 _COMPLAIN = 2.0  # s between two notices that commands are lost

@@ -33,10 +33,10 @@ def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The si
         quiet: s since it said anything.
         who: begins the sentence.
     """
-    if quiet < SILENCE:
+    doing = process.preparing
+    if quiet < SILENCE and not doing:
         return None
     waited = f"{quiet:.0f} s"
-    doing = process.preparing
     if doing is not None:
         what = f": {doing}" if doing else ""
         late = quiet > FIRST_PATIENCE

@@ -38,7 +38,6 @@ def serve(
         no_token: let everybody in who reaches the page.
     """
     from app.link.choice import SceneChoice
-    from app.link.exercise import Exercise
     from app.server.server import FIRST
     from app.server.server import serve as serve_page
 
@@ -47,7 +46,7 @@ def serve(
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
         raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
     if lesson is not None:
-        choice = SceneChoice.of_lesson(Exercise(lesson))
+        choice = SceneChoice.opening(lesson)
     elif state is not None:
         from lessons.replay.state import decode
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
 from app.link.wire import Handle
-from himpc.telemetry import Layout
-from lessons.events import Event
-from lessons.settings.settings import Settings
-from robots import Robot
+
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
+    from lessons.events import Event
+    from lessons.settings.settings import Settings
+    from robots import Robot
 
 # ------------------------------------------------------------------ page → simulation
 

@@ -11,11 +11,15 @@ import errno
 import mmap
 import os
 import tempfile
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.link.wire import Handle
-from robots import InputError, Robot
+from robots import InputError
+
+if TYPE_CHECKING:
+    from robots import Robot
 
 MAX_ROWS = 8192
 MIN_ROWS = 1024

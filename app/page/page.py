@@ -9,6 +9,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import viser
 
@@ -19,9 +20,10 @@ from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.inlet import Inlet
-from app.page.layout import Stage
-from app.view.robot import aim
 from lessons.scenes.names import ALL_SCENES
+
+if TYPE_CHECKING:
+    from app.page.layout import Stage
 
 RATE = 30.0  # Hz, poses
 PLOTS_RATE = 12.0  # Hz
@@ -155,6 +157,10 @@ class Page:
         self.learner.restart()
 
     def _build(self, ready: Ready) -> None:
+        # Not above: a page can be opened, and say what it waits for, before all of this is loaded.
+        from app.page.layout import Stage
+        from app.view.robot import aim
+
         before, self._stage = self._stage, None
         if before is not None:
             before.close()

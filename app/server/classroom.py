@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Sequence
-from typing import TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from app.client.decimated import History
 from app.client.ghost import Ghost
@@ -19,8 +19,10 @@ from app.link.messages import Command, Ready, Status, Told
 from app.link.ring import Block
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
-from lessons.settings.settings import Settings
-from lessons.teaching import lesson
+
+if TYPE_CHECKING:
+    from lessons.settings.settings import Settings
+    from lessons.teaching import lesson
 
 STEERING = "The instructor steers: this page only watches."
 T = TypeVar("T")

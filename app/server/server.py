@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import signal
 import socket
+import sys
 import threading
 import warnings
 import webbrowser
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 from urllib.parse import urlsplit
 
 import viser
@@ -21,9 +24,7 @@ from app.server.door import Door, as_origin, names_of_this_machine, new_token
 from app.server.guard import Guard
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
-from app.worker.reports.start import start
 from robots import InputError
-from robots.shapes import link_shapes
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FIRST = SceneChoice("iiwa14-hold")
@@ -69,6 +70,10 @@ def serve(
                 pass
     finally:
         server.close()
+    if server.loading:
+        # A library half imported does not survive the interpreter's own end.
+        sys.stdout.flush()
+        os._exit(0)
     return 0
 
 
@@ -120,8 +125,7 @@ class PageServer:
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         trusted = frozenset(map(as_origin, trusted_origins))
-        # Loaded here once, so that a wrong name or file is one sentence on the terminal, not in a page.
-        robot = start(choice.scene(), choice.seed).session.robot
+        _check_choice(choice)
         _check_address(host, port)
         # A tab may close between two lines of ours; that is no news for the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -149,8 +153,13 @@ class PageServer:
         self._viser.on_client_disconnect(self._disconnect)
         door = Door(local, trusted, self.token, names_of_this_machine(), f"himpc-lab-{found}")
         self.guard.open(door)
-        # Meshes take a moment to thin; the first page should not wait for that.
-        threading.Thread(target=link_shapes, args=(robot,), daemon=True).start()
+        self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
+        self._loading.start()
+
+    @property
+    def loading(self) -> bool:
+        """Whether what pages are built with is still being loaded."""
+        return self._loading.is_alive()
 
     def with_token(self, address: str) -> str:
         """An address of this page as it is handed on."""
@@ -181,6 +190,24 @@ class PageServer:
             visit.close()
         self.sessions.close()
         private.stop(self._viser)
+
+
+def _check_choice(choice: SceneChoice) -> None:
+    """So that a wrong name or file is one sentence on the terminal, not in a page. What names alone do not
+    tell is loaded for it, which takes a second before anybody can connect."""
+    if not choice.known:
+        from app.worker.reports.start import start
+
+        start(choice.scene(), choice.seed)
+
+
+def _load(choice: SceneChoice) -> None:
+    """What pages are built with, while the first one is on its way: panels, then meshes, which take a moment
+    to thin."""
+    import_module("app.page.layout")
+    from robots.shapes import link_shapes
+
+    link_shapes(choice.scene().robot)
 
 
 def _check_address(host: str, port: int) -> None:
