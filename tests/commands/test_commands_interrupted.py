@@ -1,0 +1,137 @@
+"""Ctrl-C in every phase of a command: it ends, without a traceback, and leaves no process behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.link.process import wait_until
+
+ROOT = Path(__file__).parents[2]
+LONG = 120.0  # s
+
+
+class Program:
+    """`himpc-lab` in a process group of its own, as a terminal starts it."""
+
+    def __init__(self, arguments: list[str], folder: Path, cache: str | None) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        if cache is not None:
+            environment["NUMBA_CACHE_DIR"] = cache
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "app", *arguments],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self.said: list[str] = []
+        self._listening = [
+            threading.Thread(target=self._listen, args=(stream, self.said), daemon=True)
+            for stream in (self.process.stdout, self.process.stderr)
+        ]
+        for thread in self._listening:
+            thread.start()
+
+    def _listen(self, stream: Iterator[str], said: list[str]) -> None:
+        for line in stream:
+            said.append(line)
+
+    def loaded(self, library: str) -> bool:
+        return library in Path(f"/proc/{self.process.pid}/maps").read_text()
+
+    def has_said(self, word: str) -> bool:
+        return any(word in line for line in self.said)
+
+    @property
+    def children(self) -> list[psutil.Process]:
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def interrupt(self) -> None:
+        """As the terminal does it: the whole group hears of it."""
+        os.killpg(self.process.pid, signal.SIGINT)
+
+    def end(self) -> str:
+        """Everything it said, once it has ended."""
+        self.process.wait(LONG)
+        for thread in self._listening:
+            thread.join(LONG)
+        return "".join(self.said)
+
+
+When = Callable[[Program], bool]
+
+PHASES: dict[str, tuple[list[str], bool, When]] = {
+    "imports": (["run", "iiwa14-circle"], False, lambda it: it.loaded("numpy")),
+    "imports of the page": (["--no-browser", "--port", "0"], False, lambda it: it.loaded("numpy")),
+    "compiling": (["run", "iiwa14-circle"], True, lambda it: it.has_said("compiling")),
+    "compiling for the page": (["--no-browser", "--port", "0"], True, lambda it: it.has_said("compiling")),
+    "serving": (["--no-browser", "--port", "0"], False, lambda it: it.has_said("ready at")),
+    "running": (["run", "iiwa14-circle", "--duration", "600"], False, lambda it: it.loaded("libmujoco")),
+    "checking": (["lessons", "--check", "one-task"], False, lambda it: len(it.children) > 1),
+    "sweeping": (
+        ["sweep", "planar3-hold", "--over", "horizon=1:10:10", "--over", "Q=1:100:20", "--out", "swept"],
+        False,
+        lambda it: len(it.children) > 1,
+    ),
+}
+
+
+@pytest.mark.parametrize("phase", PHASES)
+def test_ctrl_c_ends_it(phase: str, tmp_path: Path) -> None:
+    arguments, cold, when = PHASES[phase]
+    program = Program(arguments, tmp_path, str(tmp_path / "cache") if cold else None)
+    try:
+        assert wait_until(lambda: program.process.poll() is not None or when(program), LONG)
+        assert program.process.poll() is None, program.said
+        children = program.children
+        program.interrupt()
+        said = program.end()
+    finally:
+        if program.process.poll() is None:
+            os.killpg(program.process.pid, signal.SIGKILL)
+    assert "Traceback" not in said and "Exception" not in said
+    # Interrupted in code that was made from text, Python itself passes the signal on at its end.
+    assert program.process.returncode in (0, 130, -signal.SIGINT)
+    assert wait_until(lambda: not any(child.is_running() for child in children), LONG)
+
+
+def test_what_swallows_an_interrupt_is_interrupted_again(tmp_path: Path) -> None:
+    """A callback that a library calls loses the exception; a library that goes on is ended all the same."""
+    code = """
+import ctypes, time
+from app.commands.interrupts import interruptible
+compare = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+numbers = (ctypes.c_int * 1000)()
+
+@compare
+def swallow(*_):
+    print("begun", flush=True)
+    time.sleep(0.4)
+    return 0
+
+with interruptible():
+    ctypes.CDLL(None).qsort(numbers, 1000, 4, swallow)
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdout.readline() == "begun\n"
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=LONG)
+    assert process.returncode == 130
+    assert errors == ""
