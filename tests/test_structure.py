@@ -133,7 +133,7 @@ def test_one_file_touches_private_names_of_viser() -> None:
     tests it before anything is served."""
     files = sources(*(f"app/{folder}" for folder in APP if folder not in NO_PICTURE))
     touching: dict[str, set[str]] = {}
-    ours: set[str] = set()
+    ours = {"_exit"}  # of os, and no secret of anybody
     for path in files:
         name = str(path.relative_to(ROOT))
         for node in ast.walk(ast.parse(path.read_text())):

@@ -1,0 +1,78 @@
+"""The first page: the server listens before anything that computes is loaded."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.client.trouble import trouble_of
+from app.link.choice import SceneChoice
+from app.link.process import Process
+from robots import InputError
+
+ROOT = Path(__file__).parents[2]
+NUMERICS = ("scipy", "pinocchio", "mujoco", "numba", "trimesh", "placo", "coal", "daqp", "matplotlib")
+
+LISTEN = f"""
+import sys, urllib.request
+from app.link.choice import SceneChoice
+from app.server import server
+server._load = lambda choice: None  # what follows once it listens
+running = server.PageServer({{choice}}, port=0)
+try:
+    assert urllib.request.urlopen(running.url).status == 200
+    print(*sorted(set({NUMERICS}) & set(sys.modules)))
+finally:
+    running.close()
+"""
+
+
+@pytest.mark.parametrize(
+    "choice",
+    ["SceneChoice('iiwa14-hold')", "SceneChoice('ridgeback-ur10-square')", "SceneChoice.opening('one-task')"],
+)
+def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None:
+    """viser itself needs NumPy; all else comes while the browser opens."""
+    code = LISTEN.replace("{choice}", choice)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == []
+
+
+def test_names_are_judged_without_loading_and_files_by_loading() -> None:
+    assert SceneChoice("iiwa14-hold").known and SceneChoice("ridgeback-ur10-delivery", seed=3).known
+    assert not SceneChoice("hold").known and not SceneChoice("iiwa14-hodl").known
+    assert not SceneChoice("hold", "mine.urdf").known
+    assert not SceneChoice("iiwa14-hold", set=("horizon=0",)).known
+    with pytest.raises(InputError, match="'one-task'"):
+        SceneChoice.opening("one-tsak")
+
+
+def test_a_lesson_opens_with_what_its_file_says() -> None:
+    opening = SceneChoice.opening("one-task")
+    resolved = opening.resolved()
+    assert opening.known and resolved.exercise == opening.exercise
+    assert resolved == SceneChoice.of_lesson(opening.exercise) if opening.exercise else False
+    assert resolved.resolved() is resolved
+
+
+class Unborn(Process):
+    """A process that waits for the compiler."""
+
+    def __init__(self) -> None:
+        pass
+
+    @property
+    def preparing(self) -> str:
+        return "compiling the controllers, this once: 3 of 40 functions"
+
+
+def test_a_page_says_at_once_what_is_compiled() -> None:
+    trouble = trouble_of(Unborn(), loading=False, quiet=0.1)
+    assert trouble is not None and trouble.offer is None
+    assert "3 of 40 functions" in trouble.sentence
