@@ -1,0 +1,71 @@
+"""What a start costs: CPU and wall time until the page listens, of lists and help, and of compiling.
+
+    python benchmarks/start.py [--runs 5] [--cold]
+
+CPU is of the process alone (user and system), medians of several runs; `--cold` also compiles once, into a
+folder of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+LISTS = (["--help"], ["scenes"], ["controllers"], ["robots"], ["lessons"])
+PAGES = ([], ["--lesson", "one-task"], ["--scene", "hold", "--urdf", "planar3"])
+COMPILE = "from himpc.cascade.compiling import compile_all; compile_all(lambda *_: None)"
+
+
+def cost(command: list[str], **environment: str) -> float:
+    """CPU of a command and its children, s."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, env={**os.environ, **environment}, capture_output=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def listening(arguments: list[str]) -> tuple[float, float]:
+    """(CPU of the server, wall time) until it prints that it is ready, s."""
+    began = time.perf_counter()
+    command = [sys.executable, "-m", "app", "--no-browser", "--port", "0", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
+        assert server.stdout is not None and "ready at" in server.stdout.readline()
+        wall = time.perf_counter() - began
+        with open(f"/proc/{server.pid}/stat") as stat:
+            fields = stat.read().rsplit(")", 1)[1].split()
+        server.send_signal(signal.SIGINT)
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), wall
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--cold", action="store_true")
+    given = parser.parse_args()
+    found: dict[str, object] = {}
+    for arguments in LISTS:
+        command = [sys.executable, "-m", "app", *arguments]
+        cpu = statistics.median(cost(command) for _ in range(given.runs))
+        found[f"himpc-lab {' '.join(arguments)}, CPU s"] = round(cpu, 3)
+    for arguments in PAGES:
+        times = [listening(arguments) for _ in range(given.runs)]
+        found[f"listening {' '.join(arguments)}, CPU s"] = round(statistics.median(t[0] for t in times), 3)
+        found[f"listening {' '.join(arguments)}, wall s"] = round(statistics.median(t[1] for t in times), 3)
+    if given.cold:
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, "-c", COMPILE]
+            cold = cost(command, NUMBA_CACHE_DIR=folder)
+            found["compiling, CPU s"] = round(cold - cost(command, NUMBA_CACHE_DIR=folder), 2)
+    print(json.dumps(found, indent=2))
+
+
+if __name__ == "__main__":
+    main()
