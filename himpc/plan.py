@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -25,35 +28,70 @@ class Binding(NamedTuple):
     slack: float
 
 
-class Plan(NamedTuple):
-    """The first input, the prediction, and per level what was found.
+class Evidence(NamedTuple):
+    """What a tick found besides the torque; attributes as in `Plan`."""
 
-    Attributes:
-        tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; what controllers
-            that know no bounds (OSF, TDEOSF) demand.
-        tau_0: torque that was applied last, (n,) N·m.
-        levels: one solution per active level, highest priority first.
-        q: predicted positions at knots 0 … N, (N+1, n).
-        errors: x̃ per task name, (m,) each.
-        values: x per task name.
-        rows: the bounds the last level was solved under.
-        limits: the bounds in force.
-        step_us: wall time from state to torque, microseconds, kinematics included.
-        unsolved: how many QPs had no verified point at the first attempt.
-        iterations: how many times the cascade was solved; 1 but for NHIMPC.
-    """
-
-    tau: Array
-    tau_0: Array
     levels: tuple[LevelSolution, ...]
     q: Array
     errors: dict[str, Array]
     values: dict[str, Array]
     rows: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The first input, the prediction, and per level what was found.
+
+    Its numbers are its own: a plan that is kept stays as it is.
+
+    Attributes:
+        tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; what controllers
+            that know no bounds (OSF, TDEOSF) demand.
+        tau_0: torque that was applied last, (n,) N·m.
+        limits: the bounds in force.
+        step_us: wall time from state to torque, microseconds, kinematics included.
+        unsolved: how many QPs had no verified point at the first attempt.
+        find_evidence: puts together what else was found, when somebody looks at it for the first time.
+        iterations: how many times the cascade was solved; 1 but for NHIMPC.
+    """
+
+    tau: Array
+    tau_0: Array
     limits: LimitsInForce
     step_us: float
     unsolved: int
+    find_evidence: Callable[[], Evidence]
     iterations: int = 1
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """What was found besides the torque."""
+        return self.find_evidence()
+
+    @property
+    def levels(self) -> tuple[LevelSolution, ...]:
+        """One solution per active level, highest priority first."""
+        return self.evidence.levels
+
+    @property
+    def q(self) -> Array:
+        """Predicted positions at knots 0 … N, (N+1, n)."""
+        return self.evidence.q
+
+    @property
+    def errors(self) -> dict[str, Array]:
+        """x̃ per task name, (m,) each."""
+        return self.evidence.errors
+
+    @property
+    def values(self) -> dict[str, Array]:
+        """x per task name."""
+        return self.evidence.values
+
+    @property
+    def rows(self) -> Rows:
+        """The bounds the last level was solved under."""
+        return self.evidence.rows
 
     @property
     def leak(self) -> float | None:

@@ -9,7 +9,7 @@ from app.commands.output import print_table, write_json
 
 
 def bench(ticks: int = 300, json: str | None = None) -> int:
-    """Time the control step: structured route against the explicit one with DAQP and with ProxQP.
+    """Time the control step: compiled route against the explicit one with DAQP and with ProxQP.
 
     Times are the whole step, state in and torque out, kinematics included; the contenders take turns.
 

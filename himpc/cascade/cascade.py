@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
 from itertools import accumulate, pairwise
 from time import perf_counter_ns
 from typing import Literal
@@ -12,20 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.explicit import solve_explicit
-from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, LevelSolution, Point, Rung
-from himpc.cascade.null_space import nested_bases
-from himpc.cascade.structured import solve_structured
-from himpc.cascade.triangular import solve_triangular
-from himpc.limits.rows import Rows, least_slack
+from himpc.cascade.last_resort import containing, last_resort, softened
+from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution, Point, Rung
+from himpc.cascade.null_space import nested_bases, whole_space
+from himpc.limits.rows import Rows
 from himpc.qp import Solver
+from himpc.tick.problems import solve_problems
 
 Array = NDArray[np.float64]
-Route = Literal["structured", "explicit"]
-ROUTES: tuple[Route, ...] = ("structured", "explicit")
+Route = Literal["compiled", "explicit"]
+ROUTES: tuple[Route, ...] = ("compiled", "explicit")
 RUNGS: tuple[Rung, ...] = ("solve", "soften", "previous", "inherit", "damping", "hold")
-
-_ROOM = 1e-7
-"""N·m added to the least slack, so that the widened rows have an interior to rounding."""
 
 
 def solve_cascade(
@@ -48,33 +44,28 @@ def solve_cascade(
         rows: all bounds of this tick.
         previous: last tick's solutions by level name: warm starts and the "previous" rung.
         damping: makes the damping problem for the last rung, which is hardly ever needed.
-        route: structured or explicit.
+        route: compiled or explicit.
         solver: QP solver.
     """
+    if route == "compiled":
+        return solve_problems(problems, rows, previous, damping)
     N, _, n = problems[0].B.shape
-    warm = [_fitting(previous.get(problem.name), rows) for problem in problems]
     upper = [problem.B for problem in problems[:-1]]
-    B = np.concatenate(upper, axis=1) if len(upper) > 1 else upper[0] if upper else np.empty((N, 0, n))
-    points = solve_triangular(problems, B, rows, warm) if route == "structured" else []
-    rungs: list[Rung] = ["solve"] * len(points)
-    if len(points) < len(problems):
-        U = points[-1].U if points else np.zeros((N, n))
-        above = [(problem.B, point.U) for problem, point in zip(problems, points, strict=False)]
-        bases = [_whole_space(N, n), *nested_bases(upper)]
-        for place in range(len(points), len(problems)):
-            started = perf_counter_ns()
-            problem, Z = problems[place], bases[place]
-            if Z.shape[2] == 0:
-                point, rung = Point(U, NO_ROWS, 0.0, "empty"), "solve"
-            else:
-                before = previous.get(problem.name)
-                point, rung, rows = _climb_down(
-                    problem, rows, U, above, Z, warm[place], before, damping, route, solver
-                )
-            U = point.U
-            above.append((problem.B, U))
-            points.append(point._replace(time_us=(perf_counter_ns() - started) / 1e3))
-            rungs.append(rung)
+    U, above = np.zeros((N, n)), []
+    points: list[Point] = []
+    rungs: list[Rung] = []
+    for problem, Z in zip(problems, [whole_space(N, n), *nested_bases(upper)], strict=True):
+        started = perf_counter_ns()
+        if Z.shape[2] == 0:
+            point, rung = Point(U, NO_ROWS, 0.0, "empty"), "solve"
+        else:
+            before = previous.get(problem.name)
+            point, rung, rows = _climb_down(problem, rows, U, above, Z, before, damping, solver)
+        U = point.U
+        above.append((problem.B, U))
+        points.append(point._replace(time_us=(perf_counter_ns() - started) / 1e3))
+        rungs.append(rung)
+    B = np.concatenate([np.empty((N, 0, n)), *upper], axis=1)
     leaks = _leaks(upper, B, [point.U for point in points])
     return [
         LevelSolution(
@@ -93,63 +84,32 @@ def solve_cascade(
     ]
 
 
-@lru_cache(maxsize=8)
-def _whole_space(N: int, n: int) -> Array:
-    return np.tile(np.eye(n), (N, 1, 1))
-
-
-def _fitting(before: LevelSolution | None, rows: Rows) -> ActiveRows:
-    """Last tick's active rows, if the horizon and the kinds of rows are still the same."""
-    if before is None or not before.active.row.size:
-        return NO_ROWS
-    return before.active if before.active.row.max() < len(rows.L) else NO_ROWS
-
-
 def _climb_down(
     problem: LevelProblem,
     rows: Rows,
     U: Array,
     above: list[tuple[Array, Array]],
     Z: Array,
-    warm: ActiveRows,
     before: LevelSolution | None,
     damping: Callable[[], LevelProblem],
-    route: Route,
     solver: Solver,
 ) -> tuple[Point, Rung, Rows]:
-    def attempt(problem: LevelProblem, rows: Rows, warm: ActiveRows = NO_ROWS) -> Point | None:
-        if route == "explicit":
-            return solve_explicit(problem, rows, U, above, Z, solver)
-        return solve_structured(problem, rows, U if above else None, Z, warm, solver)
-
-    point = attempt(problem, rows, warm)
+    point = solve_explicit(problem, rows, U, above, Z, solver)
     if point is not None:
         return point, "solve", rows
     if above:
         return Point(U, NO_ROWS, 0.0, "unsolved"), "inherit", rows
-    slack = least_slack(rows)
-    widened = rows.widened(np.where(slack > 0, slack + _ROOM, 0.0))
-    point = attempt(problem, widened) if slack.any() else None
-    if point is not None:
+    widened = softened(rows)
+    point = None if widened is None else solve_explicit(problem, widened, U, above, Z, solver)
+    if widened is not None and point is not None:
         return point, "soften", widened
-    torque = rows.torque_only()
-    if before is not None and before.U.shape == U.shape:
-        shifted = np.vstack([before.U[1:], np.zeros((1, U.shape[1]))])
-        value = torque.L @ shifted
-        if ((value >= torque.lower) & (value <= torque.upper)).all():
-            return Point(shifted, NO_ROWS, 0.0, "unsolved"), "previous", _containing(rows, shifted)
-    point = attempt(damping(), torque)
-    if point is not None:
-        return point._replace(kkt_residual=0.0, status="unsolved"), "damping", _containing(rows, point.U)
-    first = np.clip(np.zeros(U.shape[1]), torque.lower[0], torque.upper[0])
-    held = np.vstack([first, np.zeros((len(U) - 1, U.shape[1]))])
-    return Point(held, NO_ROWS, 0.0, "unsolved"), "hold", _containing(rows, held)
 
+    def damped(torque: Rows) -> Array | None:
+        found = solve_explicit(damping(), torque, U, above, Z, solver)
+        return None if found is None else found.U
 
-def _containing(rows: Rows, U: Array) -> Rows:
-    """The rows widened as far as U needs: lower levels then start from a feasible point."""
-    value = rows.L @ U
-    return rows._replace(lower=np.minimum(rows.lower, value), upper=np.maximum(rows.upper, value))
+    rung, held = last_resort(rows, None if before is None else before.U, damped)
+    return Point(held, NO_ROWS, 0.0, "unsolved"), rung, containing(rows, held)
 
 
 def _leaks(upper: Sequence[Array], B: Array, increments: Sequence[Array]) -> list[float]:

@@ -6,8 +6,10 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from hashlib import sha256
 from logging import getLogger
 from pathlib import Path
+from types import CellType, FunctionType
 from typing import Any
 
 from numba import boolean, float64, int64, intp, njit, types
@@ -52,7 +54,8 @@ def cached(**options: Any) -> Callable[[Function], Any]:
 inner = cached()
 """Compiles a function along with those `compiled` that call it; they stand below it."""
 
-quick = cached(fastmath={"reassoc", "contract", "nsz"})
+_ANY_ORDER = {"reassoc", "contract", "nsz"}
+quick = cached(fastmath=_ANY_ORDER)
 """The same for functions whose sums may be taken in any order; NaN and infinity keep their meaning."""
 
 
@@ -63,14 +66,39 @@ def compiled(*arguments: Any, by: Callable[[Function], Any] = inner) -> Callable
     that its compilation takes.
     """
 
+    return lambda function: _compiled_now(by(function), arguments)
+
+
+piece = njit(error_model="numpy", fastmath=_ANY_ORDER)
+"""Compiles a function as a part of the `entry` that calls it, wherever that stands."""
+
+
+def entry(*arguments: Any) -> Callable[[Function], Any]:
+    """As `compiled`, for a function with every `piece` of it in whatever file of its folder.
+
+    Numba takes a function on disk for current as long as its own file is unchanged. What a closure holds is
+    part of what it looks for, though: the function is given one with a digest of all files of the folder.
+    """
+
     def compile_now(function: Function) -> Any:
-        fast = by(function)
-        with _one_at_a_time(fast.stats.cache_path):
-            fast.compile(arguments)
-        fast.disable_compile()
-        return fast
+        code, digest = function.__code__, sha256()
+        for file in sorted(Path(code.co_filename).parent.glob("*.py")):
+            digest.update(file.read_bytes())
+        sources = CellType(digest.hexdigest())
+        stamped = FunctionType(
+            code.replace(co_freevars=("sources",)), function.__globals__, function.__name__, None, (sources,)
+        )
+        stamped.__module__, stamped.__qualname__ = function.__module__, function.__qualname__
+        return _compiled_now(cached(error_model="numpy", fastmath=_ANY_ORDER)(stamped), arguments)
 
     return compile_now
+
+
+def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
+    with _one_at_a_time(fast.stats.cache_path):
+        fast.compile(arguments)
+    fast.disable_compile()
+    return fast
 
 
 def _temporary_folder() -> str | None:

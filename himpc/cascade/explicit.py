@@ -1,4 +1,4 @@
-"""The explicit route: all rows and the equality constraints (33) as printed; the structured one's oracle."""
+"""The explicit route: all rows and the equality constraints (33) as printed; the compiled one's oracle."""
 
 from __future__ import annotations
 

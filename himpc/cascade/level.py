@@ -70,19 +70,6 @@ class ActiveRows:
     def __len__(self) -> int:
         return self.row.size
 
-    def only(self, which: NDArray[np.bool_]) -> ActiveRows:
-        """Some of the rows."""
-        return ActiveRows(self.row[which], self.joint[which], self.multiplier[which], self.slack[which])
-
-    def with_rows(self, row: NDArray[np.intp], joint: NDArray[np.intp], multiplier: Array) -> ActiveRows:
-        """These rows and others, without slack."""
-        return ActiveRows(
-            np.concatenate((self.row, row)),
-            np.concatenate((self.joint, joint)),
-            np.concatenate((self.multiplier, multiplier)),
-            np.zeros(self.row.size + row.size),
-        )
-
     def labelled(self, rows: Rows) -> list[tuple[Kind, int, int, float, float]]:
         """(kind, knot, joint index, multiplier, slack) of each active row."""
         return [

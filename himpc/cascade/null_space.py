@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from himpc.tick.kernel.constants import RANK_TOLERANCE
 
-RANK_TOLERANCE = 1e-10
-"""Singular values below this share of ‖B‖ count as zero: such a direction is left to lower levels."""
+Array = NDArray[np.float64]
 
 CLEARLY_REGULAR = 1e-5
 """Diagonals of a triangular factor above this share of the largest entry prove full rank, room to spare."""
@@ -45,6 +45,12 @@ def nested_bases(levels: Sequence[Array]) -> list[Array]:
         Z = shrink(Z, B) if Z.shape[2] else Z
         bases.append(Z)
     return bases
+
+
+@lru_cache(maxsize=8)
+def whole_space(N: int, n: int) -> Array:
+    """The basis of level 1, (N, n, n): everything is free."""
+    return np.tile(np.eye(n), (N, 1, 1))
 
 
 def shrink(Z: Array, B: Array) -> Array:

@@ -17,10 +17,13 @@ from himpc.controllers.forms import StackForm, measure, prepare, stack_form, usa
 from himpc.controllers.memory import Memory
 from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, Rows, build_rows, in_force, ramp
-from himpc.plan import Plan
+from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL
+from himpc.tick.problems import increments_of
+from himpc.tick.tables import LevelTable
+from himpc.tick.tick import CompiledTick, is_built_in
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -75,6 +78,8 @@ class HIMPC:
         """Forgets plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         self._tau_0 = np.array(tau_0, float)
         self._memory: Memory | None = None
+        if self.kernel is not None:
+            self.kernel.forget()
         unbounded = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
         self._limits = unbounded
         self._weight: dict[str, float] = {}
@@ -82,7 +87,11 @@ class HIMPC:
     def configure(self, settings: Settings) -> None:
         """Takes new settings at once. If they do not fit the robot: InputError, and nothing changes."""
         before = {form.name for form in self._form.levels}
+        if self.kernel is not None:
+            self._memory = self.kernel.memory
         self._apply(settings)
+        if self.kernel is not None and self._memory is not None:
+            self.kernel.recall(self._memory, self._memory.q, self._memory.v)
         for form in self._form.levels:
             if form.name not in before and form.level is not DAMPING_LEVEL:
                 self._weight[form.name] = 0.0
@@ -92,7 +101,17 @@ class HIMPC:
         self._M_bar = np.array(settings.M_bar)
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
+        # No joint gives more: a reading beyond it is wrong, and must not pass for a bound to come down from.
+        self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings = settings
+        self.kernel = self._compile() if settings.route == "compiled" else None
+
+    def _compile(self) -> CompiledTick | None:
+        """The kernel with these settings; None where a task is not one that it knows."""
+        if not is_built_in(self._form, self._off):
+            return None
+        levels = [] if self._idle else [LevelTable.of(level) for level in self._form.levels]
+        return CompiledTick(self.robot, self._settings, self._form, self._off, levels)
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
@@ -110,10 +129,12 @@ class HIMPC:
         """
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):
-            self._tau_0 = np.array(tau_applied, float)
+            self._tau_0 = np.minimum(np.maximum(tau_applied, -self._reach), self._reach)
         settings, T_s, N = self._settings, self._settings.T_s, self._settings.horizon
         if not usable(q) or not usable(v):
             return self._hold(q, started)
+        if self.kernel is not None:
+            return self._step_compiled(self.kernel, q, v, previews, started)
         memory = self._memory or Memory.start(q, v, T_s)
         state = JointState(q, v, (v - memory.v) / memory.period)
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, T_s)
@@ -134,20 +155,38 @@ class HIMPC:
             return self._hold(q, started)
         by_name = {solution.name: solution for solution in solutions}
         self._memory = Memory(q, v, T_s, found.x_dot, self._form, predicted_q, by_name)
+        evidence = Evidence(tuple(solutions), predicted_q, errors, values, rows)
         plan = Plan(
             tau=tau,
             tau_0=self._tau_0,
-            levels=tuple(solutions),
-            q=predicted_q,
-            errors=errors,
-            values=values,
-            rows=rows,
             limits=self._limits,
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=sum(solution.rung != "solve" for solution in solutions),
+            find_evidence=lambda: evidence,
             iterations=found.iterations,
         )
         self._tau_0 = tau
+        return plan
+
+    def _step_compiled(
+        self, tick: CompiledTick, q: Array, v: Array, previews: Mapping[str, Preview], started: int
+    ) -> Plan:
+        """`step` by the kernel."""
+        self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, self._settings.T_s)
+        if self._weight:
+            for place, level in enumerate(self._form.levels):
+                tick.fade(place, self._faded(level.name))
+
+        def damped(torque: Rows) -> Array | None:
+            form = stack_form(self.robot, (DAMPING_LEVEL,), self._settings)
+            here = Configuration(self.robot, self._data, q, v, np.tile(q, (self._settings.horizon - 1, 1)))
+            problems, _ = self._problems(form, here, Memory.start(q, v, self._settings.T_s), previews, {}, {})
+            return None if problems is None else increments_of(problems[0], torque)
+
+        plan = tick.step(q, v, previews, self._tau_0, self._limits, damped, started)
+        if plan is None:
+            return self._hold(q, started)
+        self._tau_0 = plan.tau
         return plan
 
     def _search(self, tick: Tick) -> Found | None:
@@ -220,6 +259,8 @@ class HIMPC:
         """The plan for a tick without a usable state: keep the torque, forget the memory."""
         N, n = self._settings.horizon, self.robot.n
         self._memory = None
+        if self.kernel is not None:
+            self.kernel.forget()
         limits: LimitsInForce = self._limits
         tau = np.clip(self._tau_0, limits.tau_lower, limits.tau_upper)
         still = np.zeros((N, n))
@@ -227,15 +268,13 @@ class HIMPC:
         held = LevelSolution(name, still, math.nan, NO_ROWS, 0.0, "state not finite", "hold", 0.0, 0.0, 0.0)
         state = JointState(np.zeros(n), np.zeros(n), np.zeros(n))
         self._tau_0 = tau
+        rows = build_rows(state, tau, self._M_bar, self._settings.limits, limits, N, self._settings.T_s)
+        evidence = Evidence((held,), np.tile(q, (N + 1, 1)), {}, {}, rows)
         return Plan(
             tau=tau,
             tau_0=tau,
-            levels=(held,),
-            q=np.tile(q, (N + 1, 1)),
-            errors={},
-            values={},
-            rows=build_rows(state, tau, self._M_bar, self._settings.limits, limits, N, self._settings.T_s),
             limits=limits,
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=1,
+            find_evidence=lambda: evidence,
         )

@@ -16,7 +16,7 @@ from himpc.configuration import Configuration
 from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, Rows, in_force, ramp
-from himpc.plan import Plan
+from himpc.plan import Evidence, Plan
 from himpc.references import Preview
 from himpc.tasks import Damping
 from robots import Robot
@@ -219,17 +219,14 @@ class OneStepController(ABC):
         values: dict[str, Array],
         started: int,
     ) -> Plan:
+        evidence = Evidence(tuple(levels), q, errors, values, self._rows(self._limits, self._tau_0))
         return Plan(
             tau=tau,
             tau_0=self._tau_0,
-            levels=tuple(levels),
-            q=q,
-            errors=errors,
-            values=values,
-            rows=self._rows(self._limits, self._tau_0),
             limits=self._limits,
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=sum(level.rung != "solve" for level in levels),
+            find_evidence=lambda: evidence,
         )
 
     def _rows(self, limits: LimitsInForce, origin: Array) -> Rows:

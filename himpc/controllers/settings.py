@@ -26,7 +26,7 @@ class Settings:
         T_s: control period, s.
         M_bar: diagonal of M̄, one per joint, kg·m².
         limits: bounds to impose.
-        route: "structured" (fast) or "explicit" (all rows as printed).
+        route: "compiled" (the kernel of `himpc.tick`) or "explicit" (all rows as printed).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
         R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ.
         damping: add the damping level whenever the enabled levels leave freedom.
@@ -38,7 +38,7 @@ class Settings:
     horizon: int = 5
     T_s: float = 1e-3
     limits: Limits = field(default_factory=Limits)
-    route: Route = "structured"
+    route: Route = "compiled"
     solver: Solver = "daqp"
     R_on: Literal["torque", "acceleration"] = "torque"
     damping: bool = True

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from time import perf_counter_ns
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem, LevelSolution
+from himpc.controllers.forms import LevelForm
 from himpc.controllers.himpc import HIMPC, Tick
 from himpc.plan import Plan
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL
+from himpc.tick.tables import LevelTable
+from himpc.tick.tick import CompiledTick, is_built_in
 
 Array = NDArray[np.float64]
 
@@ -41,7 +45,22 @@ class Weighted(HIMPC):
         """One control period, see `HIMPC.step`."""
         self._evidence_us = 0.0
         plan = super().step(q, v, previews, tau_applied)
-        return plan._replace(step_us=plan.step_us - self._evidence_us)
+        return replace(plan, step_us=plan.step_us - self._evidence_us)
+
+    def _compile(self) -> CompiledTick | None:
+        if not is_built_in(self._form, self._off):
+            return None
+        levels = [] if self._idle else list(accumulated(self._form.levels))
+        tick = CompiledTick(self.robot, self._settings, self._form, self._off, levels)
+        for place, level in enumerate(self._form.levels):
+            if level.name == DAMPING_LEVEL.name:
+                tick.fade(place, math.sqrt(DAMPING_SHARE))
+        return tick
+
+    def _faded(self, name: str) -> float:
+        share = super()._faded(name)
+        compiled = self.kernel is not None and name == DAMPING_LEVEL.name
+        return math.sqrt(DAMPING_SHARE) * share if compiled else share
 
     def _cascade(
         self, problems: list[LevelProblem], tick: Tick, damping: Callable[[], LevelProblem]
@@ -65,6 +84,14 @@ class Weighted(HIMPC):
         ]
         self._evidence_us = (perf_counter_ns() - started) / 1e3
         return solutions
+
+
+def accumulated(levels: Sequence[LevelForm]) -> Iterator[LevelTable]:
+    """Levels 1 … p in one cost, for every p; each entry's evidence is about level p."""
+    R, knots = np.zeros_like(levels[0].R), 0
+    for level in levels:
+        R, knots = R + level.R, max(knots, level.knots)
+        yield LevelTable(slice(0, level.rows.stop), knots, R, level.rows, level.knots, level.R, alone=True)
 
 
 def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:

@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.cascade.compiled import (
@@ -19,29 +18,11 @@ from himpc.cascade.compiled import (
     compiled,
     inner,
 )
+from himpc.geometry import Geometry, geometry
 from robots import Robot
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-
-class Geometry(NamedTuple):
-    """A robot's tree; row j belongs to joint j, row 0 to the world.
-
-    Attributes:
-        parent: (n+1,) the joint before; it always has a smaller number.
-        turn, shift: (n+1, 3, 3) and (n+1, 3) m, from the joint before to this one at q = 0.
-        axis: (n+1, 3) in the joint's own axes.
-        turns: (n+1,) 1 for a revolute joint, 0 for a prismatic one.
-        moves: (n+1, n) 1 where joint j is carried by the joint of a column.
-    """
-
-    parent: Indices
-    turn: Array
-    shift: Array
-    axis: Array
-    turns: Indices
-    moves: Array
 
 
 class Placed(NamedTuple):
@@ -54,31 +35,6 @@ class Placed(NamedTuple):
     R: Array
     p: Array
     z: Array
-
-
-@lru_cache(maxsize=32)
-def geometry(robot: Robot) -> Geometry:
-    """The tables of a robot."""
-    model, n = robot.model, robot.n
-    data = model.createData()
-    # One radian or metre from zero shows the axis of any kind of joint.
-    pin.forwardKinematics(model, data, np.ones(n))
-    axis, turns, moves = np.zeros((n + 1, 3)), np.zeros(n + 1, np.intp), np.zeros((n + 1, n))
-    for joint in range(1, n + 1):
-        motion = model.jointPlacements[joint].actInv(data.liMi[joint])
-        turning = pin.log3(motion.rotation)
-        turns[joint] = int(float(np.linalg.norm(turning)) > 0.5)
-        axis[joint] = turning if turns[joint] else motion.translation
-        axis[joint] /= np.linalg.norm(axis[joint])
-        moves[joint, [other - 1 for other in model.supports[joint] if other > 0]] = 1.0
-    return Geometry(
-        np.array([int(parent) for parent in model.parents], np.intp),
-        np.array([placement.rotation for placement in model.jointPlacements]),
-        np.array([placement.translation for placement in model.jointPlacements]),
-        axis,
-        turns,
-        moves,
-    )
 
 
 @inner

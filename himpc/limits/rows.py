@@ -62,7 +62,8 @@ REACTION = 5.0
 
 
 @lru_cache(maxsize=64)
-def _toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
+def toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
+    """L of `Rows`."""
     lag = np.subtract.outer(np.arange(N), np.arange(N)).astype(float)
     blocks = {
         "torque": np.where(lag >= 0, 1.0, 0.0),
@@ -73,7 +74,7 @@ def _toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _approached(N: int, share: float) -> Array:
+def approached(N: int, share: float) -> Array:
     """Share of the distance to a velocity bound that may be gone at knots 1 … N, (N, 1); 1 for share 0."""
     return 1.0 - np.asarray((1.0 - min(1.0, share or 1.0)) ** np.arange(1.0, N + 1)[:, None], np.float64)
 
@@ -112,14 +113,12 @@ def build_rows(
         v = np.array((-force.v_limit, force.v_limit))
     scale = M_bar / T_s
     velocity = bounds[:, N : 2 * N]
-    np.multiply(
-        _approached(N, limits.velocity_approach * T_s), ((v - state.v) * scale)[:, None], out=velocity
-    )
+    np.multiply(approached(N, limits.velocity_approach * T_s), ((v - state.v) * scale)[:, None], out=velocity)
     velocity -= state.gained_velocity(N, T_s) * scale
     if paper:
         q = np.array((force.q_lower, force.q_upper))[:, None]
         bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)
-    return Rows(_toeplitz(N, kinds), bounds[0], bounds[1], kinds, stopping)
+    return Rows(toeplitz(N, kinds), bounds[0], bounds[1], kinds, stopping)
 
 
 def least_slack(rows: Rows) -> Array:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from himpc.tick.kernel.constants import RETURN_RATE
 
-RETURN_RATE = 5.0
-"""1/s: a joint beyond its limit is asked to come back at this rate times the excess."""
+Array = NDArray[np.float64]
 
 
 def viability_bounds(

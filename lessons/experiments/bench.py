@@ -15,7 +15,7 @@ from lessons.session.torque import TorqueSession
 
 HORIZONS = (5, 10, 20, 30)
 CONTENDERS: tuple[tuple[Route, Solver], ...] = (
-    ("structured", "daqp"),
+    ("compiled", "daqp"),
     ("explicit", "daqp"),
     ("explicit", "proxqp"),
     ("explicit", "qpoases"),
@@ -90,17 +90,17 @@ def _spread(times: list[float]) -> dict[str, float]:
 
 
 def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
-    """How many times slower than the structured route, and ProxQP's QP time over DAQP's, per horizon."""
+    """How many times slower than the compiled route, and ProxQP's QP time over DAQP's, per horizon."""
     found = {(t.horizon, t.route, t.solver): t for t in timings}
     result = {}
     for N in sorted({t.horizon for t in timings}):
-        structured = found[N, "structured", "daqp"].step_ms["median"]
+        compiled = found[N, "compiled", "daqp"].step_ms["median"]
         if (N, "explicit", "daqp") not in found:
             continue
         daqp, proxqp = found[N, "explicit", "daqp"], found[N, "explicit", "proxqp"]
         result[str(N)] = {
-            "explicit_daqp_over_structured": daqp.step_ms["median"] / structured,
-            "explicit_proxqp_over_structured": proxqp.step_ms["median"] / structured,
+            "explicit_daqp_over_compiled": daqp.step_ms["median"] / compiled,
+            "explicit_proxqp_over_compiled": proxqp.step_ms["median"] / compiled,
             "proxqp_qp_over_daqp_qp": proxqp.qp_ms / daqp.qp_ms if daqp.qp_ms else None,
         }
         qpoases = found.get((N, "explicit", "qpoases"))

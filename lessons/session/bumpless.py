@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ class Handover:
             self._old = None
             return plan
         share = x * x * (3.0 - 2.0 * x)
-        return plan._replace(tau=(1.0 - share) * leaving + share * plan.tau)
+        return replace(plan, tau=(1.0 - share) * leaving + share * plan.tau)
 
 
 def settled(controller: Controller) -> Controller:

@@ -61,7 +61,7 @@ class TorqueSettings(Settings):
     horizon: int = 5
     T_s: float = 1e-3
     R_on: Literal["torque", "acceleration"] = "torque"
-    route: Literal["structured", "explicit"] = "structured"
+    route: Literal["compiled", "explicit"] = "compiled"
     solver: Literal["daqp", "proxqp", "qpoases"] = "daqp"
     damping: bool = True
     deadline_ms: float = 0.0

@@ -51,7 +51,7 @@ class Hierarchy:
 
     def solve(
         self,
-        route: Route = "structured",
+        route: Route = "compiled",
         solver: Solver = "daqp",
         previous: dict[str, LevelSolution] | None = None,
     ) -> list[LevelSolution]:

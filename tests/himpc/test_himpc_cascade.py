@@ -26,15 +26,15 @@ depths = st.integers(1, 4)
 @given(seeds, joints, horizons, depths, st.booleans(), st.sampled_from([1.0, 5.0, 30.0]))
 @settings(max_examples=250)
 def test_routes_agree(seed: int, n: int, N: int, levels: int, position_rows: bool, room: float) -> None:
-    """The structured route solves every feasible hierarchy, and equals the explicit one to 1e-6 N·m."""
+    """The compiled route solves every feasible hierarchy, and equals the explicit one to 1e-6 N·m."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
-    structured = hierarchy.solve("structured")
-    assert_sound(hierarchy, structured)
-    assert max(solution.leak for solution in structured) <= 1e-6
+    compiled = hierarchy.solve("compiled")
+    assert_sound(hierarchy, compiled)
+    assert max(solution.leak for solution in compiled) <= 1e-6
     explicit = hierarchy.solve("explicit")
     # The oracle must have an accurate point: DAQP refuses about one in a hundred of the large explicit QPs.
     assume(all(solution.rung == "solve" and solution.kkt_residual <= 1e-9 for solution in explicit))
-    assert largest_difference(structured, explicit) <= 1e-6
+    assert largest_difference(compiled, explicit) <= 1e-6
 
 
 def test_the_random_hierarchies_bind() -> None:
@@ -55,7 +55,7 @@ def test_proxqp_agrees_where_it_solves(seed: int, n: int, N: int, levels: int) -
         H, f = quadratic(problem)
         scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(solution.U)), float(np.linalg.norm(f)))
         assume(solution.rung == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6)
-    assert_agree(hierarchy.solve("structured"), proxqp)
+    assert_agree(hierarchy.solve("compiled"), proxqp)
 
 
 @pytest.mark.skipif(not is_installed("qpoases"), reason="CasADi, which brings qpOASES, is not installed")
@@ -65,7 +65,7 @@ def test_qpoases_agrees(seed: int) -> None:
     hierarchy = random_hierarchy(seed, 5, 4, 3)
     qpoases = hierarchy.solve("explicit", "qpoases")
     assert all(solution.rung == "solve" for solution in qpoases)
-    assert_agree(hierarchy.solve("structured"), qpoases)
+    assert_agree(hierarchy.solve("compiled"), qpoases)
 
 
 @given(seeds, joints, horizons, st.integers(2, 4))
@@ -100,10 +100,10 @@ def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade
     size = 0.0 if decade is None else 10**decade
     assert size < 0.01 * RANK_TOLERANCE or size > 100 * RANK_TOLERANCE
     hierarchy = singular_hierarchy(seed, n, N, size)
-    structured, explicit = hierarchy.solve("structured"), hierarchy.solve("explicit")
-    assert_sound(hierarchy, structured)
+    compiled, explicit = hierarchy.solve("compiled"), hierarchy.solve("explicit")
+    assert_sound(hierarchy, compiled)
     assume(all(solution.rung == "solve" for solution in explicit))
-    assert largest_difference(structured, explicit) <= 1e-6
+    assert largest_difference(compiled, explicit) <= 1e-6
 
 
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-12, -8))
@@ -124,7 +124,7 @@ def test_no_freedom_left_keeps_the_upper_levels() -> None:
     everything = random_hierarchy(4, 4, 5, 1).problems[0]
     full = replace_rows(everything, np.random.default_rng(0).normal(0, 1, (5, 4, 4)))
     stack = Hierarchy([full, hierarchy.problems[0]._replace(name="last")], hierarchy.rows)
-    for route in ("structured", "explicit"):
+    for route in ("compiled", "explicit"):
         first, last = stack.solve(route)
         np.testing.assert_array_equal(first.U, last.U)
         assert (last.rung, last.status) == ("solve", "empty")

@@ -52,7 +52,7 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
     scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
     third = Level((Joints(name="q1", joints=robot.joint_names[:1]),))
     settings = replace(scene.settings, levels=(*scene.settings.levels[:2], third))
-    for route in ("structured", "explicit"):
+    for route in ("compiled", "explicit"):
         session = TorqueSession(replace(scene, settings=replace(settings, route=route)))
         start = session.robot.home
         session.post(Set("levels.q1.K_p", 400))
@@ -111,7 +111,7 @@ kinds = st.sampled_from(["fine", "fine", "huge", "nan", "inf", "tiny"])
     seed=st.integers(0, 2**32 - 1),
     states=st.lists(st.tuples(kinds, kinds, kinds, kinds), min_size=1, max_size=4),
     N=st.integers(1, 8),
-    route=st.sampled_from(["structured", "explicit"]),
+    route=st.sampled_from(["compiled", "explicit"]),
     solver=st.sampled_from(["daqp", "daqp", "daqp", "proxqp"]),
     position=st.sampled_from(["viability", "paper", "off"]),
 )

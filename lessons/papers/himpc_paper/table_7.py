@@ -41,7 +41,7 @@ def _table_7(results: Results, quick: bool) -> Section:
             paper[controller][kind],
             ours[controller][kind],
             trouble(results[timed(controller, 5, quick)])
-            or "another machine, and the structured route with DAQP instead of qpOASES or CasADi's SQP",
+            or "another machine, and a compiled active-set method instead of qpOASES or CasADi's SQP",
         )
         for controller in ("himpc", "nhimpc")
         for kind in ("average", "median", "maximum")

@@ -1,0 +1,203 @@
+"""The dual active-set method of Goldfarb and Idnani (1983) for one level, from the rows of the tick before.
+
+The method keeps a point that is optimal under the rows taken so far, as equalities whose multipliers push the
+right way, and takes one violated row after the other; the cost only grows, so no set comes twice and it ends.
+A row that depends on those taken replaces the one it relieves.
+"""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.bounds import sums
+from himpc.tick.kernel.level import Level, increments
+from himpc.tick.kernel.linear import backward
+from himpc.tick.kernel.taken import Taken, balance, fix, move, normal_of, refine, resolve, settle, without
+
+TOLERANCE = 1e-9
+"""N·m: a row violated by less counts as met."""
+_NOISE = 1e-12
+"""Multipliers that change by less than this share of the one that changes most do not change."""
+_ROUNDED = 1e-7
+"""N·m: a row that nothing can move any more and that is violated by less is met, up to rounding."""
+
+FAILED = -1.0
+
+
+@piece
+def worst(value: Array, low: Array, high: Array) -> tuple[float, int, int, int]:
+    """The row that is violated most: by how much, row, joint and side. What is not a number is violated."""
+    most, row, joint, side = 0.0, -1, -1, 0
+    for r in range(len(value)):
+        for a in range(value.shape[1]):
+            above, below = value[r, a] - high[r, a], low[r, a] - value[r, a]
+            if above > most:
+                most, row, joint, side = above, r, a, 1
+            if below > most:
+                most, row, joint, side = below, r, a, -1
+            if value[r, a] != value[r, a]:
+                return math.inf, r, a, 1
+    return most, row, joint, side
+
+
+@piece
+def warm_rows(
+    level: Level,
+    taken: Taken,
+    count: int,
+    row: Whole,
+    joint: Whole,
+    pressed: Array,
+    L: Array,
+    low: Array,
+    high: Array,
+    budget: Array,
+) -> int:
+    """Takes the rows that pressed a tick ago, but for those that depend on others; returns how many."""
+    d, D = level.offset[len(level.start)], level.rest[len(level.start)]
+    enough = 0.5 * budget[0]
+    k = 0
+    for p in range(count):
+        taken.row[k], taken.joint[k] = row[p], joint[p]
+        taken.side[k] = 1 if pressed[p] > 0.0 else -1
+        bound = high[row[p], joint[p]] if pressed[p] > 0.0 else low[row[p], joint[p]]
+        if k >= D or not math.isfinite(bound) or budget[0] < enough:
+            continue
+        normal_of(level, taken, k, L, low, high)
+        budget[0] -= 0.5 * d * d
+        length = resolve(taken, k, D, budget)
+        if length > 0.0:
+            fix(taken, k, length, D)
+            k += 1
+    return k
+
+
+@piece
+def release(level: Level, taken: Taken, k: int, ideal: Array, budget: Array) -> int:
+    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay."""
+    D = level.rest[len(level.start)]
+    while True:
+        kept = k
+        for p in range(k - 1, -1, -1):
+            if not taken.pull[p] * taken.side[p] > 0.0:
+                without(taken, p, kept, D, budget)
+                kept -= 1
+        if kept == k:
+            return k
+        k = kept
+        balance(level, taken, k, ideal)
+
+
+@piece
+def take(level: Level, taken: Taken, k: int, excess: float, budget: Array) -> tuple[bool, int]:
+    """Takes the row at place k, violated by `excess`, as an equality: the dual step. Returns whether a point
+    meets this row and the others, within the budget, and how many rows are taken then."""
+    D = level.rest[len(level.start)]
+    side = float(taken.side[k])
+    taken.pull[k] = 0.0
+    while True:
+        length = resolve(taken, k, D, budget)
+        change = taken.change
+        for q in range(k):
+            change[q] = taken.corner[k, q]
+        backward(taken.corner, change, k)
+        # How far until the first multiplier is used up, and how far until the row is met.
+        first, reach, noise = -1, math.inf, 0.0
+        for q in range(k):
+            noise = max(noise, _NOISE * abs(change[q]))
+        for q in range(k):
+            rate = side * change[q] * taken.side[q]
+            if rate > noise:
+                far = taken.pull[q] * taken.side[q] / rate
+                if far < reach:
+                    first, reach = q, far
+        whole = excess / (length * length) if length > 0.0 else math.inf
+        step = min(reach, whole)
+        if not step < math.inf or budget[0] < 0.0:
+            return False, k
+        for q in range(k):
+            taken.pull[q] -= step * side * change[q]
+        taken.pull[k] += step * side
+        if whole <= reach:
+            fix(taken, k, length, D)
+            return True, k + 1
+        excess -= step * length * length
+        taken.pull[first] = 0.0
+        without(taken, first, k, D, budget)
+        move(taken, k, k - 1, D)
+        k -= 1
+
+
+@piece
+def optimum(
+    level: Level,
+    taken: Taken,
+    count: int,
+    row: Whole,
+    joint: Whole,
+    pressed: Array,
+    L: Array,
+    low: Array,
+    high: Array,
+    ideal: Array,
+    U: Array,
+    value: Array,
+    budget: Array,
+) -> tuple[float, int]:
+    """The level's optimum under low ≤ L U ≤ high: its KKT residual and how many rows hold it; FAILED if none
+    was found within the budget.
+
+    Args:
+        level: prepared.
+        taken: scratch; holds the active rows and their multipliers afterwards.
+        count, row, joint, pressed: the rows active a tick ago and their multipliers.
+        L, low, high: all bounds.
+        ideal: from `prepare`.
+        U: the increments found, (N, n).
+        value: L U, (b, n).
+        budget: how many multiplications are left, one number: time, but the same on every machine.
+    """
+    N = len(level.start)
+    d, D = level.offset[N], level.rest[N]
+    look = float(d * d + U.size * U.shape[1] + 4 * value.size)
+    k = warm_rows(level, taken, count, row, joint, pressed, L, low, high, budget)
+    balance(level, taken, k, ideal)
+    k = release(level, taken, k, ideal, budget)
+    settle(level, taken, k, ideal)
+    while True:
+        budget[0] -= 3.0 * look + 4.0 * k * D
+        kkt = refine(level, taken, k)
+        if kkt < 0.0 or budget[0] < 0.0:
+            return FAILED, 0
+        kept = release(level, taken, k, ideal, budget)
+        if kept < k:
+            k = kept
+            settle(level, taken, k, ideal)
+            continue
+        increments(level, U)
+        sums(U, value)
+        excess, r, a, side = worst(value, low, high)
+        if not excess > TOLERANCE:
+            return kkt, k
+        while excess > TOLERANCE:
+            if not excess < math.inf:
+                return FAILED, 0
+            taken.row[k], taken.joint[k], taken.side[k] = r, a, side
+            budget[0] -= look + 2.0 * k * D
+            normal_of(level, taken, k, L, low, high)
+            met, k = take(level, taken, k, excess, budget)
+            if not met:
+                if excess > _ROUNDED or budget[0] < 0.0:
+                    return FAILED, 0
+                if side > 0:
+                    high[r, a] += excess
+                else:
+                    low[r, a] -= excess
+                balance(level, taken, k, ideal)
+                k = release(level, taken, k, ideal, budget)
+            settle(level, taken, k, ideal)
+            increments(level, U)
+            sums(U, value)
+            excess, r, a, side = worst(value, low, high)

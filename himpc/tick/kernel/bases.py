@@ -1,0 +1,92 @@
+"""What (33) leaves free at each knot: orthonormal coordinates in which the cascade is triangular."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.constants import RANK_TOLERANCE
+from himpc.tick.kernel.linear import dot, subtract
+
+
+@piece
+def no_directions(Q: Array) -> None:
+    """Q (n, n) of a knot before any level took part: the identity."""
+    Q[:] = 0.0
+    for a in range(len(Q)):
+        Q[a, a] = 1.0
+
+
+@piece
+def seen_rows(
+    B: Array, metric: Array, reflector: Array, count: int, first: int, last: int, seen: Array
+) -> None:
+    """Rows of one knot in its coordinates: seen_i = (b_i ∘ metric) Q.
+
+    Args:
+        B: Ĵ M̄⁻¹ of the knot, (m, n).
+        metric: √(ρ/R) per joint: U = metric ∘ V makes the effort ρ‖V‖².
+        reflector, count: the reflections whose product is Q so far.
+        first, last: which rows.
+        seen: (m, n), the result.
+    """
+    n = metric.size
+    for i in range(first, last):
+        row = seen[i]
+        for a in range(n):
+            row[a] = B[i, a] * metric[a]
+        for c in range(count):
+            reflect(reflector[c], row, c)
+
+
+@piece
+def reflect(v: Array, x: Array, first: int) -> None:
+    """x ← (1 − v vᵀ) x from index `first` on; ‖v‖² = 2."""
+    n = x.size - first
+    subtract(dot(v[first:], x[first:], n), v[first:], x[first:], n)
+
+
+@piece
+def take_directions(seen: Array, first: int, last: int, count: int, reflector: Array, Q: Array) -> int:
+    """Householder QR of a level's rows within what the levels above left, one knot; returns how many
+    directions are taken then. The level sees those before that number only; the rest is left to lower levels.
+
+    The row with most left is taken next, so what remains tells the rank: directions that the level feels by
+    less than RANK_TOLERANCE of the size of its rows are left to lower levels.
+
+    Args:
+        seen: the level's rows in the coordinates so far, (m, n); then in the new ones.
+        first, last: which rows.
+        count: how many directions the levels above took.
+        reflector: (n, n), one more reflection for each direction.
+        Q: (n, n), its columns the directions; the first `count` stay as they are.
+    """
+    n = len(Q)
+    size = 0.0
+    for i in range(first, last):
+        size += dot(seen[i], seen[i], n)
+    # Each row once: a row that was taken has nothing left beyond its direction but rounding.
+    for _ in range(min(last - first, n - count)):
+        best, most = first, -1.0
+        for i in range(first, last):
+            left = dot(seen[i, count:], seen[i, count:], n - count)
+            if left > most:
+                best, most = i, left
+        if not most > RANK_TOLERANCE * RANK_TOLERANCE * size:
+            break
+        v, row = reflector[count], seen[best]
+        for a in range(count, n):
+            v[a] = row[a]
+        v[count] += math.copysign(math.sqrt(most), row[count])
+        scale = math.sqrt(2.0 / dot(v[count:], v[count:], n - count))
+        for a in range(count, n):
+            v[a] *= scale
+        for i in range(first, last):
+            reflect(v, seen[i], count)
+        for a in range(count + 1, n):
+            row[a] = 0.0
+        for a in range(n):
+            reflect(v, Q[a], count)
+        count += 1
+    return count

@@ -1,0 +1,94 @@
+"""The bounds (32d)–(32f) over the horizon, and what increments make of them."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.constants import RETURN_RATE
+
+VIABILITY, PAPER, OFF = range(3)
+"""How position limits are kept."""
+
+
+@piece
+def viable_speed(room: float, v_limit: float, a_max: float, reaction: float) -> float:
+    """The speed from which a joint can still stop within `room`, see `limits.viability`; past the limit the
+    speed of return, negative."""
+    inside = max(room, 0.0)
+    reach = min(v_limit, a_max * (math.sqrt(reaction * reaction + (2.0 / a_max) * inside) - reaction))
+    return reach + max(RETURN_RATE * min(room, 0.0), -v_limit)
+
+
+@piece
+def bounds(
+    q: Array,
+    v: Array,
+    v_was: Array,
+    tau_0: Array,
+    M_bar: Array,
+    limits: Array,
+    approach: Array,
+    mode: int,
+    reaction: float,
+    period: float,
+    T_s: float,
+    lower: Array,
+    upper: Array,
+    stopping: Array,
+) -> None:
+    """Bounds on L U in N·m, (b, n): torque (32f), velocity (32e) scaled by M̄/T_s and, as printed, position
+    (32d) by M̄/T_s²; see `limits.build_rows`.
+
+    Args:
+        q, v, v_was: measured state, and the velocity one `period` ago, (n,).
+        tau_0: torque that acts now, (n,) N·m.
+        M_bar: diagonal of M̄, (n,).
+        limits: (6, n) torque, velocity limit, positions (stops but for PAPER), and deceleration.
+        approach: share of the distance to a velocity bound that may be gone at knots 1 … N.
+        mode: VIABILITY, PAPER or OFF.
+        reaction: s, see `viable_speed`.
+        period, T_s: s since the last tick, and of this one.
+        lower, upper: the result.
+        stopping: (2, n), 1 where a velocity row is the position limit's, see `Rows`.
+    """
+    N = approach.size
+    for a in range(q.size):
+        q_dd = (v[a] - v_was[a]) / period
+        v_low, v_high = -limits[2, a], limits[2, a]
+        if mode == VIABILITY:
+            down = -viable_speed(q[a] - limits[3, a], limits[2, a], limits[5, a], reaction)
+            up = viable_speed(limits[4, a] - q[a], limits[2, a], limits[5, a], reaction)
+            v_low, v_high = min(down, up), max(down, up)
+            stopping[0, a], stopping[1, a] = -v_low < limits[2, a], v_high < limits[2, a]
+        scale = M_bar[a] / T_s
+        for j in range(N):
+            lower[j, a], upper[j, a] = limits[0, a] - tau_0[a], limits[1, a] - tau_0[a]
+            gained = T_s * (j + 1.0) * q_dd * scale
+            lower[N + j, a] = approach[j] * ((v_low - v[a]) * scale) - gained
+            upper[N + j, a] = approach[j] * ((v_high - v[a]) * scale) - gained
+            if mode == PAPER:
+                t = T_s * (j + 1.0)
+                free = q[a] + t * v[a] + 0.5 * t * (t - T_s) * q_dd
+                lower[2 * N + j, a] = (limits[3, a] - free) * (scale / T_s)
+                upper[2 * N + j, a] = (limits[4, a] - free) * (scale / T_s)
+
+
+@piece
+def sums(U: Array, value: Array) -> None:
+    """L U, (b, n): torque rows are running sums of the increments, velocity rows of these, and position rows,
+    one knot later, of those."""
+    N, n = U.shape
+    kinds = len(value) // N
+    for a in range(n):
+        torque, velocity, position = 0.0, 0.0, 0.0
+        for j in range(N):
+            torque += U[j, a]
+            position += velocity
+            velocity += torque
+            value[j, a] = torque
+            if kinds > 1:
+                value[N + j, a] = velocity
+            if kinds > 2:
+                value[2 * N + j, a] = position

@@ -1,0 +1,190 @@
+"""From Problem 1 to Problem r: each level within what (33) leaves of those above."""
+
+from __future__ import annotations
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.active_set import FAILED, optimum
+from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.bases import no_directions, seen_rows, take_directions
+from himpc.tick.kernel.bounds import sums
+from himpc.tick.kernel.level import Level, prepare
+from himpc.tick.kernel.linear import dot
+from himpc.tick.kernel.taken import Taken
+
+FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
+"""Columns of the table of levels: its rows; how many knots it counts; whether its efforts are measured unlike
+those of the level above, so that directions must be found anew; whether (33) does not bind it; and the rows
+and knots that its evidence is about, which are its own also where priorities are left out."""
+
+
+@piece
+def own_directions(
+    place: int,
+    levels: Whole,
+    B: Array,
+    metric: Array,
+    reflector: Array,
+    Q: Array,
+    seen: Array,
+    count: Whole,
+    start: Whole,
+) -> None:
+    """Directions of a level at every knot: those of the levels above up to `start`, its own up to `count`."""
+    N, _, n = B.shape
+    above = 0 if levels[place, ALONE] else place
+    afresh = above == 0 or levels[place, AFRESH]
+    first, last = levels[place, FIRST], levels[place, LAST]
+    # What the last level leaves nobody needs: if it may want all that is left, it takes part as it is.
+    whole = place == len(levels) - 1 or levels[place, ALONE]
+    for j in range(N):
+        if afresh:
+            no_directions(Q[j])
+            count[j] = 0
+            for p in range(above):
+                seen_rows(B[j], metric, reflector[j], count[j], levels[p, FIRST], levels[p, LAST], seen[j])
+                count[j] = take_directions(
+                    seen[j], levels[p, FIRST], levels[p, LAST], count[j], reflector[j], Q[j]
+                )
+        start[j] = count[j]
+        seen_rows(B[j], metric, reflector[j], count[j], first, last, seen[j])
+        if whole and last - first >= n - count[j]:
+            count[j] = n
+        else:
+            count[j] = take_directions(seen[j], first, last, count[j], reflector[j], Q[j])
+
+
+@piece
+def keep_above(level: Level, U_above: Array, knots: int) -> None:
+    """What (33) fixes of U_{i−1}, (N, n): its part in the directions of the levels above; all of it beyond
+    the level's own horizon (Remark 8)."""
+    N, n = U_above.shape
+    fixed, Q, metric = level.fixed, level.Q, level.metric
+    for j in range(N):
+        for a in range(n):
+            fixed[j, a] = U_above[j, a] if j >= knots else 0.0
+        for c in range(level.start[j] if j < knots else 0):
+            along = 0.0
+            for a in range(n):
+                along += Q[j, a, c] * U_above[j, a] / metric[a]
+            for a in range(n):
+                fixed[j, a] += metric[a] * Q[j, a, c] * along
+
+
+@piece
+def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Whole, rest: Whole) -> int:
+    """Where own coordinates and those beyond stand, see `Level`; returns how many there are."""
+    N = len(start)
+    offset[0] = 0
+    for j in range(N):
+        offset[j + 1] = offset[j] + (count[j] - start[j] if j < knots else 0)
+    rest[0] = offset[N]
+    for j in range(N):
+        rest[j + 1] = rest[j] + (n - count[j] if j < knots else 0)
+    return rest[N]
+
+
+@piece
+def solve_level(
+    place: int,
+    levels: Whole,
+    level: Level,
+    taken: Taken,
+    B: Array,
+    free: Array,
+    root_Q: Array,
+    U: Array,
+    count: int,
+    row: Whole,
+    joint: Whole,
+    pressed: Array,
+    L: Array,
+    lower: Array,
+    upper: Array,
+    low: Array,
+    high: Array,
+    value: Array,
+    ideal: Array,
+    budget: Array,
+    room: float,
+) -> tuple[float, int]:
+    """Problem i, whose directions are known, into U[i]: its KKT residual and how many rows hold it; FAILED if
+    no optimum was found.
+
+    Args:
+        place, levels: i and the table of levels.
+        level, taken, ideal, value: scratch, see `optimum`.
+        B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
+        U: (r, N, n) increments of all levels, those above known.
+        count, row, joint, pressed: the rows active a tick ago.
+        L, lower, upper: all bounds.
+        low, high: what they are for this level.
+        budget: multiplications left.
+        room: N·m, how far bounds give way around U_{i−1}.
+    """
+    _, N, n = U.shape
+    alone = place == 0 or levels[place, ALONE] == 1
+    knots = levels[place, KNOTS]
+    if alone:
+        level.fixed[:] = 0.0
+        low[:] = lower
+        high[:] = upper
+    else:
+        keep_above(level, U[place - 1], knots)
+        # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
+        sums(U[place - 1], value)
+        for r in range(len(value)):
+            for a in range(n):
+                low[r, a] = min(lower[r, a], value[r, a] - room)
+                high[r, a] = max(upper[r, a], value[r, a] + room)
+        if level.rest[N] == 0:
+            U[place] = U[place - 1]
+            return 0.0, 0
+    if not prepare(level, B, free, root_Q, ideal):
+        return FAILED, 0
+    return optimum(level, taken, count, row, joint, pressed, L, low, high, ideal, U[place], value, budget)
+
+
+@piece
+def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whole, knots: int) -> float:
+    """The value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
+    total = 0.0
+    for i in range(first, last):
+        for k in range(row_knots[i]):
+            total += e[k, i] * e[k, i]
+    for j in range(knots):
+        for a in range(U.shape[1]):
+            total += R[a] * U[j, a] * U[j, a]
+    return total
+
+
+@piece
+def leak_of(place: int, levels: Whole, effect: Array) -> float:
+    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect (r, N, m) is J M̄⁻¹ Δτ."""
+    most = 0.0
+    N = effect.shape[1]
+    for p in range(place):
+        for j in range(N):
+            for i in range(levels[p, OWN_FIRST], levels[p, OWN_LAST]):
+                most = max(most, abs(effect[place, j, i] - effect[p, j, i]))
+    return most
+
+
+@piece
+def predict(
+    q: Array, v: Array, v_was: Array, U: Array, M_bar: Array, period: float, T_s: float, path: Array
+) -> None:
+    """q at knots 0 … N under the increments, (N+1, n), by (18), see `prediction.joint`."""
+    for a in range(q.size):
+        position, speed, acceleration = q[a], v[a], (v[a] - v_was[a]) / period
+        path[0, a] = position
+        for j in range(len(U)):
+            acceleration += U[j, a] / M_bar[a]
+            position += T_s * speed
+            speed += T_s * acceleration
+            path[j + 1, a] = position
+
+
+@piece
+def finite(x: Array) -> bool:
+    """Finite, and small enough that its squares and the bounds' differences stay so."""
+    return dot(x, x, x.size) < 1e18

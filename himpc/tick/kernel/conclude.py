@@ -1,0 +1,88 @@
+"""Entry: evidence, torque and prediction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from himpc.cascade.compiled import INDICES, VECTOR, WHOLE, entry
+from himpc.tick.kernel.arena import AT, PERIOD, T_S, WHOLE_AT, Whole
+from himpc.tick.kernel.cascade import (
+    ALONE,
+    OWN_FIRST,
+    OWN_KNOTS,
+    OWN_LAST,
+    cost_of,
+    finite,
+    leak_of,
+    predict,
+)
+from himpc.tick.kernel.residual import add_effects, effects
+from himpc.tick.kernel.views import matrices, matrix, vector
+
+
+@entry(VECTOR, INDICES, INDICES, INDICES, WHOLE)
+def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
+    """Evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18). False if the
+    torque is not finite; else the tick is remembered, if it is to be kept."""
+    s = vector(whole, whole_where[WHOLE_AT.sizes], 10)
+    n, N, M, m, r, k = s[0], s[1], s[2], s[3], s[4], s[8] + 1
+    last = max(r, 1) - 1
+    levels = matrix(whole, whole_where[WHOLE_AT.level], r, 8)
+    U, effect = matrices(data, where[AT.U], last + 1, N, n), matrices(data, where[AT.effect], r, N, M)
+    B, free = matrices(data, where[AT.B], N, M, n), matrix(data, where[AT.free], N, M)
+    root_Q, C = vector(data, where[AT.root_Q], M), matrix(data, where[AT.C], M, N)
+    e, row_knots = matrix(data, where[AT.e_1], N, M), vector(whole, whole_where[WHOLE_AT.row_knots], M)
+    R = matrix(data, where[AT.R], r, n)
+    q, v = vector(data, where[AT.q], n), vector(data, where[AT.v], n)
+    q_was, v_was = vector(data, where[AT.q_was], n), vector(data, where[AT.v_was], n)
+    for i in range(r):
+        effects(B, U[i], 0, m, effect[i])
+    for i in range(r):
+        applied = last if levels[last, ALONE] else i
+        first, end = levels[i, OWN_FIRST], levels[i, OWN_LAST]
+        for j in range(N):
+            for row in range(first, end):
+                e[j, row] = root_Q[row] * free[j, row]
+        add_effects(C, effect[applied], first, end, row_knots, e)
+        data[where[AT.cost] + i] = cost_of(e, U[applied], R[i], first, end, row_knots, levels[i, OWN_KNOTS])
+        data[where[AT.leak] + i] = leak_of(i, levels, effect)
+    tau_0, tau = vector(data, where[AT.tau_0], n), vector(data, where[AT.tau], n)
+    bound, predicted = matrix(data, where[AT.limits], 6, n), matrix(data, where[AT.predicted], N + 1, n)
+    for a in range(n):
+        tau[a] = min(max(tau_0[a] + U[last, 0, a], bound[0, a]), bound[1, a])
+    predict(
+        q,
+        v,
+        v_was,
+        U[last],
+        vector(data, where[AT.M_bar], n),
+        data[where[AT.scalars] + PERIOD],
+        data[where[AT.scalars] + T_S],
+        predicted,
+    )
+    if not finite(tau):
+        return False
+    if keep:
+        q_was[:] = q
+        v_was[:] = v
+        vector(data, where[AT.x_dot_was], M)[:] = vector(data, where[AT.x_dot], M)
+        matrix(data, where[AT.path], N + 1, n)[:] = predicted
+        matrices(data, where[AT.U_was], last + 1, N, n)[:] = U
+        data[where[AT.scalars] + PERIOD] = data[where[AT.scalars] + T_S]
+        whole[whole_where[WHOLE_AT.known] + 1] = 1
+        pressed_row, pressed_joint = (
+            matrix(whole, whole_where[WHOLE_AT.pressed_row], r, k),
+            matrix(whole, whole_where[WHOLE_AT.pressed_joint], r, k),
+        )
+        active_row, active_joint = (
+            matrix(whole, whole_where[WHOLE_AT.active_row], r, k),
+            matrix(whole, whole_where[WHOLE_AT.active_joint], r, k),
+        )
+        pressed, multiplier = matrix(data, where[AT.pressed], r, k), matrix(data, where[AT.multiplier], r, k)
+        for i in range(r):
+            active = whole[whole_where[WHOLE_AT.active_count] + i]
+            whole[whole_where[WHOLE_AT.pressed_count] + i] = active
+            for p in range(active):
+                pressed_row[i, p], pressed_joint[i, p] = active_row[i, p], active_joint[i, p]
+                pressed[i, p] = multiplier[i, p]
+    return True

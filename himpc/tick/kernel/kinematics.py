@@ -1,0 +1,140 @@
+"""Kinematics of a tree of revolute and prismatic joints: places of frames, rows of the Jacobian (3)."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array, Whole
+
+POSITION, ORIENTATION, JOINTS, DAMPING = range(4)
+"""Kinds of tasks."""
+
+
+@piece
+def place(
+    q: Array, parent: Whole, turns: Whole, turn: Array, shift: Array, axis: Array, placed: Array, z: Array
+) -> None:
+    """Where all joints are at q: `placed` (n+1, 12), the rotation row by row, then the point, world axes; the
+    world first. z (n+1, 3) are the joints' axes in the world.
+
+    Args:
+        q: (n,) rad or m.
+        parent: the place each one is fixed to; it always comes before.
+        turns: whether the joint is revolute, not prismatic.
+        turn, shift: from the parent to the joint at q = 0.
+        axis: of the joint, in its own axes.
+        placed, z: the result.
+    """
+    for a in range(12):
+        placed[0, a] = 1.0 if a % 4 == 0 and a < 9 else 0.0
+    for j in range(1, q.size + 1):
+        before, here = placed[parent[j]], placed[j]
+        x, y, w, angle = axis[j, 0], axis[j, 1], axis[j, 2], q[j - 1]
+        cos, sin = (math.cos(angle), math.sin(angle)) if turns[j] else (1.0, 0.0)
+        gone = 0.0 if turns[j] else angle
+        for a in range(3):
+            left, middle, right = before[3 * a], before[3 * a + 1], before[3 * a + 2]
+            f = left * turn[j, 0, 0] + middle * turn[j, 1, 0] + right * turn[j, 2, 0]
+            g = left * turn[j, 0, 1] + middle * turn[j, 1, 1] + right * turn[j, 2, 1]
+            h = left * turn[j, 0, 2] + middle * turn[j, 1, 2] + right * turn[j, 2, 2]
+            z[j, a] = f * x + g * y + h * w
+            along = (1.0 - cos) * z[j, a]
+            here[3 * a] = cos * f + along * x + sin * (g * w - h * y)
+            here[3 * a + 1] = cos * g + along * y + sin * (h * x - f * w)
+            here[3 * a + 2] = cos * h + along * w + sin * (f * y - g * x)
+            point = left * shift[j, 0] + middle * shift[j, 1] + right * shift[j, 2]
+            here[9 + a] = before[9 + a] + point + gone * z[j, a]
+
+
+@piece
+def points(placed: Array, frame_joint: Whole, frame_shift: Array, point: Array) -> None:
+    """Origins of the frames in the world, (F, 3) m."""
+    for f in range(frame_joint.size):
+        on, r = placed[frame_joint[f]], frame_shift[f]
+        for a in range(3):
+            point[f, a] = on[9 + a] + on[3 * a] * r[0] + on[3 * a + 1] * r[1] + on[3 * a + 2] * r[2]
+
+
+@piece
+def jacobian(
+    task: Whole,
+    part: Whole,
+    parent: Whole,
+    turns: Whole,
+    placed: Array,
+    z: Array,
+    frame_joint: Whole,
+    point: Array,
+    J: Array,
+) -> None:
+    """J_i of (3) of all tasks, one below the other, (M, n), world axes at the frames' origins.
+
+    Args:
+        task: (T, 4) kind, frame, first row and number of rows of each task.
+        part: (M,) which axis or joint a row is about.
+        parent, turns, placed, z: as in `place`.
+        frame_joint, point: the joint that carries each frame, and its origin.
+        J: the result.
+    """
+    J[:] = 0.0
+    for t in range(len(task)):
+        kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
+        for i in range(first, first + size):
+            if kind >= JOINTS:
+                J[i, part[i]] = 1.0
+                continue
+            c = part[i]
+            a, b = (c + 1) % 3, (c + 2) % 3
+            j = frame_joint[frame]
+            while j > 0:
+                if kind == ORIENTATION:
+                    J[i, j - 1] = z[j, c] if turns[j] else 0.0
+                elif turns[j]:
+                    x, y = point[frame, a] - placed[j, 9 + a], point[frame, b] - placed[j, 9 + b]
+                    J[i, j - 1] = z[j, a] * y - z[j, b] * x
+                else:
+                    J[i, j - 1] = z[j, c]
+                j = parent[j]
+
+
+@piece
+def frame_rotation(on: Array, turn: Array, R: Array) -> None:
+    """R of a frame in the world, (3, 3); `on` is the place of the joint that carries it."""
+    for a in range(3):
+        for b in range(3):
+            R[a, b] = on[3 * a] * turn[0, b] + on[3 * a + 1] * turn[1, b] + on[3 * a + 2] * turn[2, b]
+
+
+@piece
+def turned_away(R: Array, D: Array, out: Array) -> None:
+    """log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
+
+    By way of the quaternion whose largest component comes from a root: it is accurate at every angle up to π.
+    """
+    E = (
+        (dot3(R[0], D[0]), dot3(R[0], D[1]), dot3(R[0], D[2])),
+        (dot3(R[1], D[0]), dot3(R[1], D[1]), dot3(R[1], D[2])),
+        (dot3(R[2], D[0]), dot3(R[2], D[1]), dot3(R[2], D[2])),
+    )
+    xx, yy, zz = E[0][0], E[1][1], E[2][2]
+    w, x, y, z = 1.0 + xx + yy + zz, E[2][1] - E[1][2], E[0][2] - E[2][0], E[1][0] - E[0][1]
+    if w < 1.0:
+        # More than 90°: the vector part is large, and the angle's sine is not what to divide by.
+        if xx >= yy and xx >= zz:
+            w, x, y, z = x, 1.0 + xx - yy - zz, E[0][1] + E[1][0], E[0][2] + E[2][0]
+        elif yy >= zz:
+            w, x, y, z = y, E[0][1] + E[1][0], 1.0 + yy - xx - zz, E[1][2] + E[2][1]
+        else:
+            w, x, y, z = z, E[0][2] + E[2][0], E[1][2] + E[2][1], 1.0 + zz - xx - yy
+        if w < 0.0:
+            w, x, y, z = -w, -x, -y, -z
+    length = math.sqrt(x * x + y * y + z * z)
+    share = 2.0 * math.atan2(length, w) / length if length > 1e-12 * w else 2.0 / w
+    out[0], out[1], out[2] = share * x, share * y, share * z
+
+
+@piece
+def dot3(a: Array, b: Array) -> float:
+    """aᵀb of three numbers."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,0 +1,103 @@
+"""One level of the cascade in its own coordinates: the quadratic that (34a) is there, and its optimum."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.linear import dot, factorise, forward
+from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian
+
+
+class Level(NamedTuple):
+    """min ½ρ‖x‖² + ½ρ‖x'‖² + ½‖e₀ + G x‖², where U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j).
+
+    Coordinates of a knot stand in this order: those of the levels above, which (33) keeps; the level's own x,
+    which move its residual; and those beyond, x', which it does not feel and bounds may need. All own
+    coordinates stand side by side, knot by knot, then all of those beyond.
+
+    Attributes:
+        first, last: its rows among all.
+        rho: ρ, the weight of the increments.
+        accuracy: the gradient that its point may have.
+        C, S, row_knots: see `residual`.
+        seen: B in coordinates, (N, m, n).
+        e_0, e_1: √Q e for x = 0, and at the point, (N, m).
+        pushed: scratch, (N, m).
+        start: (N,) its first own coordinate of a knot.
+        offset: (N+1,) where its own coordinates of a knot stand in x.
+        rest: (N+1,) where those beyond stand; they end all coordinates.
+        fixed: (N, n) what the levels above keep, N·m.
+        Q, metric: directions (N, n, n), and the joints' units of effort, (n,).
+        F: the Cholesky factor of ρ + GᵀG.
+        x: the point, own coordinates and those beyond.
+        z: scratch.
+        slope: the gradient.
+        size: ‖G‖, ‖e₀‖: two numbers.
+    """
+
+    first: int
+    last: int
+    rho: float
+    accuracy: float
+    C: Array
+    S: Array
+    row_knots: Whole
+    seen: Array
+    e_0: Array
+    e_1: Array
+    pushed: Array
+    start: Whole
+    offset: Whole
+    rest: Whole
+    fixed: Array
+    Q: Array
+    metric: Array
+    F: Array
+    x: Array
+    z: Array
+    slope: Array
+    size: Array
+
+
+@piece
+def prepare(level: Level, B: Array, free: Array, root_Q: Array, ideal: Array) -> bool:
+    """e₀, the factor F and `ideal`, the optimum without any row in white coordinates Fᵀx. False if the
+    Hessian is not positive: nothing is finite then."""
+    first, last = level.first, level.last
+    N = len(level.start)
+    total = 0.0
+    effects(B, level.fixed, first, last, level.pushed)
+    for i in range(first, last):
+        for k in range(N):
+            level.e_0[k, i] = root_Q[i] * free[k, i] if k < level.row_knots[i] else 0.0
+    add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_0)
+    for k in range(N):
+        total += dot(level.e_0[k, first:last], level.e_0[k, first:last], last - first)
+    trace = hessian(level.S, level.seen, first, last, level.start, level.offset, level.rho, level.F)
+    level.size[0], level.size[1] = math.sqrt(trace), math.sqrt(total)
+    gather_effects(level.C, level.e_0, first, last, level.row_knots, level.pushed)
+    gather(level.seen, level.pushed, first, last, level.start, level.offset, level.slope)
+    d = level.offset[N]
+    if not factorise(level.F, d):
+        return False
+    for c in range(d):
+        ideal[c] = -level.slope[c]
+    forward(level.F, ideal, d)
+    return True
+
+
+@piece
+def increments(level: Level, U: Array) -> None:
+    """U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j), (N, n) N·m."""
+    N, n = U.shape
+    for j in range(N):
+        mine, others = level.offset[j + 1] - level.offset[j], level.rest[j + 1] - level.rest[j]
+        start = level.start[j]
+        for a in range(n):
+            row = level.Q[j, a, start:]
+            total = dot(row, level.x[level.offset[j] :], mine)
+            total += dot(row[mine:], level.x[level.rest[j] :], others)
+            U[j, a] = level.fixed[j, a] + level.metric[a] * total

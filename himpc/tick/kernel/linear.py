@@ -1,0 +1,69 @@
+"""The linear algebra of small dense matrices, compiled: at these sizes a call costs more than the work."""
+
+from __future__ import annotations
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array
+
+
+@piece
+def dot(a: Array, b: Array, n: int) -> float:
+    """aᵀb over the first n."""
+    total = 0.0
+    for i in range(n):
+        total += a[i] * b[i]
+    return total
+
+
+@piece
+def subtract(share: float, x: Array, y: Array, n: int) -> None:
+    """y ← y − share · x over the first n."""
+    for i in range(n):
+        y[i] -= share * x[i]
+
+
+@piece
+def factorise(H: Array, d: int) -> bool:
+    """The lower Cholesky factor F of H = F Fᵀ in place of its lower triangle; False if H is not positive.
+
+    H (d, d) is given by its upper triangle, from the left in panels of four rows: what is left of the matrix
+    is then read and written once for four columns, in lines as long as the matrix is wide.
+    """
+    for k in range(0, d, 4):
+        width = min(4, d - k)
+        for p in range(k, k + width):
+            row = H[p]
+            for s in range(k, p):
+                subtract(H[s, p], H[s, p:], row[p:], d - p)
+            if not row[p] > 0.0:
+                return False
+            share = 1.0 / row[p] ** 0.5
+            for c in range(p, d):
+                row[c] *= share
+        if width < 4:
+            break
+        a, b, c, e = H[k], H[k + 1], H[k + 2], H[k + 3]
+        for i in range(k + 4, d):
+            row = H[i]
+            fa, fb, fc, fe = a[i], b[i], c[i], e[i]
+            for j in range(i, d):
+                row[j] -= fa * a[j] + fb * b[j] + fc * c[j] + fe * e[j]
+    for i in range(d):
+        for j in range(i):
+            H[i, j] = H[j, i]
+    return True
+
+
+@piece
+def forward(F: Array, x: Array, d: int) -> None:
+    """x ← F⁻¹ x, F lower triangular."""
+    for a in range(d):
+        x[a] = (x[a] - dot(F[a], x, a)) / F[a, a]
+
+
+@piece
+def backward(F: Array, x: Array, d: int) -> None:
+    """x ← F⁻ᵀ x, F lower triangular."""
+    for a in range(d - 1, -1, -1):
+        x[a] /= F[a, a]
+        subtract(x[a], F[a], x, a)

@@ -1,0 +1,148 @@
+"""The residual (28) over the horizon: free motion, the effect of increments, and the cost's Hessian."""
+
+from __future__ import annotations
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.linear import dot
+
+
+@piece
+def free_motion(
+    error: Array,
+    x_dot: Array,
+    x_dot_was: Array,
+    period: float,
+    K_p: Array,
+    K_v: Array,
+    on_velocity: Array,
+    on_acceleration: Array,
+    displacement: Array,
+    velocity_d: Array,
+    acceleration_d: Array,
+    m: int,
+    free: Array,
+) -> float:
+    """e at knots 1 … N for Δτ = 0, (N, m), by (15) and (28); ẍ_k is the backward difference of ẋ. Returns
+    their sum, which is finite if they are.
+
+    Args:
+        error, x_dot, x_dot_was: x̃_k, ẋ_k and ẋ one `period` (s) ago, (m,).
+        K_p, K_v: (m,) of (4).
+        on_velocity, on_acceleration: (N, m), see `ResidualModel`.
+        displacement, velocity_d, acceleration_d: the references at k … k+N, (N+1, m).
+        m: how many rows count.
+        free: the result.
+    """
+    total = 0.0
+    for j in range(len(free)):
+        for i in range(m):
+            x_ddot = (x_dot[i] - x_dot_was[i]) / period
+            moving = K_p[i] * error[i] + on_velocity[j, i] * x_dot[i] + on_acceleration[j, i] * x_ddot
+            desired = (
+                acceleration_d[j + 1, i] + K_v[i] * velocity_d[j + 1, i] + K_p[i] * displacement[j + 1, i]
+            )
+            free[j, i] = moving - desired
+            total += free[j, i]
+    return total
+
+
+@piece
+def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
+    """B_j U_j of some rows, (N, m): the change of ẍ by the increments of one knot."""
+    N, _, n = B.shape
+    for j in range(N):
+        for i in range(first, last):
+            pushed[j, i] = dot(B[j, i], U[j], n)
+
+
+@piece
+def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole, e: Array) -> None:
+    """e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots that a row counts.
+
+    Args:
+        C: √Q c_l of `ResidualModel`, (m, N): the effect depends on the distance l of two knots only.
+        pushed: (N, m).
+        first, last: the rows.
+        row_knots: how many knots a row counts (Remark 8).
+        e: (N, m), changed.
+    """
+    for i in range(first, last):
+        for k in range(row_knots[i]):
+            total = e[k, i]
+            for j in range(k + 1):
+                total += C[i, k - j] * pushed[j, i]
+            e[k, i] = total
+
+
+@piece
+def gather_effects(C: Array, e: Array, first: int, last: int, row_knots: Whole, pulled: Array) -> None:
+    """The transpose of `add_effects`: pulled_j = Σ_{k≥j} √Q c_{k−j} e_{k+1}."""
+    N = len(e)
+    for i in range(first, last):
+        for j in range(N):
+            total = 0.0
+            for k in range(j, row_knots[i]):
+                total += C[i, k - j] * e[k, i]
+            pulled[j, i] = total
+
+
+@piece
+def hessian(
+    S: Array, seen: Array, first: int, last: int, start: Whole, offset: Whole, rho: float, H: Array
+) -> float:
+    """H = ρ + GᵀG of a level in its own coordinates, upper triangle; returns the trace of GᵀG.
+
+    G is never built. Since C is Toeplitz, the block of knots j and l is Σ_i S_i[j, l] b_ji b_liᵀ with
+    S_i = Σ_k Q c_{k−j} c_{k−l}, which only the settings change.
+
+    Args:
+        S: (m, N, N).
+        seen: b, the rows of B in the level's coordinates, (N, m, n).
+        first, last: the level's rows.
+        start, offset: where its own coordinates of a knot begin among all of the knot, and among its own.
+        rho: ρ, the weight R of the increments.
+        H: the result.
+    """
+    N = len(start)
+    trace = 0.0
+    for j in range(N):
+        for a in range(offset[j], offset[j + 1]):
+            row = H[a]
+            row[a : offset[N]] = 0.0
+            for i in range(first, last):
+                mine = seen[j, i, start[j] + a - offset[j]]
+                for k in range(j, N):
+                    weight = S[i, j, k] * mine
+                    begin = start[k] - offset[k]
+                    for b in range(max(a, offset[k]), offset[k + 1]):
+                        row[b] += weight * seen[k, i, begin + b]
+            trace += row[a]
+            row[a] += rho
+    return trace
+
+
+@piece
+def apply(seen: Array, x: Array, first: int, last: int, start: Whole, offset: Whole, pushed: Array) -> None:
+    """B_j of own coordinates x, (N, m)."""
+    for j in range(len(start)):
+        begin = start[j] - offset[j]
+        for i in range(first, last):
+            total = 0.0
+            for a in range(offset[j], offset[j + 1]):
+                total += seen[j, i, begin + a] * x[a]
+            pushed[j, i] = total
+
+
+@piece
+def gather(
+    seen: Array, pulled: Array, first: int, last: int, start: Whole, offset: Whole, slope: Array
+) -> None:
+    """The transpose of `apply`: slope = Σ_i b_ji pulled_ji."""
+    for j in range(len(start)):
+        begin = start[j] - offset[j]
+        for a in range(offset[j], offset[j + 1]):
+            total = 0.0
+            for i in range(first, last):
+                total += seen[j, i, begin + a] * pulled[j, i]
+            slope[a] = total

@@ -1,0 +1,126 @@
+"""Entry: one level of the cascade."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from himpc.cascade.compiled import INDICES, NUMBER, VECTOR, WHOLE, entry
+from himpc.tick.kernel.active_set import FAILED
+from himpc.tick.kernel.arena import AT, WHOLE_AT, Whole
+from himpc.tick.kernel.cascade import FIRST, KNOTS, LAST, count_coordinates, own_directions, solve_level
+from himpc.tick.kernel.level import Level
+from himpc.tick.kernel.taken import Taken
+from himpc.tick.kernel.views import matrices, matrix, vector
+
+BUDGET = 6e6
+"""Multiplications that the changes of active rows may cost at one level: some milliseconds on a slow core. A
+count, not a clock: the same seed gives the same run."""
+
+
+@entry(VECTOR, INDICES, INDICES, INDICES, WHOLE, NUMBER)
+def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, room: float) -> bool:
+    """Problem i of the cascade, those above it known; False if no optimum was found within BUDGET.
+
+    room: N·m by which bounds give way where the levels above leave none.
+    """
+    s = vector(whole, whole_where[WHOLE_AT.sizes], 10)
+    n, N, M, r, b, w = s[0], s[1], s[2], s[4], s[7], s[8]
+    k = w + 1
+    levels = matrix(whole, whole_where[WHOLE_AT.level], r, 8)
+    B, free = matrices(data, where[AT.B], N, M, n), matrix(data, where[AT.free], N, M)
+    root_Q, U = vector(data, where[AT.root_Q], M), matrices(data, where[AT.U], r, N, n)
+    Q, reflector = matrices(data, where[AT.Q], N, n, n), matrices(data, where[AT.reflector], N, n, n)
+    seen, metric = matrices(data, where[AT.seen], N, M, n), matrix(data, where[AT.metric], r, n)
+    count, start = (
+        vector(whole, whole_where[WHOLE_AT.count], N),
+        vector(whole, whole_where[WHOLE_AT.start], N),
+    )
+    offset, rest = (
+        vector(whole, whole_where[WHOLE_AT.offset], N + 1),
+        vector(whole, whole_where[WHOLE_AT.rest], N + 1),
+    )
+    taken = Taken(
+        vector(whole, whole_where[WHOLE_AT.held_row], k),
+        vector(whole, whole_where[WHOLE_AT.held_joint], k),
+        vector(whole, whole_where[WHOLE_AT.held_side], k),
+        matrix(data, where[AT.normal], k, w),
+        matrix(data, where[AT.white], k, w),
+        matrix(data, where[AT.basis], k, w),
+        matrix(data, where[AT.corner], k, k),
+        vector(data, where[AT.target], k),
+        vector(data, where[AT.pull], k),
+        vector(data, where[AT.lost], k),
+        vector(data, where[AT.change], k),
+    )
+    value = matrix(data, where[AT.reached], b, n)
+    low, high = matrix(data, where[AT.low], b, n), matrix(data, where[AT.high], b, n)
+    pressed_row, pressed_joint = (
+        matrix(whole, whole_where[WHOLE_AT.pressed_row], r, k),
+        matrix(whole, whole_where[WHOLE_AT.pressed_joint], r, k),
+    )
+    active_row, active_joint = (
+        matrix(whole, whole_where[WHOLE_AT.active_row], r, k),
+        matrix(whole, whole_where[WHOLE_AT.active_joint], r, k),
+    )
+    multiplier, slack = matrix(data, where[AT.multiplier], r, k), matrix(data, where[AT.slack], r, k)
+    own_directions(i, levels, B, metric[i], reflector, Q, seen, count, start)
+    whole[whole_where[WHOLE_AT.left] + i] = count_coordinates(levels[i, KNOTS], n, count, start, offset, rest)
+    level = Level(
+        levels[i, FIRST],
+        levels[i, LAST],
+        data[where[AT.rho] + i],
+        data[where[AT.accuracy] + i],
+        matrix(data, where[AT.C], M, N),
+        matrices(data, where[AT.S], M, N, N),
+        vector(whole, whole_where[WHOLE_AT.row_knots], M),
+        seen,
+        matrix(data, where[AT.e_0], N, M),
+        matrix(data, where[AT.e_1], N, M),
+        matrix(data, where[AT.pushed], N, M),
+        start,
+        offset,
+        rest,
+        matrix(data, where[AT.fixed], N, n),
+        Q,
+        metric[i],
+        matrix(data, where[AT.H], w, w),
+        vector(data, where[AT.x], w),
+        vector(data, where[AT.z], w),
+        vector(data, where[AT.slope], w),
+        vector(data, where[AT.size], 2),
+    )
+    data[where[AT.budget]] = BUDGET
+    kkt, held = solve_level(
+        i,
+        levels,
+        level,
+        taken,
+        B,
+        free,
+        root_Q,
+        U,
+        whole[whole_where[WHOLE_AT.pressed_count] + i],
+        pressed_row[i],
+        pressed_joint[i],
+        matrix(data, where[AT.pressed], r, k)[i],
+        matrix(data, where[AT.L], b, N),
+        matrix(data, where[AT.lower], b, n),
+        matrix(data, where[AT.upper], b, n),
+        low,
+        high,
+        value,
+        vector(data, where[AT.ideal], w),
+        vector(data, where[AT.budget], 1),
+        room,
+    )
+    if kkt == FAILED:
+        return False
+    data[where[AT.kkt] + i] = kkt
+    whole[whole_where[WHOLE_AT.active_count] + i] = held
+    for p in range(held):
+        row, joint = taken.row[p], taken.joint[p]
+        active_row[i, p], active_joint[i, p], multiplier[i, p] = row, joint, taken.pull[p]
+        slack[i, p] = (
+            high[row, joint] - value[row, joint] if taken.side[p] > 0 else value[row, joint] - low[row, joint]
+        )
+    return True

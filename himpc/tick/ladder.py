@@ -1,0 +1,104 @@
+"""The cascade on an arena, with a fallback for every level that has no optimum within its budget."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter_ns
+
+import numpy as np
+
+from himpc.cascade.explicit import solve_explicit
+from himpc.cascade.last_resort import containing, last_resort, softened
+from himpc.cascade.level import NO_ROWS, Point, Rung
+from himpc.cascade.null_space import nested_bases, whole_space
+from himpc.limits import Rows
+from himpc.limits.rows import Kind
+from himpc.tick.kernel.active_set import TOLERANCE
+from himpc.tick.kernel.arena import Arena, Array
+from himpc.tick.kernel.cascade import ALONE
+from himpc.tick.kernel.solve import solve
+from himpc.tick.printed import printed_problem
+
+_SMALL = 72
+"""Unknowns up to which the printed QP is a matter of milliseconds: it is asked where the kernel gives up."""
+
+
+def solve_levels(
+    arena: Arena, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None]
+) -> list[tuple[Rung, float]]:
+    """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
+    on and its time, microseconds.
+
+    The ladder is that of `solve_cascade`.
+
+    Args:
+        arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.
+        kinds: of the rows.
+        damped: the increments of the damping level alone under torque rows.
+    """
+    found = []
+    for place in range(int(arena.i["sizes"][4])):
+        started = perf_counter_ns()
+        rung = "solve" if solve(*arena.arguments, place, 0.0) else _climb_down(arena, place, kinds, damped)
+        found.append((rung, (perf_counter_ns() - started) / 1e3))
+    return found
+
+
+def _climb_down(
+    arena: Arena, place: int, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None]
+) -> Rung:
+    f = arena.f
+    rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
+    point = _as_printed(arena, place, rows)
+    if point is not None:
+        _put(arena, place, point)
+        return "solve"
+    alone = place == 0 or bool(arena.i["level"][place, ALONE])
+    if not alone:
+        # Where U_{i−1} is all but the only point that the rows admit, a little room tells them apart.
+        if solve(*arena.arguments, place, TOLERANCE):
+            return "solve"
+        _put(arena, place, Point(f["U"][place - 1], NO_ROWS, 0.0, "unsolved"))
+        return "inherit"
+    widened = softened(rows)
+    if widened is not None:
+        _write(arena, widened)
+        solved = bool(solve(*arena.arguments, place, 0.0))
+        point = None if solved else _as_printed(arena, place, widened)
+        if point is not None:
+            _put(arena, place, point)
+        if solved or point is not None:
+            if place:
+                _write(arena, rows)
+            return "soften"
+    before = f["U_was"][place].copy() if arena.i["known"][1] else None
+    rung, U = last_resort(rows, before, damped)
+    _put(arena, place, Point(U, NO_ROWS, 0.0, "unsolved"))
+    _write(arena, rows if place else containing(rows, U))
+    return rung
+
+
+def _as_printed(arena: Arena, place: int, rows: Rows) -> Point | None:
+    """The level's optimum by the printed route, if that is a small matter."""
+    N, n = arena.f["U"][place].shape
+    if N * n > _SMALL:
+        return None
+    alone = bool(arena.i["level"][place, ALONE])
+    upper = [] if alone else [printed_problem(arena, p).B for p in range(place)]
+    U_above = np.zeros((N, n)) if alone or not place else arena.f["U"][place - 1]
+    Z = nested_bases(upper)[-1] if upper else whole_space(N, n)
+    above = [(B, arena.f["U"][p]) for p, B in enumerate(upper)]
+    return solve_explicit(printed_problem(arena, place), rows, U_above, above, Z, "daqp")
+
+
+def _write(arena: Arena, rows: Rows) -> None:
+    arena.f["lower"][:], arena.f["upper"][:] = rows.lower, rows.upper
+
+
+def _put(arena: Arena, place: int, point: Point) -> None:
+    """A level's point that the kernel did not find."""
+    f, i, active = arena.f, arena.i, point.active
+    f["U"][place], f["kkt"][place], i["active_count"][place] = point.U, point.kkt_residual, len(active)
+    here = place, slice(0, len(active))
+    i["active_row"][here], i["active_joint"][here] = active.row, active.joint
+    f["multiplier"][here], f["slack"][here] = active.multiplier, active.slack

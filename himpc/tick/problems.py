@@ -1,0 +1,101 @@
+"""The compiled cascade for level problems that stand by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, LevelSolution, Rung
+from himpc.limits.rows import Rows
+from himpc.tick.kernel.arena import Arena, Array, Snapshot
+from himpc.tick.kernel.conclude import conclude
+from himpc.tick.kernel.solve import solve
+from himpc.tick.ladder import solve_levels
+from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
+
+
+def solve_problems(
+    problems: Sequence[LevelProblem],
+    rows: Rows,
+    previous: Mapping[str, LevelSolution],
+    damping: Callable[[], LevelProblem],
+) -> list[LevelSolution]:
+    """`solve_cascade` by the kernel; arguments as there."""
+    arena = arena_of(problems, rows, previous)
+    rungs = solve_levels(arena, rows.kinds, lambda torque: increments_of(damping(), torque))
+    conclude(*arena.arguments, False)
+    return solutions([problem.name for problem in problems], arena.found(), rungs)
+
+
+def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str, LevelSolution]) -> Arena:
+    """An arena in which the problems wait to be solved."""
+    N, _, n = problems[0].B.shape
+    ends = np.cumsum([0] + [problem.B.shape[1] for problem in problems])
+    arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L))
+    f = arena.f
+    tables = []
+    for place, problem in enumerate(problems):
+        span = slice(int(ends[place]), int(ends[place + 1]))
+        f["B"][:, span], f["free"][:, span] = problem.B, problem.free
+        write_effects(arena, span, problem.root_Q, problem.weighted_C)
+        tables.append(LevelTable(span, problem.knots, problem.R, span, problem.knots, problem.R))
+        before = previous.get(problem.name)
+        if before is not None:
+            press(arena, place, before.active)
+            if before.U.shape == (N, n):
+                f["U_was"][place], arena.i["known"][1] = before.U, 1
+    write_levels(arena, tables)
+    f["L"][:], f["lower"][:], f["upper"][:] = rows.L, rows.lower, rows.upper
+    f["M_bar"][:], f["scalars"][:] = 1.0, 1.0
+    f["limits"][0], f["limits"][1] = -np.inf, np.inf
+    return arena
+
+
+def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
+    """The optimum of one level alone, (N, n); None if there is none."""
+    arena = arena_of([problem], rows, {})
+    return arena.f["U"][0] if solve(*arena.arguments, 0, 0.0) else None
+
+
+def solutions(
+    names: Sequence[str], found: Snapshot, rungs: Sequence[tuple[Rung, float]]
+) -> list[LevelSolution]:
+    """The evidence of all levels, from what a tick found."""
+    U, cost, kkt, leak, left = (found(name) for name in ("U", "cost", "kkt", "leak", "left"))
+    return [
+        LevelSolution(
+            name,
+            U[place],
+            float(cost[place]),
+            active_rows(found, place),
+            float(kkt[place]),
+            "unsolved" if rung not in ("solve", "soften") else "optimal" if left[place] else "empty",
+            rung,
+            time_us,
+            0.0,
+            float(leak[place]),
+        )
+        for place, (name, (rung, time_us)) in enumerate(zip(names, rungs, strict=True))
+    ]
+
+
+def press(arena: Arena, place: int, active: ActiveRows) -> None:
+    """The rows that a level starts from."""
+    fits = active.row < len(arena.f["lower"])
+    k = min(int(fits.sum()), arena.f["pressed"].shape[1])
+    arena.i["pressed_count"][place] = k
+    arena.i["pressed_row"][place, :k], arena.i["pressed_joint"][place, :k] = (
+        active.row[fits][:k],
+        active.joint[fits][:k],
+    )
+    arena.f["pressed"][place, :k] = active.multiplier[fits][:k]
+
+
+def active_rows(found: Snapshot, place: int) -> ActiveRows:
+    """The rows that hold a level's point."""
+    k = int(found("active_count")[place])
+    if not k:
+        return NO_ROWS
+    names = ("active_row", "active_joint", "multiplier", "slack")
+    return ActiveRows(*(found(name)[place, :k] for name in names))

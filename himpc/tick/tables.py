@@ -1,0 +1,102 @@
+"""The levels of a cascade as numbers: rows, weights, and how increments reach the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from himpc.qp import KKT_TOLERANCE
+from himpc.tick.kernel.arena import Arena, Array
+
+if TYPE_CHECKING:
+    from himpc.controllers.forms import LevelForm
+
+_ACCURACY = 1e-8
+"""N·m: how far a point may be from the optimum, since H ≥ ρ."""
+
+
+@dataclass(frozen=True, eq=False)
+class LevelTable:
+    """What a level is to the kernel.
+
+    Attributes:
+        rows: its rows among all.
+        knots: how many knots it counts, K.
+        R: (n,) weight of the increments.
+        own_rows, own_knots, own_R: what its evidence is about; the same but where priorities are left out.
+        alone: (33) does not bind it.
+    """
+
+    rows: slice
+    knots: int
+    R: Array
+    own_rows: slice
+    own_knots: int
+    own_R: Array
+    alone: bool = False
+
+    @classmethod
+    def of(cls, level: LevelForm) -> LevelTable:
+        """A level of a strict hierarchy."""
+        return cls(level.rows, level.knots, level.R, level.rows, level.knots, level.R)
+
+
+def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
+    """The table of levels."""
+    f = arena.f
+    for place, level in enumerate(levels):
+        rho = float(level.R.min())
+        metric = np.sqrt(rho / level.R)
+        f["rho"][place], f["metric"][place], f["R"][place] = rho, metric, level.own_R
+        f["accuracy"][place] = min(_ACCURACY * rho, KKT_TOLERANCE)
+        arena.i["level"][place] = (
+            level.rows.start,
+            level.rows.stop,
+            level.knots,
+            place > 0 and bool((f["metric"][place - 1] != metric).any()),
+            level.alone,
+            level.own_rows.start,
+            level.own_rows.stop,
+            level.own_knots,
+        )
+
+
+def write_effects(arena: Arena, rows: slice, root_Q: Array, weighted_C: Array) -> None:
+    """√Q and the effect coefficients √Q c_l of some rows; (m,) and (K, m, K) of `LevelForm`."""
+    f, K = arena.f, len(weighted_C)
+    f["root_Q"][rows] = root_Q
+    f["C"][rows, :K] = weighted_C[:, :, 0].T
+    # A row that is padded with zeros counts fewer knots: its own effect on the next knot is never zero.
+    arena.i["row_knots"][rows] = (np.diagonal(weighted_C, axis1=0, axis2=2) > 0.0).sum(axis=1)
+    by_row = weighted_C.transpose(1, 0, 2)
+    f["S"][rows, :K, :K] = by_row.transpose(0, 2, 1) @ by_row
+
+
+def sizes(
+    n: int, N: int, rows: int, solved: int, levels: int, bounds: int, tasks: int = 1, frames: int = 1
+) -> Arena:
+    """An arena for n joints and N knots.
+
+    Args:
+        n, N: see there.
+        rows, solved: rows of all tasks, and how many of them, the first, are solved for.
+        levels, bounds, tasks, frames: how many.
+    """
+    arena = Arena(
+        n=n,
+        N=N,
+        N1=N + 1,
+        M=rows,
+        r=max(levels, 1),
+        T=tasks,
+        F=frames,
+        J=n + 1,
+        b=bounds,
+        w=N * n,
+        k=N * n + 1,
+    )
+    arena.i["sizes"][:9] = n, N, rows, solved, levels, tasks, frames, bounds, N * n
+    return arena

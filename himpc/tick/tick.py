@@ -1,0 +1,224 @@
+"""One control period by the kernel: what a controller hands over, and the plan it gets back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter_ns
+
+import numpy as np
+
+from himpc.cascade.level import LevelSolution, Rung
+from himpc.controllers.forms import StackForm
+from himpc.controllers.memory import Memory
+from himpc.controllers.settings import Settings
+from himpc.limits import LimitsInForce, Rows
+from himpc.limits.rows import Kind
+from himpc.plan import Evidence, Plan
+from himpc.references import Preview
+from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
+from himpc.tick.configure import arena_for, write_limits
+from himpc.tick.kernel.arena import Array, Snapshot
+from himpc.tick.kernel.conclude import conclude
+from himpc.tick.kernel.look import look
+from himpc.tick.ladder import solve_levels
+from himpc.tick.problems import press, solutions
+from himpc.tick.tables import LevelTable, write_effects
+from robots import Robot
+
+_BUILT_IN = (FramePosition, FrameOrientation, Joints, Posture, Damping)
+
+
+def is_built_in(form: StackForm, off: list[Task]) -> bool:
+    """Whether the kernel knows all tasks."""
+    return all(type(task) in _BUILT_IN for task in (*form.tasks, *off))
+
+
+class CompiledTick:
+    """The numbers of one controller with one set of settings.
+
+    Args:
+        robot: gives the geometry.
+        settings: as for the controller.
+        form: the levels that are solved.
+        off: tasks of the levels that are not; their errors are measured.
+        levels: what each level is to the kernel; none are solved if there are none.
+        tolerance: N·m; all levels are solved again, along their own prediction, until no increment changes by
+            more, see `NHIMPC`.
+        most: how often they are solved.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: Settings,
+        form: StackForm,
+        off: list[Task],
+        levels: list[LevelTable],
+        tolerance: float = math.inf,
+        most: int = 1,
+    ) -> None:
+        self._form, self._settings, self._levels = form, settings, levels
+        self.arena, self._spans = arena_for(robot, settings, form, off, levels)
+        self._kinds: tuple[Kind, ...] = ("torque", "velocity")
+        if settings.limits.position == "paper":
+            self._kinds = ("torque", "velocity", "position")
+        self._tolerance, self._most = tolerance, most
+        self._limits: LimitsInForce | None = None
+        self._shares = [1.0] * len(form.levels)
+        self._started = False
+
+    def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
+        """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
+        N, T_s = self._settings.horizon, self._settings.T_s
+        memory = memory or Memory.start(q, v, T_s)
+        f, i = self.arena.f, self.arena.i
+        f["q_was"][:], f["v_was"][:], f["scalars"][0] = memory.q, memory.v, memory.period
+        i["known"][:], i["pressed_count"][:], f["U_was"][:] = 0, 0, 0.0
+        if memory.x_dot is not None and memory.form is self._form:
+            f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
+        f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
+        for place, level in enumerate(self._form.levels if self._levels else ()):
+            before = memory.solutions.get(level.name)
+            if before is not None:
+                press(self.arena, place, before.active)
+                if before.U.shape == f["U"][place].shape:
+                    f["U_was"][place], i["known"][1] = before.U, 1
+        self._started = True
+
+    def forget(self) -> None:
+        """Forgets what it remembers."""
+        self._started = False
+
+    @property
+    def memory(self) -> Memory | None:
+        """What it remembers, for whoever takes over."""
+        if not self._started:
+            return None
+        f, i = self.arena.f, self.arena.i
+        known = bool(i["known"][0])
+        rungs: list[tuple[Rung, float]] = [("solve", math.nan)] * len(self._levels)
+        levels = self._solutions(self.arena.found(), rungs) if i["known"][1] else []
+        return Memory(
+            f["q_was"].copy(),
+            f["v_was"].copy(),
+            float(f["scalars"][0]),
+            f["x_dot_was"][: sum(self._form.sizes)].copy() if known else None,
+            self._form if known else None,
+            f["path"].copy(),
+            {level.name: level for level in levels},
+        )
+
+    def fade(self, place: int, share: float) -> None:
+        """Lets `share` of a level's √Q count."""
+        if share != self._shares[place]:
+            level = self._form.levels[place]
+            self._shares[place] = share
+            write_effects(self.arena, level.rows, share * level.root_Q, share * level.weighted_C)
+
+    def step(
+        self,
+        q: Array,
+        v: Array,
+        previews: Mapping[str, Preview],
+        tau_0: Array,
+        limits: LimitsInForce,
+        damped: Callable[[Rows], Array | None],
+        started: int,
+    ) -> Plan | None:
+        """One control period; None if the state's consequences are not finite.
+
+        Args:
+            q, v: measured state, (n,).
+            previews: of every task.
+            tau_0: torque that acts now, (n,) N·m.
+            limits: in force.
+            damped: increments of the damping level alone under torque rows, the last rung but one.
+            started: when the period began, ns.
+        """
+        self._take(q, v, previews, tau_0, limits)
+        arena = self.arena
+        rungs: list[tuple[Rung, float]] = []
+        change, iterations = math.inf, 0
+        while iterations == 0 or (change > self._tolerance and iterations < self._most):
+            if iterations:
+                # J_i(q_{k+j|k}): the knots of this tick's own prediction take the place of the last one's.
+                arena.f["path"][1:] = arena.f["predicted"][:-1]
+                before = arena.f["U"].copy()
+            else:
+                before = None
+            if not look(*arena.arguments):
+                return None
+            rungs = solve_levels(arena, self._kinds, damped) if self._levels else []
+            iterations += 1
+            once = self._most == 1
+            if not conclude(*arena.arguments, once):
+                return None
+            if before is not None:
+                change = float(np.abs(arena.f["U"] - before).max())
+        if self._most > 1:
+            conclude(*arena.arguments, True)
+        return self._plan(rungs, tau_0, limits, iterations, started)
+
+    def _take(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_0: Array, limits: LimitsInForce
+    ) -> None:
+        if not self._started:
+            self.recall(None, q, v)
+        f = self.arena.f
+        f["q"][:], f["v"][:], f["tau_0"][:] = q, v, tau_0
+        if limits is not self._limits:
+            self._limits = limits
+            write_limits(self.arena, limits, len(self._kinds) == 3)
+        reach = self._settings.horizon + 1
+        for place, task, span in self._spans:
+            if isinstance(task, Damping):
+                continue
+            value, displacement, velocity, acceleration = previews[task.name]
+            if value.ndim == 2:
+                f["R_d"][place] = value
+            else:
+                f["x_d"][span] = value
+            f["displacement"][:, span] = displacement[:reach]
+            f["velocity_d"][:, span] = velocity[:reach]
+            f["acceleration_d"][:, span] = acceleration[:reach]
+
+    def _solutions(self, found: Snapshot, rungs: Sequence[tuple[Rung, float]]) -> list[LevelSolution]:
+        return solutions([level.name for level in self._form.levels], found, rungs) if self._levels else []
+
+    def _plan(
+        self,
+        rungs: list[tuple[Rung, float]],
+        tau_0: Array,
+        limits: LimitsInForce,
+        iterations: int,
+        started: int,
+    ) -> Plan:
+        found = self.arena.found()
+        # Levels that stand alone are evidence but for the last one, which is applied.
+        idle_us = sum(time_us for _, time_us in rungs[:-1]) if self._levels and self._levels[0].alone else 0.0
+
+        def evidence() -> Evidence:
+            R, value, error = found("R_now"), found("value"), found("error")
+            values = {
+                task.name: R[place] if isinstance(task, FrameOrientation) else value[span]
+                for place, task, span in self._spans
+            }
+            stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
+            return Evidence(
+                levels=tuple(self._solutions(found, rungs)),
+                q=found("predicted"),
+                errors={task.name: error[span] for _, task, span in self._spans},
+                values=values,
+                rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._kinds, stopping),
+            )
+
+        return Plan(
+            tau=found("tau"),
+            tau_0=tau_0,
+            limits=limits,
+            step_us=(perf_counter_ns() - started) / 1e3 - idle_us,
+            unsolved=sum(rung != "solve" for rung, _ in rungs),
+            find_evidence=evidence,
+            iterations=iterations,
+        )

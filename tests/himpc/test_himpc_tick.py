@@ -1,0 +1,211 @@
+"""The compiled tick: its kinematics are Pinocchio's, and its torques those of the printed route."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from cascade_checks import assert_agree, assert_sound
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from problems import Hierarchy, random_hierarchy, shifted
+
+from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
+from himpc.cascade.cascade import Route
+from himpc.references import Hold
+from himpc.tick.kernel.conclude import conclude
+from himpc.tick.kernel.look import look
+from himpc.tick.kernel.solve import solve
+from lessons.events import MoveTarget
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
+from robots import Robot, load_robot
+
+INERTIAL = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+LIMIT = '<limit lower="-2" upper="2" velocity="3" effort="50"/>'
+Array = NDArray[np.float64]
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+# ------------------------------------------------------------------ kinematics
+
+
+def random_tree(seed: int, folder: Path) -> Robot:
+    """A tree of revolute and prismatic joints about any axis, each on any link before it."""
+    rng = np.random.default_rng(seed)
+
+    def joint(number: int) -> str:
+        axis, place, turn = rng.normal(size=3), rng.uniform(-0.5, 0.5, 3), rng.uniform(-3, 3, 3)
+        kind = "prismatic" if rng.random() < 0.3 else "revolute"
+        return (
+            f'<joint name="j{number}" type="{kind}"><parent link="l{rng.integers(0, number)}"/>'
+            f'<child link="l{number}"/>{_origin(place, turn)}<axis xyz="{_text(axis)}"/>{LIMIT}</joint>'
+        )
+
+    n = int(rng.integers(2, 9))
+    fixed = (
+        f'<joint name="tool" type="fixed"><parent link="l{n}"/><child link="tip"/>'
+        f"{_origin(rng.uniform(-0.3, 0.3, 3), rng.uniform(-3, 3, 3))}</joint>"
+    )
+    links = [f'<link name="l{k}">{INERTIAL if k else ""}</link>' for k in range(n + 1)]
+    path = folder / f"tree{seed}.urdf"
+    parts = (*links, '<link name="tip"/>', *(joint(k) for k in range(1, n + 1)), fixed)
+    path.write_text(f'<robot name="tree">{"".join(parts)}</robot>')
+    return load_robot(str(path)).with_tip("tip")
+
+
+def _text(numbers: Array) -> str:
+    return " ".join(f"{number:.6f}" for number in numbers)
+
+
+def _origin(place: Array, turn: Array) -> str:
+    return f'<origin xyz="{_text(place)}" rpy="{_text(turn)}"/>'
+
+
+@given(seeds)
+@settings(max_examples=60)
+def test_kinematics_are_pinocchio_s(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+    """Positions, rotations, log₃ and Jacobians of random trees at random states agree to 1e-12."""
+    robot = random_tree(seed, tmp_path_factory.mktemp("trees"))
+    rng = np.random.default_rng(seed)
+    stack = (
+        Level((FramePosition(name="position"), FrameOrientation(name="orientation"))),
+        Level((Posture(name="posture"),)),
+    )
+    M_bar = np.ones(robot.n)
+    controller = HIMPC(robot, Settings(stack, tuple(M_bar), horizon=3))
+    q, v, turn = rng.uniform(-2, 2, robot.n), rng.normal(size=robot.n), pin.exp3(2 * rng.normal(size=3))
+    references = {"position": Hold(np.zeros(3)), "orientation": Hold(turn), "posture": Hold(robot.home)}
+    plan = controller.step(q, v, {name: each.preview(0.0, 1e-3, 3) for name, each in references.items()})
+    data, tip = robot.model.createData(), robot.frame_id("tip")
+    J = pin.computeFrameJacobian(robot.model, data, q, tip, pin.LOCAL_WORLD_ALIGNED)
+    place = pin.updateFramePlacement(robot.model, data, tip)
+    np.testing.assert_allclose(plan.values["position"], place.translation, atol=1e-12)
+    np.testing.assert_allclose(plan.values["orientation"], place.rotation, atol=1e-12)
+    assert controller.kernel is not None
+    np.testing.assert_allclose(controller.kernel.arena.f["B"][0, :6], J, atol=1e-12)
+    away = pin.log3(place.rotation @ turn.T)
+    if np.linalg.norm(away) < np.pi - 0.02:  # Pinocchio's own formula loses digits next to π
+        np.testing.assert_allclose(plan.errors["orientation"], away, atol=1e-12)
+    np.testing.assert_allclose(pin.exp3(plan.errors["orientation"]), place.rotation @ turn.T, atol=1e-12)
+
+
+# ------------------------------------------------------------------ the same torques
+
+
+@pytest.mark.parametrize("controller", ["himpc", "hiqp", "nhimpc", "weighted"])
+@pytest.mark.parametrize(
+    ("name", "horizon"),
+    [
+        ("iiwa14-circle", 5),
+        ("iiwa14-circle-paper", 5),
+        ("iiwa14-hold", 3),
+        ("planar3-circle", 5),
+        ("planar3-conflict", 10),
+        ("ridgeback-ur10-hold", 2),
+    ],
+)
+def test_torques_are_those_of_the_printed_route(name: str, horizon: int, controller: str) -> None:
+    """Two closed loops side by side, one by the kernel, one by the rows as printed; targets are dragged."""
+    scene = torque_scene(name)
+    taken = replace(scene.settings, horizon=horizon, controller=controller)
+    compiled, printed = (
+        TorqueSession(replace(scene, settings=replace(taken, route=route)))
+        for route in ("compiled", "explicit")
+    )
+    worst = 0.0
+    for k in range(60):
+        for session in (compiled, printed):
+            target = session.target("position")
+            if k == 5 and target is not None:
+                session.post(MoveTarget("position", tuple(target.value + 0.2)))
+            session.tick()
+        assert compiled.plan is not None
+        assert printed.plan is not None
+        worst = max(worst, float(np.abs(compiled.plan.tau - printed.plan.tau).max()))
+        for one, other in zip(compiled.plan.levels, printed.plan.levels, strict=True):
+            assert one.rung == "solve"
+            assert one.leak <= 1e-6 or controller == "weighted"
+            assert one.kkt_residual <= 1e-6
+            assert one.cost == pytest.approx(other.cost, rel=1e-6, abs=1e-6)
+    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact.
+    assert worst <= (1e-7 if controller == "weighted" else 1e-8)
+
+
+def a_tick_later(hierarchy: Hierarchy, seed: int) -> Hierarchy:
+    rng = np.random.default_rng(seed)
+    return Hierarchy(
+        [shifted(p, rng.normal(0, 1e-3, p.free.shape)) for p in hierarchy.problems], hierarchy.rows
+    )
+
+
+@given(seeds, st.integers(2, 9), st.integers(1, 8), st.integers(1, 4), st.sampled_from([1.0, 5.0, 30.0]))
+@settings(max_examples=150)
+def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels: int, room: float) -> None:
+    """With last tick's active rows the optimum meets the literal KKT conditions and the explicit route."""
+    hierarchy = random_hierarchy(seed, n, N, levels, room=room, even=True)
+    before = {solution.name: solution for solution in hierarchy.solve()}
+    later = a_tick_later(hierarchy, seed)
+    solutions = later.solve(previous=before)
+    assert_sound(later, solutions)
+    explicit = later.solve("explicit")
+    assume(all(solution.rung == "solve" and solution.kkt_residual <= 1e-9 for solution in explicit))
+    assert_agree(solutions, explicit)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_optimum_does_not_depend_on_where_it_started(seed: int) -> None:
+    """From last tick's rows, from none and from rows that press the wrong way the increments are the same."""
+    hierarchy = random_hierarchy(seed, 7, 6, 3, even=True)
+    cold = hierarchy.solve()
+    warm = {solution.name: solution for solution in cold}
+    wrong = {
+        name: each._replace(active=replace(each.active, multiplier=-each.active.multiplier))
+        for name, each in warm.items()
+    }
+    for previous in (warm, wrong):
+        assert_agree(hierarchy.solve(previous=previous), cold, 1e-7)
+
+
+@pytest.mark.parametrize("route", ["compiled", "explicit"])
+def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
+    """A sensor that reads many times the robot's limit leaves the next torques within it."""
+    scene = torque_scene("planar3-hold")
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, route=route)))
+    session.tick()
+    previews = {name: each.preview(session.t, 1e-3, 5) for name, each in session.references.items()}
+    for _ in range(3):
+        state = session.plant.measure(1e-3)
+        plan = session.controller.step(state.q, state.v, previews, 13.0 * session.robot.tau_limit)
+        assert (np.abs(plan.tau) <= session.robot.tau_limit).all()
+
+
+def test_a_plan_that_is_kept_stays_as_it_is() -> None:
+    """Its evidence is that of its own tick, whenever it is looked at."""
+    session = TorqueSession(torque_scene("iiwa14-circle"))
+    session.tick()
+    kept, other = session.plan, TorqueSession(torque_scene("iiwa14-circle"))
+    other.tick()
+    for _ in range(20):
+        session.tick()
+    assert kept is not None
+    assert other.plan is not None
+    for one, two in zip(kept.levels, other.plan.levels, strict=True):
+        np.testing.assert_array_equal(one.U, two.U)
+    np.testing.assert_array_equal(kept.q, other.plan.q)
+
+
+def test_nothing_is_compiled_while_a_robot_moves() -> None:
+    """One compiled form of each entry serves every layout."""
+    for name in ("iiwa14-circle", "planar3-hold"):
+        TorqueSession(torque_scene(name)).tick()
+    for compiled in (look, solve, conclude):
+        assert len(compiled.signatures) == 1
