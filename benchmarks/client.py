@@ -1,26 +1,37 @@
-"""A client that speaks the page's protocol and draws nothing: it receives and decodes every message.
+"""Clients that speak the page's protocol and draw nothing: they receive and decode every message.
 
-    python -m benchmarks.client URL
+    python -m benchmarks.client URL [--clients K] [--tab TAB] [--delay SECONDS]
 
-Answers what the page waits for (camera, empty local storage). Prints a line of JSON every second: messages,
-megabytes, and how often the busiest plot and the busiest node of the scene were renewed.
+Each answers what the page waits for (camera, local storage) and says that it shows the plots of one tab.
+Prints a line of JSON every second and client: messages, megabytes, and how often the busiest plot and the
+busiest node of the scene were renewed. --delay: rests so long before each packet, as a slow line would. A
+number on stdin lets the first client reload its page so often, each time until it sees its robot, and say so.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
+import threading
 import time
 from collections import Counter
 from dataclasses import dataclass, field
+from queue import SimpleQueue
+from socket import SO_RCVBUF, SOL_SOCKET, socket
 from typing import Any
+from urllib.parse import urlsplit
 
-from viser import __version__
+from viser import __version__, _messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
-from browsing.wire import camera, messages_of, nothing_kept, pack
+from app.panels.widgets.in_view import ASLEEP, AWAKE, LABEL
+from browsing.wire import camera, messages_of, pack
+
+_PATIENCE = 60.0  # s for a robot to appear
+_TAB = "Joints"  # the one with the most curves
 
 
 @dataclass
@@ -42,41 +53,175 @@ class Second:
         }
 
 
-def watch(url: str) -> None:
-    """Stays connected until it is ended, and prints a line of JSON every second."""
-    protocol: Any = [f"viser-v{__version__}"]
-    with connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None) as socket:
-        socket.send(pack(camera()))
-        began, second = time.monotonic(), Second()
-        while True:
-            try:
-                raw = socket.recv(timeout=0.2)
-            except TimeoutError:
-                raw = b""
-            except ConnectionClosed:
-                return
-            if isinstance(raw, bytes) and raw:
-                second.bytes += len(raw)
-                for message in messages_of(raw):
-                    _take(socket, message, second)
-            spent = time.monotonic() - began
-            if spent >= 1.0:
-                print(json.dumps(second.rates(spent)), flush=True)
-                began, second = time.monotonic(), Second()
+class Viewer:
+    """One browser. What it stores outlives its connections."""
+
+    def __init__(self, url: str, tab: str | None = _TAB, delay: float = 0.0) -> None:
+        self._url = url.replace("http", "ws")
+        self._tab, self._delay = tab, delay
+        self._stored: dict[str, str] = {}
+        self.second = Second()
+        self._parents: dict[str, str] = {}
+        self._charts: dict[str, str] = {}  # title by uuid
+        self._tabs: dict[str, str] = {}  # label by container
+        self._control: str | None = None
+        self._said = ""
+
+    def connect(self, slow: bool = False) -> Connection:
+        """slow: a line that takes some kilobytes until they are read."""
+        protocol: Any = [f"viser-v{__version__}"]
+        line = socket()
+        if slow:
+            line.setsockopt(SOL_SOCKET, SO_RCVBUF, 8192)
+        address = urlsplit(self._url)
+        line.connect((address.hostname, address.port))
+        queue = 1 if slow or self._delay else 16
+        connection = connect(self._url, sock=line, subprotocols=protocol, max_size=None, max_queue=queue)
+        self._forget()
+        connection.send(pack(camera()))
+        return connection
+
+    def watch(self, client: int, asked: SimpleQueue[int]) -> None:
+        """Stays connected until it is ended, and prints a line of JSON every second. asked: numbers of
+        reloads."""
+        while self._watch(client, asked):
+            came = sum(self.visit() for _ in range(asked.get()))
+            _tell({"client": client, "came": came})
+
+    def _watch(self, client: int, asked: SimpleQueue[int]) -> bool:
+        """Until it is asked to reload; False if the connection ends before."""
+        with self.connect() as page:
+            began = time.monotonic()
+            while asked.empty():
+                try:
+                    self.hear(page, 0.2)
+                except ConnectionClosed:
+                    return False
+                spent = time.monotonic() - began
+                if spent >= 1.0:
+                    _tell({"client": client, **self.second.rates(spent)})
+                    began, self.second = time.monotonic(), Second()
+        return True
+
+    def visit(self) -> bool:
+        """Comes, waits until a robot moved or its plots did, and leaves."""
+        self.second = Second()
+        end = time.monotonic() + _PATIENCE
+        with self.connect() as page:
+            while time.monotonic() < end:
+                self.hear(page, 0.2)
+                if self.second.plots or self.second.links:
+                    return True
+        return False
+
+    def hear(self, page: Connection, timeout: float) -> None:
+        """Takes one packet, if there is one in time."""
+        time.sleep(self._delay)
+        try:
+            raw = page.recv(timeout=timeout)
+        except TimeoutError:
+            return
+        if isinstance(raw, bytes):
+            self.second.bytes += len(raw)
+            for message in messages_of(raw):
+                self._take(page, message)
+            self._tell_what_is_seen(page)
+
+    @property
+    def drawn(self) -> set[str]:
+        """Titles of the charts that were renewed in the present `second`."""
+        return {self._charts[uuid] for uuid in self.second.plots if uuid in self._charts}
+
+    def show(self, tab: str | None) -> None:
+        """The plots of another tab; None: the whole page goes behind other ones."""
+        self._tab = tab
+
+    def _forget(self) -> None:
+        self._parents, self._charts, self._tabs, self._control, self._said = {}, {}, {}, None, ""
+
+    def _take(self, page: Connection, message: dict[str, Any]) -> None:
+        self.second.messages += 1
+        self._note(message)
+        match message["type"]:
+            case "GuiUpdateMessage" if "data" in message["updates"]:
+                self.second.plots[message["uuid"]] += 1
+            case "SceneNodeUpdateMessage" | "SetPositionMessage" | "SetOrientationMessage":
+                self.second.links[f"{message['type']} {message.get('name')}"] += 1
+            case "LocalStorageSetItemMessage":
+                self._stored[message["key"]] = message["value"]
+            case "LocalStorageGetItemRequestMessage":
+                value = self._stored.get(message["key"])
+                answer = _messages.LocalStorageGetItemResponseMessage(value, None, message["request_uuid"])
+                page.send(pack(answer))
+            case _:
+                pass
+
+    def _note(self, message: dict[str, Any]) -> None:
+        """Where charts are, and whom to tell which of them are seen."""
+        props = message.get("props", {})
+        if "container_uuid" in message:
+            self._parents[message["uuid"]] = message["container_uuid"]
+        match message["type"]:
+            case "ResetGuiMessage":
+                self._forget()
+            case "GuiUplotMessage":
+                self._charts[message["uuid"]] = props["title"]
+            case "GuiRemoveMessage":
+                self._charts.pop(message["uuid"], None)
+            case "GuiPanelMessage" | "GuiTabGroupMessage":
+                self._tabs |= zip(props["_tab_container_ids"], props["_tab_labels"], strict=True)
+            case "GuiUpdateMessage" if "_tab_labels" in message["updates"]:
+                self._tab_ids(message["updates"])
+            case "GuiTextMessage" if props["label"] == LABEL:
+                self._control = message["uuid"]
+            case _:
+                pass
+
+    def _tab_ids(self, updates: dict[str, Any]) -> None:
+        if "_tab_container_ids" in updates:
+            self._tabs |= zip(updates["_tab_container_ids"], updates["_tab_labels"], strict=True)
+
+    def _tell_what_is_seen(self, page: Connection) -> None:
+        titles = sorted(title for uuid, title in self._charts.items() if self._in_tab(uuid))
+        seen = ASLEEP if self._tab is None else "\n".join([AWAKE, *titles])
+        if self._control is not None and seen != self._said:
+            self._said = seen
+            page.send(pack(_messages.GuiUpdateMessage(self._control, {"value": seen})))
+
+    def _in_tab(self, uuid: str) -> bool:
+        while uuid in self._parents:
+            uuid = self._parents[uuid]
+        return self._tabs.get(uuid, self._tab) == self._tab
 
 
-def _take(socket: Connection, message: dict[str, Any], second: Second) -> None:
-    second.messages += 1
-    match message["type"]:
-        case "GuiUpdateMessage" if "data" in message["updates"]:
-            second.plots[message["uuid"]] += 1
-        case "SceneNodeUpdateMessage" | "SetPositionMessage" | "SetOrientationMessage":
-            second.links[f"{message['type']} {message.get('name')}"] += 1
-        case "LocalStorageGetItemRequestMessage":
-            socket.send(pack(nothing_kept(message["request_uuid"])))
-        case _:
-            pass
+def _tell(line: dict[str, float]) -> None:
+    # In one piece: other clients write, too.
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Watches as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("url")
+    parser.add_argument("--clients", type=int, default=1)
+    parser.add_argument("--tab", default=_TAB)
+    parser.add_argument("--delay", type=float, default=0.0)
+    options = parser.parse_args()
+    queues = [SimpleQueue[int]() for _ in range(options.clients)]
+    threads = [
+        threading.Thread(target=Viewer(options.url, options.tab, options.delay).watch, args=each, daemon=True)
+        for each in enumerate(queues)
+    ]
+    for thread in threads:
+        thread.start()
+    for line in sys.stdin:
+        queues[0].put(int(line))
+    for thread in threads:
+        thread.join()
+    for thread in threads:
+        thread.join()
 
 
 if __name__ == "__main__":
-    watch(sys.argv[1])
+    main()

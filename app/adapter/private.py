@@ -13,14 +13,14 @@ import threading
 import uuid
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from http import HTTPStatus
 from typing import Any
 
+import numpy as np
 import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
-from websockets.http11 import Request, Response
 
+from app.adapter.probe import answer, reaches, refuse
 from app.adapter.wake import WakeUp
 from robots import InputError
 
@@ -37,7 +37,12 @@ Guard = Callable[[Mapping[str, Any]], dict[str, Any]]
 _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
 
+_UNSENT = 32_000
+"""Bytes that may wait in the machine's own buffer. Its usual megabytes are seconds of old pictures where the
+line is slow."""
+
 _OF_MODULES = (
+    (_messages, ("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage")),
     (_messages, ("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect")),
     (_messages, ("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage")),
     (_messages, ("FileTransferStartUpload", "FileTransferPart", "Message")),
@@ -67,7 +72,7 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     try:
         _require(served == [True], "how it serves")
         for path in _OF_A_SERVER:
-            _require(_reaches(server, path), path)
+            _require(reaches(server, path), path)
         handlers = server._websock_server
         # Any client could ask for a public tunnel to this machine, button or not.
         for tunnel in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
@@ -95,7 +100,7 @@ def self_test(guard: Guard) -> None:
         bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
         bare.start()
         try:
-            refused = _answer(bare._port).startswith(b"HTTP/1.1 503")
+            refused = answer(bare._port).startswith(b"HTTP/1.1 503")
         finally:
             bare.stop()
     _require(served == [True] and refused, "how it serves")
@@ -116,7 +121,7 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
             changed = guard(keywords)
         except Exception:
             served.append(False)
-            return plain(*given, **{**keywords, "process_request": _refuse})
+            return plain(*given, **{**keywords, "process_request": refuse})
         served.append(True)
         return plain(*given, **changed)
 
@@ -128,31 +133,12 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
             web.serve = plain
 
 
-def _answer(port: int) -> bytes:
-    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
-        stranger.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-        return stranger.recv(100)
-
-
-def _refuse(connection: ServerConnection, _: Request) -> Response:
-    return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
-
-
 def _require(found: bool, what: str) -> None:
     if not found:
         raise InputError(
             f"viser {viser.__version__} is not the one this page was made for ({what} has changed): it is "
             "not served, for nobody could be kept out. Install viser 1.1 again."
         )
-
-
-def _reaches(start: object, path: str) -> bool:
-    for name in path.split("."):
-        try:
-            start = getattr(start, name)
-        except (AttributeError, RecursionError):
-            return False
-    return True
 
 
 def _keep_awake(server: viser.ViserServer) -> None:
@@ -218,6 +204,27 @@ async def read_storage(
     return tuple(future.result() if future.done() else None for future in asked.values())
 
 
+def run_script(client: viser.ClientHandle, source: str) -> None:
+    """Runs JavaScript in the page."""
+    client._websock_connection.queue_message(_messages.RunJavascriptMessage(source))
+
+
+def waiting(client: viser.ClientHandle) -> int:
+    """Messages that its line has not taken yet."""
+    return len(client._websock_connection.get_message_buffer().message_from_id)
+
+
+def keep_short(server: viser.ViserServer, client: viser.ClientHandle) -> None:
+    """Lets the line take no more than it soon delivers, so that what waits can still be replaced by what is
+    newer."""
+    live = connection_of(server, client)
+    if live is None or not hasattr(socket, "TCP_NOTSENT_LOWAT"):
+        return
+    line = live.transport.get_extra_info("socket")
+    with contextlib.suppress(OSError):  # gone already
+        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT)
+
+
 # ---------------------------------------------------------------- what a browser says
 
 Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
@@ -270,3 +277,23 @@ def send_again(handle: viser.GuiInputHandle[Any]) -> None:
     control = handle._impl
     update = _messages.GuiUpdateMessage(control.uuid, {"value": control.value})
     control.gui_api._websock_interface.queue_message(update)
+
+
+def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> None:
+    """New curves for a chart, abscissas first, as they are; assigning them would send double precision."""
+    chart._queue_update("data", tuple(np.ascontiguousarray(each) for each in arrays))
+
+
+# ---------------------------------------------------------------- one node of the scene
+
+
+def shift(node: viser.FrameHandle, position: np.ndarray) -> None:
+    """Moves a node, (3,) m; assigning compares at length with what was."""
+    node._impl.position[:] = position
+    node._impl.api._queue_scene_message(_messages.SetPositionMessage(node.name, tuple(position.tolist())))
+
+
+def turn(node: viser.FrameHandle, wxyz: np.ndarray) -> None:
+    """Turns a node."""
+    node._impl.wxyz[:] = wxyz
+    node._impl.api._queue_scene_message(_messages.SetOrientationMessage(node.name, tuple(wxyz.tolist())))

@@ -1,4 +1,4 @@
-"""What wakes viser's sender, from any thread."""
+"""What wakes viser's sender, whichever thread writes."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import contextlib
 
 
 class WakeUp(asyncio.Event):
-    """An event that is set on its loop, whoever sets it.
+    """An event that is set on its loop only.
 
-    asyncio's own may be set on their loop only, and viser 1.1 sets its sender's from whatever thread writes.
-    Once in hours that falls between the sender's last look and its sleep. The event is set then, its sender
-    asleep, and what is set already wakes nobody: the page stands still for good.
+    asyncio's own may not be set elsewhere, and viser 1.1 sets its sender's from whatever thread writes, and
+    then asks the loop to set it, too. Once in hours that falls between the sender's last look and its sleep.
+    The event is set then, its sender asleep, and what is set already wakes nobody: the page stands still for
+    good. So what another thread sets is left to the loop; a picture of many messages then wakes it once.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -19,13 +20,6 @@ class WakeUp(asyncio.Event):
         self._home = loop
 
     def set(self) -> None:
-        wake = super().set
-        try:
-            here = asyncio.get_running_loop() is self._home
-        except RuntimeError:
-            here = False  # a thread without a loop
-        if here:
-            wake()
-            return
-        with contextlib.suppress(RuntimeError):  # the loop has ended, and so has the sender
-            self._home.call_soon_threadsafe(wake)
+        with contextlib.suppress(RuntimeError):  # a thread without a loop
+            if asyncio.get_running_loop() is self._home:
+                super().set()

@@ -119,7 +119,7 @@ class History:
         slots = wanted % _SLOTS
         known = self._numbers[slots] == wanted
         known &= wanted >= 0
-        return Window(self.layout, known, slots, self._pairs, self._bits)
+        return Window(self.layout, 2 * (end - BUCKETS + 1), known, slots, self._pairs, self._bits)
 
     def at(self, t: float) -> np.ndarray:
         """The row that was the newest one when the clock read t (s), as near as is known."""
@@ -138,9 +138,17 @@ class Window:
     """What the plots show at one moment: BUCKETS pairs, oldest first."""
 
     def __init__(
-        self, layout: Layout, known: np.ndarray, slots: np.ndarray, pairs: np.ndarray, bits: np.ndarray
+        self,
+        layout: Layout,
+        first: int,
+        known: np.ndarray,
+        slots: np.ndarray,
+        pairs: np.ndarray,
+        bits: np.ndarray,
     ) -> None:
+        """first: number of the oldest value since the run began; it may be negative."""
         self.layout = layout
+        self.first = first
         self._known, self._slots = known, slots
         self._pairs, self._bits = pairs, bits
 

@@ -50,16 +50,18 @@ class Moment:
     ghost: Shade | None
 
 
-def moment_of(learner: Learner, past: float | None) -> Moment | None:
+def moment_of(learner: Learner, past: float | None, curves: bool = True) -> Moment | None:
     """The instant to show, after taking over what is new; None while nothing was reported yet.
 
     Args:
         learner: whose.
         past: s of simulated time to look back to; None: now.
+        curves: whether telemetry is wanted that is up to date, and the ways that robot and ghost went, which
+            are empty otherwise.
     """
-    t = learner.look()
+    t = learner.look(curves)
     ghost = learner.ghost
-    beside = None if ghost is None else ghost.look()
+    beside = None if ghost is None else ghost.look(curves)
     if ghost is not None and (ghost.ready is None or ghost.ready.choice != learner.choice):
         beside = None  # still the ghost of another scene
     status = learner.status
@@ -76,7 +78,7 @@ def moment_of(learner: Learner, past: float | None) -> Moment | None:
             learner.tape.at(shown),
             history.window(shown),
             history.latest if past is None else history.at(shown),
-            _way(learner, shown),
+            _way(learner, shown, curves),
         )
     )
     if found is None:
@@ -92,14 +94,16 @@ def moment_of(learner: Learner, past: float | None) -> Moment | None:
         latest=latest,
         window=window,
         way=way,
-        ghost=None if ghost is None or beside is None else _shade(ghost, t),
+        ghost=None if ghost is None or beside is None else _shade(ghost, t, curves),
     )
 
 
-def _shade(ghost: Ghost, t: float) -> Shade | None:
-    found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t)))
+def _shade(ghost: Ghost, t: float, ways: bool) -> Shade | None:
+    found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t, ways)))
     return None if found is None or found[0] is None else Shade(found[0].poses, found[1], found[2])
 
 
-def _way(simulation: Simulation, t: float) -> np.ndarray:
+def _way(simulation: Simulation, t: float, wanted: bool) -> np.ndarray:
+    if not wanted:
+        return np.zeros((0, 0, 7))
     return np.array([frame.poses for frame in simulation.tape.between(t - TRACE_SECONDS, t)])

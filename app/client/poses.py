@@ -39,7 +39,7 @@ class Tape:
         if len(frames) > 1 and frames[-1].t - frames[-2].t < 1 / RATE - 1e-9:
             frames.pop()
         frames.append(frame)
-        if len(frames) > 2 * KEPT * RATE:
+        if len(frames) > 1.2 * KEPT * RATE:
             del frames[: self._index(frame.t - KEPT)]
 
     def clear(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,40 +23,46 @@ class Record:
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self._t = layout.fields["t"].start
-        self._recent: deque[np.ndarray] = deque(maxlen=round(KEPT * RATE))
-        self._whole: list[np.ndarray] = []
+        # Two blocks for good: rows of their own, kept for minutes among what lives for an instant, leave
+        # holes all over the memory. And filled, so that a learner takes now what it will take.
+        self._recent = np.full((round(KEPT * RATE), layout.size), np.nan)
+        self._whole = np.full((MOST, layout.size), np.nan)
+        self._clear()
+
+    def _clear(self) -> None:
         self._every = 1
-        self._kept = 0
+        self._kept = 0  # rows that were taken at RATE
+        self._thinned = 0  # rows of `_whole`
         self._mark = -1
+        self._last = -np.inf
 
     def take(self, rows: np.ndarray) -> None:
         """Rows in order; a time that goes back begins a new run."""
-        if self._recent and rows[0, self._t] < self._recent[-1][self._t]:
-            self._recent.clear()
-            self._whole.clear()
-            self._every, self._kept, self._mark = 1, 0, -1
-        marks = np.floor(rows[:, self._t] * RATE + 1e-6).astype(np.int64)
-        for row, mark in zip(rows, marks.tolist(), strict=True):
-            if mark != self._mark:
-                self._mark = mark
-                self._keep(row.copy())
+        times = rows[:, self._t]
+        if times[0] < self._last:
+            self._clear()
+        self._last = float(times[-1])
+        marks = np.floor(times * RATE + 1e-6).astype(np.int64)
+        for k in np.flatnonzero(np.diff(marks, prepend=self._mark)):
+            self._keep(rows[k])
+        self._mark = int(marks[-1])
 
     def _keep(self, row: np.ndarray) -> None:
-        self._recent.append(row)
+        self._recent[self._kept % len(self._recent)] = row
         if self._kept % self._every == 0:
-            self._whole.append(row)
-            if len(self._whole) >= MOST:
-                self._whole = self._whole[::2]
+            self._whole[self._thinned] = row
+            self._thinned += 1
+            if self._thinned == MOST:
+                self._thinned = (MOST + 1) // 2
+                self._whole[: self._thinned] = self._whole[::2].copy()
                 self._every *= 2
         self._kept += 1
 
     def recent(self) -> np.ndarray:
         """(k, size) rows of the last minute."""
-        return self._stacked(list(self._recent))
+        end = self._kept
+        return self._recent[np.arange(max(0, end - len(self._recent)), end) % len(self._recent)]
 
     def whole(self) -> np.ndarray:
         """(k, size) rows since the last reset."""
-        return self._stacked(self._whole)
-
-    def _stacked(self, rows: list[np.ndarray]) -> np.ndarray:
-        return np.array(rows) if rows else np.empty((0, self.layout.size))
+        return self._whole[: self._thinned].copy()

@@ -140,11 +140,13 @@ class Simulation:
                 return None
             return look(self._block, self._history)
 
-    def look(self) -> float | None:
-        """Takes over what is new, keeps it for looking back, and returns the simulated time, s."""
+    def look(self, rows: bool = True) -> float | None:
+        """Takes over what is new, keeps it for looking back, and returns the simulated time, s. rows: the
+        telemetry, too, which can wait for the next look but one."""
 
         def take(block: Block, history: History) -> float:
-            history.pull()
+            if rows:
+                history.pull()
             t, poses = block.moment()
             self.tape.add(Frame(t, poses, self.status))
             return t

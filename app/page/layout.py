@@ -32,6 +32,7 @@ from app.panels.run.scene import RobotPanel
 from app.panels.run.share import SharePanel
 from app.panels.run.timeline import TimeLine
 from app.panels.widgets.command import add_command
+from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import in_order
@@ -63,8 +64,19 @@ class Stage:
         self._theme = theme
         self._colours = level_colours([task.level for task in in_order(ready)])
         self._bindings: Bindings[Any] = Bindings(self._post, loop)
+        self._in_view = InView(client)
         self._face = face_for(
-            Context(client, learner, ready, self._colours, self._bindings, loop, dark, self._change_theme)
+            Context(
+                client,
+                self._in_view,
+                learner,
+                ready,
+                self._colours,
+                self._bindings,
+                loop,
+                dark,
+                self._change_theme,
+            )
         )
         self._resets: int | None = None
         self._ghost: GhostView | None = None
@@ -149,13 +161,22 @@ class Stage:
         self._playback.show_trouble(trouble)
 
     def follow(self, plots: bool, texts: bool) -> None:
-        """Shows the newest poses, and now and then plots and texts."""
+        """Shows the newest poses, and now and then plots and texts. A page that nobody sees gets texts only,
+        and a browser that still waits for what was sent last gets no more for now: later it will be newer."""
         learner = self._learner
         if learner.status is not None:
             self._time_line.update(learner.status.running)
-        moment = moment_of(learner, self._time_line.past)
+        due, plots = plots, plots and not self._in_view.asleep
+        moment = moment_of(learner, self._time_line.past, curves=due)
         if moment is None or learner.ready is not self._ready:
             return  # nothing yet, or already another scene, which the page will build
+        if not self._in_view.asleep:
+            self._draw(moment, plots)
+        if texts and learner.failure is None:
+            self._write(moment)
+
+    def _draw(self, moment: Moment, plots: bool) -> None:
+        learner = self._learner
         with self._client.atomic():
             self._robot.move(moment.poses[:-1])
             self._show_ghost(moment)
@@ -170,8 +191,6 @@ class Stage:
                 self._face.draw(moment)
                 if self._ghost is not None and moment.ghost is not None:
                     self._ghost.draw(moment.ghost)
-        if texts:
-            self._write(moment)
 
     def _show_ghost(self, moment: Moment) -> None:
         ghost = self._learner.ghost

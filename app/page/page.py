@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import viser
 
+from app.adapter import private
 from app.client.learner import Learner
 from app.client.progress import Notebook
 from app.client.trouble import Trouble
@@ -122,6 +123,9 @@ class Page:
         if trouble != self._trouble:
             self._trouble = trouble
             stage.show_trouble(trouble)
+        if private.waiting(self._client) > 0:
+            learner.look()  # the line is slow: what happens meanwhile is kept, and the next picture is newer
+            return
         try:
             stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
         except Exception:

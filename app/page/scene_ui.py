@@ -14,6 +14,7 @@ from app.client.learner import Learner
 from app.client.moment import Moment
 from app.html.palette import RGB
 from app.link.messages import Post, Ready, Status
+from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from app.view.robot import RobotView
@@ -22,9 +23,11 @@ from lessons.events import Event
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """Where a face lives. bindings: of the kind's settings; theme: called with a new theme, dark or not."""
+    """Where a face lives. in_view: what its browser shows; bindings: of the kind's settings; theme: called
+    with a new theme, dark or not."""
 
     client: viser.ClientHandle
+    in_view: InView
     learner: Learner
     ready: Ready
     colours: dict[str, RGB]

@@ -55,9 +55,11 @@ class TorqueFace:
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
         with plots.add_tab("Errors"):
-            self._level_plots = LevelPlots(gui, self._context.ready, self._context.colours)
+            self._level_plots = LevelPlots(
+                gui, self._context.in_view, self._context.ready, self._context.colours
+            )
         with plots.add_tab("Joints"):
-            self._joint_plots = JointPlots(gui, self._context.ready.robot)
+            self._joint_plots = JointPlots(gui, self._context.in_view, self._context.ready.robot)
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         context, ready = self._context, self._context.ready

@@ -75,9 +75,13 @@ class VelocityFace:
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
         with plots.add_tab("Errors"):
-            self._plots = TrackingPlots(gui, self._context.ready, self._context.colours)
+            self._plots = TrackingPlots(
+                gui, self._context.in_view, self._context.ready, self._context.colours
+            )
         with plots.add_tab("Joints"):
-            self._joint_plots = JointPlots(gui, self._context.ready.robot, ACCELERATION)
+            self._joint_plots = JointPlots(
+                gui, self._context.in_view, self._context.ready.robot, ACCELERATION
+            )
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         del robot  # velocity servos do not feel a pull

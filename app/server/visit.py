@@ -50,6 +50,7 @@ class Visit:
         self._workers = Workers()
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)
+        private.keep_short(server, client)
         connection = private.connection_of(server, client)
         if isinstance(connection, GuardedConnection):
             connection.uploads = (lambda: private.unfinished_uploads(client), self._refuse_upload)

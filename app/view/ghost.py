@@ -8,7 +8,7 @@ import viser
 from app.client.moment import Shade
 from app.html.palette import GHOST
 from app.view.robot import RobotView
-from app.view.trails import NOTHING, segments
+from app.view.trails import NOTHING, trace
 from robots import Robot
 
 _OPACITY = 0.38
@@ -31,7 +31,7 @@ class GhostView:
 
     def draw(self, shade: Shade) -> None:
         """The trace, about ten times a second."""
-        self._trace.points = segments(shade.way[:, -1, :3]) if len(shade.way) > 1 else NOTHING
+        self._trace.points = trace(shade.way[:, -1, :3]) if len(shade.way) else NOTHING
 
     def remove(self) -> None:
         self._root.remove()

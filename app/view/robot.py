@@ -6,11 +6,12 @@ import numpy as np
 import pinocchio as pin
 import viser
 
+from app.adapter import private
 from app.html.palette import RGB
 from robots import Robot
 from robots.shapes import link_shapes
 
-_STILL = 1e-5  # m, and about as many rad: less than a pixel
+_STILL = 1e-4  # m, and about as many rad: a tenth of a pixel
 
 
 class RobotView:
@@ -52,12 +53,14 @@ class RobotView:
     def move(self, poses: np.ndarray) -> None:
         """poses (n, 7): position, m, and quaternion wxyz per joint. A robot at rest sends nothing, so that
         the browser need not draw."""
-        if np.allclose(poses, self._shown, rtol=0.0, atol=_STILL):
-            return
-        self._shown = poses.copy()
-        for frame, pose in zip(self._frames, poses, strict=False):
-            frame.position = pose[:3]
-            frame.wxyz = pose[3:]
+        moved = ~(np.abs(poses - self._shown) <= _STILL)  # NaN: never shown
+        shifted, turned = moved[:, :3].any(axis=1), moved[:, 3:].any(axis=1)
+        for k in np.flatnonzero(shifted):
+            private.shift(self._frames[k], poses[k, :3])
+            self._shown[k, :3] = poses[k, :3]
+        for k in np.flatnonzero(turned):
+            private.turn(self._frames[k], poses[k, 3:])
+            self._shown[k, 3:] = poses[k, 3:]
 
 
 def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
+from app.adapter import private
 from app.html.palette import BAD, RGB
 from app.link.messages import TaskView
 
@@ -15,6 +16,7 @@ Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
 _BALL = 0.07  # m: larger than most wrists, which it encloses like a bubble
 _FRAME = 0.09  # m
+_STILL = 1e-4  # m, and about as many rad: a tenth of a pixel
 _INVITATION = "drag an arrow"
 
 
@@ -137,6 +139,7 @@ class Frames:
         self._desired = scene.add_frame(
             "/desired", axes_length=_FRAME, axes_radius=0.0035, origin_radius=0.009, visible=False
         )
+        self._shown = np.full(7, np.nan)
         self._actual = scene.add_frame("/actual", axes_length=1.25 * _FRAME, axes_radius=0.0025)
 
     def show(self, on: bool) -> None:
@@ -144,11 +147,11 @@ class Frames:
 
     def actual(self, pose: np.ndarray) -> None:
         """pose (7,): position and quaternion wxyz."""
-        if np.allclose(pose[:3], self._actual.position, rtol=0.0, atol=1e-5) and np.allclose(
-            pose[3:], self._actual.wxyz, rtol=0.0, atol=1e-5
-        ):
-            return
-        self._actual.position, self._actual.wxyz = pose[:3], pose[3:]
+        moved = ~(np.abs(pose - self._shown) <= _STILL)  # NaN: never shown
+        if self._actual.visible and moved.any():
+            self._shown = pose.copy()
+            private.shift(self._actual, pose[:3])
+            private.turn(self._actual, pose[3:])
 
     def desired(self, position: np.ndarray, xyzw: np.ndarray | None) -> None:
         if np.isfinite(position).all():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.client.corners import corners
 from app.html.palette import RGB
 
 EXAGGERATION = 100
@@ -16,7 +17,13 @@ def segments(points: np.ndarray) -> np.ndarray:
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
 
+def trace(tips: np.ndarray) -> np.ndarray:
+    """The way (k, 3) a hand went, m, as segments, without the points that lie on straight stretches."""
+    return segments(tips[corners(tips.T, _FINE)]) if len(tips) > 1 else NOTHING
+
+
 NOTHING = np.zeros((1, 2, 3), np.float32)
+_FINE = 1e-3  # m: half a pixel
 
 
 class Trails:
@@ -50,7 +57,8 @@ class Trails:
 
     def draw(self, tips: np.ndarray, path: np.ndarray, T_s: float) -> None:
         """tips (k, 3): the way the hand went; path (N + 1, 3): the predicted tip."""
-        self._trace.points = segments(tips) if len(tips) > 1 else NOTHING
+        if self._trace.visible:
+            self._trace.points = trace(tips)
         if not self._prediction.visible:
             return
         if len(path) < 2 or not np.isfinite(path).all():

@@ -215,6 +215,25 @@ def test_no_thread_can_hold_up_what_is_sent(page: Page, server: PageServer) -> N
     assert all(isinstance(event, WakeUp) for event in (everybody, *each))
 
 
+def test_the_browser_tells_which_charts_it_shows(page: Page, server: PageServer, learner: Learner) -> None:
+    """Of the others nothing is sent."""
+    pages = [each._page for each in server._visits.values() if each._page is not None]
+    (shown,) = (each for each in pages if each.learner is learner)
+
+    def sees(title: str) -> bool:
+        return shown._stage is not None and shown._stage._in_view.sees(title)
+
+    for name, seen, unseen in (
+        ("Joints", "Torque, % of bound", "Control step, ms"),
+        ("Who binds", "", "Torque, % of bound"),
+        ("Errors", "Control step, ms", "Torque, % of bound"),
+    ):
+        tab(page, name)
+        assert eventually(
+            page, lambda seen=seen, unseen=unseen: sees(seen) == bool(seen) and not sees(unseen)
+        )
+
+
 def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> None:
     tab(page, "Control")
     set_number(page, "N", 7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import viser
@@ -13,6 +14,7 @@ from app.client.decimated import Window
 from app.html.palette import BAD, BOUND, GOOD, joint_colour
 from app.html.text import block
 from app.panels.widgets.chart import Chart, Line, of_ghost
+from app.panels.widgets.in_view import InView
 from robots import Robot
 from robots.truth import joint_axis
 
@@ -55,8 +57,9 @@ ACCELERATION = Input("Acceleration, largest", "acceleration", None, "a_limit", (
 class JointPlots:
     """Three charts. The choice is only noted by the callback; the page's loop builds and draws."""
 
-    def __init__(self, gui: viser.GuiApi, robot: Robot, driven: Input = TORQUE) -> None:
-        self._gui, self._robot, self._input = gui, robot, driven
+    def __init__(self, gui: viser.GuiApi, in_view: InView, robot: Robot, driven: Input = TORQUE) -> None:
+        self._gui, self._in_view = gui, in_view
+        self._robot, self._input = robot, driven
         self._sheet = _sheet(robot, driven)
         self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
         self._joint: int | None = None
@@ -82,31 +85,29 @@ class JointPlots:
         joint = self._joint
         if (joint, ghost is not None) != self._built:
             self._build(joint, ghost is not None)
-        ages = window.ages()
+        if not any(chart.in_view for chart in self._charts):
+            return
         beside = [None] * 3 if ghost is None else self._read(ghost)
-        for kind, (chart, quantity, other) in enumerate(
-            zip(self._charts, self._read(window), beside, strict=True)
-        ):
-            at_bound = window.at_bound(kind)
-            known = np.isfinite(quantity.values[:, 0])
-            if joint is None:
-                edge = np.where(known, 100.0, np.nan)
-                low, high = -_SHARE, _SHARE
-                lines = [*quantity.shares().T, edge, -edge]
-                dashed = [] if other is None else list(other.shares().T)
-                marked = at_bound.any(axis=1)
-            else:
-                low, high = self._span(kind, joint)
-                unit = self._unit(kind, joint)[1]
-                lines = [
-                    unit * quantity.values[:, joint],
-                    unit * quantity.upper[:, joint],
-                    unit * quantity.lower[:, joint],
-                ]
-                dashed = [] if other is None else [unit * other.values[:, joint]]
-                marked = at_bound[:, joint]
-            rug = np.where(marked, low + _RUG * (high - low), low)
-            chart.show(ages, [*lines, rug, *dashed])
+        for kind, (chart, *found) in enumerate(zip(self._charts, self._read(window), beside, strict=True)):
+            chart.show(window, partial(self._curves, window.at_bound(kind), kind, joint, *found))
+
+    def _curves(
+        self, at_bound: np.ndarray, kind: int, joint: int | None, own: _Quantity, other: _Quantity | None
+    ) -> list[np.ndarray]:
+        """Values, upper and lower bound, the marks at the bottom, the ghost's values."""
+        if joint is None:
+            edge = np.where(np.isfinite(own.values[:, 0]), 100.0, np.nan)
+            low, high = -_SHARE, _SHARE
+            lines = [*own.shares().T, edge, -edge]
+            dashed = [] if other is None else list(other.shares().T)
+            marked = at_bound.any(axis=1)
+        else:
+            low, high = self._span(kind, joint)
+            unit = self._unit(kind, joint)[1]
+            lines = [unit * each[:, joint] for each in (own.values, own.upper, own.lower)]
+            dashed = [] if other is None else [unit * other.values[:, joint]]
+            marked = at_bound[:, joint]
+        return [*lines, np.where(marked, low + _RUG * (high - low), low), *dashed]
 
     def _read(self, window: Window) -> Sequence[_Quantity]:
         columns, fields = window.columns, window.layout.fields
@@ -163,6 +164,7 @@ class JointPlots:
         bounds = [Line("upper bound", BOUND, dashed=True), Line("lower bound", BOUND, dashed=True)]
         return Chart(
             self._gui,
+            self._in_view,
             f"{title}, % of bound",
             [*lines, *bounds, Line("at bound", BAD, fill=0.5, width=0.5), *of_ghost(lines, ghost)],
             (-_SHARE, _SHARE),
@@ -176,6 +178,7 @@ class JointPlots:
         line = Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0)
         return Chart(
             self._gui,
+            self._in_view,
             f"{title}, {self._unit(kind, joint)[0]}",
             [
                 line,

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.client.decimated import Window
+from app.client.decimated import BUCKETS, Window
 from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB
 from app.link.messages import Ready
 from app.panels.widgets.chart import Chart, Line, of_ghost
+from app.panels.widgets.in_view import InView
 
 _ERROR = (1e-3, 1e3)  # mm or degrees
 _TIME = (1e-2, 1e2)  # ms
@@ -19,8 +20,9 @@ class LevelPlots:
     """Logarithmic axes: they need not jump to show both a micrometre and a lost level. A ghost has dashed
     curves of its own; the page's loop builds the charts anew when one comes or goes."""
 
-    def __init__(self, gui: viser.GuiApi, ready: Ready, colours: dict[str, RGB]) -> None:
-        self._gui, self._tasks, self._colours = gui, ready.tasks, colours
+    def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
+        self._gui, self._in_view = gui, in_view
+        self._tasks, self._colours = ready.tasks, colours
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
         self._build(ghost=False)
@@ -39,7 +41,7 @@ class LevelPlots:
         budget = Line("budget", GOOD, dashed=True, fill=0.12)
         with self._place:
             self._charts = [
-                Chart(self._gui, title, lines, span, height=height, log=True)
+                Chart(self._gui, self._in_view, title, lines, span, height=height, log=True)
                 for title, lines, span, height in (
                     ("Error per task, mm or °", errors, _ERROR, 200),
                     ("Control step, ms", [*step, budget], _TIME, 170),
@@ -52,12 +54,10 @@ class LevelPlots:
         if (ghost is not None) != self._with_ghost:
             self._build(ghost is not None)
         windows = [window] if ghost is None else [window, ghost]
-        ages = window.ages()
         error, step, leak = self._charts
-        error.show(ages, [curve for each in windows for curve in self._errors(each)])
-        times = [1e-3 * each.columns(each.layout.fields["step_us"])[:, 0] for each in windows]
-        step.show(ages, [*times, np.full_like(ages, 1e3 * T_s)])
-        leak.show(ages, [curve for each in windows for curve in _leaks(each)])
+        error.show(window, lambda: [curve for each in windows for curve in self._errors(each)])
+        step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
+        leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
 
     def _errors(self, window: Window) -> list[np.ndarray]:
         fields = window.layout.fields
@@ -66,6 +66,10 @@ class LevelPlots:
             * (1e3 if task.unit == "m" else np.degrees(1.0))
             for task in self._tasks
         ]
+
+
+def _times(window: Window) -> np.ndarray:
+    return 1e-3 * window.columns(window.layout.fields["step_us"])[:, 0]
 
 
 def _leaks(window: Window) -> list[np.ndarray]:

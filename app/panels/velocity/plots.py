@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.client.decimated import Window
+from app.client.decimated import BUCKETS, Window
 from app.html.palette import BOUND, GOOD, JOINTS, LEVELS, RGB
 from app.html.text import block
 from app.link.messages import Ready, TaskView
 from app.panels.widgets.chart import Chart, Line, of_ghost
+from app.panels.widgets.in_view import InView
 from himpc.htmpc import base_joints
 
 _ERROR = (1e-2, 1e4)  # mm or degrees
@@ -20,8 +21,8 @@ _W = (1e-4, 1e1)  # m³
 class TrackingPlots:
     """Errors on a logarithmic axis: it need not jump to show both a millimetre and three metres."""
 
-    def __init__(self, gui: viser.GuiApi, ready: Ready, colours: dict[str, RGB]) -> None:
-        self._tasks = ready.tasks
+    def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
+        self._in_view, self._tasks = in_view, ready.tasks
         self._gui, self._colours, self._limits = gui, colours, ready.robot.v_limit
         self._base = list(base_joints(ready.robot))[:2]
         self._place = gui.add_folder(None)
@@ -56,13 +57,14 @@ class TrackingPlots:
                 self._charts.append(self._speed(ghost))
 
     def _chart(self, title: str, lines: list[Line], span: tuple[float, float], height: int) -> Chart:
-        return Chart(self._gui, title, lines, span, height=height, log=True)
+        return Chart(self._gui, self._in_view, title, lines, span, height=height, log=True)
 
     def _speed(self, ghost: bool) -> Chart:
         limit = float(self._limits[self._base].max())
         speeds = [Line("x", JOINTS[0]), Line("y", JOINTS[3])]
         return Chart(
             self._gui,
+            self._in_view,
             "Base speed, m/s",
             [
                 *speeds,
@@ -79,20 +81,34 @@ class TrackingPlots:
         """ghost: the same stretch of time of the ghost."""
         if (ghost is not None) != self._with_ghost:
             self._build(ghost is not None)
+        fields = window.layout.fields
         beside = [] if ghost is None else [ghost]
-        ages, fields = window.ages(), window.layout.fields
+        windows = [window, *beside]
         error, step, w = self._charts[:3]
-        bounds = [_unit(task) * window.columns(fields[f"bound/{task.level}"])[:, 0] for task in self._tasks]
-        dashed = [curve for each in beside for curve in self._errors(each)]
-        error.show(ages, [*self._errors(window), *bounds, *dashed])
-        times, *others = (1e-3 * each.columns(fields["step_us"])[:, 0] for each in (window, *beside))
-        step.show(ages, [times, np.full_like(ages, 1e3 * T_s), *others])
-        w.show(ages, [each.columns(fields["manipulability"])[:, 0] for each in (window, *beside)])
+        error.show(
+            window,
+            lambda: [
+                *self._errors(window),
+                *self._bounds(window),
+                *(curve for each in beside for curve in self._errors(each)),
+            ],
+        )
+        period = np.full(2 * BUCKETS, 1e3 * T_s)
+        step.show(window, lambda: [_times(window), period, *(_times(each) for each in beside)])
+        w.show(window, lambda: [each.columns(fields["manipulability"])[:, 0] for each in windows])
         if self._base:
-            limit = window.columns(fields["v_limit"])[:, self._base].min(axis=1)
-            limit = np.where(np.isfinite(limit), limit, float(self._limits[self._base].max()))
-            own, *rest = (each.columns(fields["v"])[:, self._base].T for each in (window, *beside))
-            self._charts[3].show(ages, [*own, limit, -limit, *(curve for each in rest for curve in each)])
+            self._charts[3].show(window, lambda: self._speeds(window, beside))
+
+    def _speeds(self, window: Window, beside: list[Window]) -> list[np.ndarray]:
+        fields = window.layout.fields
+        limit = window.columns(fields["v_limit"])[:, self._base].min(axis=1)
+        limit = np.where(np.isfinite(limit), limit, float(self._limits[self._base].max()))
+        own, *rest = (each.columns(fields["v"])[:, self._base].T for each in (window, *beside))
+        return [*own, limit, -limit, *(curve for each in rest for curve in each)]
+
+    def _bounds(self, window: Window) -> list[np.ndarray]:
+        fields = window.layout.fields
+        return [_unit(task) * window.columns(fields[f"bound/{task.level}"])[:, 0] for task in self._tasks]
 
     def _errors(self, window: Window) -> list[np.ndarray]:
         fields = window.layout.fields
@@ -100,6 +116,10 @@ class TrackingPlots:
             _unit(task) * np.linalg.norm(window.columns(fields[f"error/{task.name}"]), axis=1)
             for task in self._tasks
         ]
+
+
+def _times(window: Window) -> np.ndarray:
+    return 1e-3 * window.columns(window.layout.fields["step_us"])[:, 0]
 
 
 def _unit(task: TaskView) -> float:

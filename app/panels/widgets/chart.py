@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import viser
 from viser import uplot
 
-from app.client.decimated import BUCKETS, WINDOW
+from app.adapter import private
+from app.client.corners import corners
+from app.client.decimated import BUCKETS, WINDOW, Window
 from app.html.palette import RGB, css
+from app.panels.widgets.in_view import InView
 
 _NUDGE = 10
-"""Updates between two invisible changes of the time axis: without one, a chart that was laid out while its
-panel still had no width stays without ticks for ever."""
+"""Looks between two curves that are sent even if nothing changed, with an invisible change of the time axis:
+without one, a chart that was laid out while its panel still had no width stays without ticks for ever."""
+_AROUND = 60  # px of a chart's height that are title and time axis
+_FINE = 0.35  # px: what is closer to a curve lies on it
+_TOP = 30_000.0
+"""The end of every axis as it is sent, in two bytes a value; the beginning is 0. No screen shows more."""
+_TICKS = 5
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,7 @@ class Chart:
     def __init__(
         self,
         gui: viser.GuiApi,
+        in_view: InView,
         title: str,
         lines: Sequence[Line],
         span: tuple[float, float],
@@ -61,15 +70,18 @@ class Chart:
             # uPlot's own logarithmic scale draws nine grid lines per decade, a wall of grey here.
             span = (math.log10(span[0]), math.log10(span[1]))
         self._span = span
+        self._title, self._in_view = title, in_view
+        self._tolerance = _FINE * _TOP / (height - _AROUND)
         self._shows = 0
+        self._sent: tuple[np.ndarray, np.ndarray] | None = None
         x = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
-        scale: uplot.Scale = {"range": span, "auto": False}
+        scale: uplot.Scale = {"range": (0.0, _TOP), "auto": False}
         self._handle = gui.add_uplot(
-            (x, *(np.full_like(x, span[0]) for _ in lines)),
-            ({"label": "s"}, *(_series(line, span[0]) for line in lines)),
+            (x, *(np.zeros_like(x) for _ in lines)),
+            ({"label": "s"}, *(_series(line) for line in lines)),
             title=title,
             scales={"x": {"time": False}, "y": scale},
-            axes=({"size": 36, "space": 60}, _decades(span) if log else {"size": 52, "space": 26}),
+            axes=({"size": 36, "space": 60}, _axis(span, log)),
             bands=tuple(
                 {"series": (upper + 1, lower + 1), "fill": css(colour, 0.10)}
                 for upper, lower, colour in bands
@@ -81,43 +93,75 @@ class Chart:
             padding=(6, 12, 0, 0),
         )
 
-    def show(self, ages: np.ndarray, values: Sequence[np.ndarray]) -> None:
-        """values: one array per line. What is beyond the axis is drawn at its edge. uPlot cannot leave out
-        what is before the first known value: a linear curve is flat there, since a jump would look like a
-        motion; a logarithmic one lies on the axis."""
-        low, high = self._span
+    @property
+    def in_view(self) -> bool:
+        """Whether the browser shows it."""
+        return self._in_view.sees(self._title)
+
+    def show(self, window: Window, curves: Callable[[], Sequence[np.ndarray]]) -> None:
+        """curves: (2 · BUCKETS,) values of each line; not asked for while nobody sees the chart.
+
+        What is beyond the axis is drawn at its edge. uPlot cannot leave out what is before the first known
+        value: a linear curve is flat there, since a jump would look like a motion; a logarithmic one lies on
+        the axis."""
+        if not self.in_view:
+            return
+        values = np.array(curves())
         known = np.isfinite(values[0])
         if np.count_nonzero(known) < 2:
             return
+        low, high = self._span
         if self._log:
-            values = [np.log10(np.maximum(column, 10.0 ** (low - 1))) for column in values]
-        clipped = [
-            np.clip(np.nan_to_num(column, nan=low, posinf=high, neginf=low), low, high) for column in values
-        ]
+            values = np.log10(np.maximum(values, 10.0 ** (low - 1)))
+        values = np.clip(np.nan_to_num(values, nan=low, posinf=high, neginf=low), low, high)
         if not self._log:
             start = int(np.argmax(known))
-            for column in clipped:
-                column[:start] = column[start]
+            values[:, :start] = values[:, start : start + 1]
+        values = (values - low) * (_TOP / (high - low))
+        kept = corners(values, self._tolerance, window.first)
+        self._send(kept, values[:, kept], window.ages()[kept])
+
+    def _send(self, kept: np.ndarray, values: np.ndarray, ages: np.ndarray) -> None:
+        """kept: numbers of the points."""
         self._shows += 1
-        if self._shows % _NUDGE == 0:
-            ages = ages.copy()
-            ages[0] -= 1e-6 * (self._shows // _NUDGE % 2)
-        self._handle.data = (ages, *(np.ascontiguousarray(column) for column in clipped))
+        due = self._shows % _NUDGE == 0
+        if not due and self._looks_the_same(kept, values):
+            return
+        self._sent = kept, values
+        if due:
+            ages[0] -= 1e-5 * (self._shows // _NUDGE % 2)
+        private.send_curves(self._handle, (ages.astype(np.float32), *np.rint(values).astype(np.int16)))
+
+    def _looks_the_same(self, kept: np.ndarray, values: np.ndarray) -> bool:
+        if self._sent is None or not np.array_equal(kept, self._sent[0]):
+            return False
+        return bool(np.abs(values - self._sent[1]).max() <= self._tolerance)
 
     def remove(self) -> None:
         self._handle.remove()
 
 
-def _decades(span: tuple[float, float]) -> uplot.Axis:
-    """Ticks at powers of ten, about five of them."""
-    low, high = round(span[0]), round(span[1])
-    every = max(1, round((high - low) / 5))
-    powers = [power for power in range(low, high + 1) if power % every == 0]
-    labels = tuple(f"{10.0**p:g}" if -4 < p < 4 else f"1e{p}" for p in powers)
-    return {"size": 52, "splits": tuple(float(p) for p in powers), "values": labels}
+def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:
+    """About five ticks: at powers of ten (a logarithmic axis' span is of exponents), or at round numbers."""
+    low, high = span
+    every = max(1.0, round((high - low) / _TICKS)) if log else _round((high - low) / _TICKS)
+    places = [every * k for k in range(math.ceil(low / every - 1e-9), math.floor(high / every + 1e-9) + 1)]
+    labels = tuple(_power(place) if log else f"{place:.6g}" for place in places)
+    splits = tuple(_TOP * (place - low) / (high - low) for place in places)
+    return {"size": 52, "splits": splits, "values": labels}
 
 
-def _series(line: Line, floor: float) -> uplot.Series:
+def _power(exponent: float) -> str:
+    return f"{10.0**exponent:g}" if -4 < exponent < 4 else f"1e{exponent:g}"
+
+
+def _round(step: float) -> float:
+    """The next greater one of 1, 2 and 5 times a power of ten."""
+    scale = 10.0 ** math.floor(math.log10(step))
+    return next(scale * digit for digit in (1.0, 2.0, 5.0, 10.0) if scale * digit >= step - 1e-12 * scale)
+
+
+def _series(line: Line) -> uplot.Series:
     series: uplot.Series = {
         "label": line.label,
         "stroke": css(line.colour),
@@ -127,5 +171,5 @@ def _series(line: Line, floor: float) -> uplot.Series:
     if line.dashed:
         series["dash"] = line.dash
     if line.fill:
-        series["fill"], series["fillTo"] = css(line.colour, line.fill), floor
+        series["fill"], series["fillTo"] = css(line.colour, line.fill), 0.0
     return series

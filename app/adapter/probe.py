@@ -1,0 +1,31 @@
+"""What the test of viser's seams asks."""
+
+from __future__ import annotations
+
+import socket
+from http import HTTPStatus
+
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
+
+
+def answer(port: int) -> bytes:
+    """How a request to this machine is answered, from its beginning."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
+        stranger.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        return stranger.recv(100)
+
+
+def refuse(connection: ServerConnection, _: Request) -> Response:
+    """Lets nobody in."""
+    return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
+
+
+def reaches(start: object, path: str) -> bool:
+    """Whether there is something at a dotted path."""
+    for name in path.split("."):
+        try:
+            start = getattr(start, name)
+        except (AttributeError, RecursionError):
+            return False
+    return True

@@ -1,0 +1,80 @@
+"""Which charts a browser shows, so that nothing is sent for the others."""
+
+from __future__ import annotations
+
+import json
+
+import viser
+
+from app.adapter import private
+
+LABEL = "Charts in view"
+"""Of the control, never shown, by which the browser tells."""
+AWAKE, ASLEEP = "(awake)", "(asleep)"
+_LONGEST = 4000  # characters that are looked at
+
+# Charts go by their titles. An observer notices tabs, folded panels and scrolling alike; a page behind other
+# tabs shows nothing. Charts come and go with viser's tabs, hence the look now and then.
+_SCRIPT = """
+const control = %s, awake = %s, asleep = %s, key = "__himpcLabInView";
+window[key]?.();
+const shown = new Map();
+let said = null;
+const tell = () => {
+  const titles = new Set([awake]);
+  for (const [chart, on] of shown)
+    if (on && chart.isConnected) titles.add(chart.querySelector(".u-title")?.textContent ?? "");
+  const value = document.hidden ? asleep : [...titles].sort().join("\\n");
+  if (value === said || !window.__viserMutable) return;
+  said = value;
+  window.__viserMutable.sendMessage({ type: "GuiUpdateMessage", uuid: control, updates: { value } });
+};
+const observer = new IntersectionObserver((entries) => {
+  for (const entry of entries) if (shown.has(entry.target)) shown.set(entry.target, entry.isIntersecting);
+  tell();
+});
+const look = () => {
+  for (const chart of document.querySelectorAll(".uplot"))
+    if (!shown.has(chart)) { shown.set(chart, false); observer.observe(chart); }
+  for (const chart of shown.keys())
+    if (!chart.isConnected) { shown.delete(chart); observer.unobserve(chart); }
+  tell();
+};
+const soon = () => setTimeout(look, 30);
+const timer = setInterval(look, 250);
+document.addEventListener("visibilitychange", look);
+document.addEventListener("click", soon, true);
+window[key] = () => {
+  clearInterval(timer);
+  observer.disconnect();
+  document.removeEventListener("visibilitychange", look);
+  document.removeEventListener("click", soon, true);
+};
+look();
+"""
+
+
+class InView:
+    """Until the browser has told anything, everything counts as seen."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        self._told = client.gui.add_text(LABEL, "", visible=False)
+        self._titles: frozenset[str] | None = None
+        self.asleep = False
+
+        @self._told.on_update
+        async def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
+            if event.client is not None:
+                self._hear(self._told.value)
+
+        words = private.dom_id(self._told), AWAKE, ASLEEP
+        private.run_script(client, _SCRIPT % tuple(json.dumps(each) for each in words))
+
+    def _hear(self, told: str) -> None:
+        told = told[:_LONGEST]
+        self.asleep = told == ASLEEP
+        self._titles = frozenset(told.split("\n"))
+
+    def sees(self, title: str) -> bool:
+        """Whether a chart of this title is in view."""
+        return self._titles is None or title in self._titles

@@ -1,0 +1,167 @@
+"""Does the server stay as it is: memory of server and simulations, threads, handles; and over reconnects?
+
+    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--json -]
+
+Runs a server of its own, and in a process of their own K clients that speak the page's protocol
+(benchmarks/client.py), and watches for M minutes: the first ten of them (or the first half of a shorter run)
+are for filling what is kept to look back at. Then one of the clients reloads its page N times. Prints a
+table; exit 0 if after the first minutes memory of the server and of its children grew by at most 5 %,
+threads and handles are as many as before, and 100 reloads cost at most 5 MB.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import asdict, dataclass
+from statistics import median
+
+import psutil
+
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.server import PageServer
+from benchmarks.learners import LONG, Viewers, simulated
+
+FILL = 10.0  # minutes
+EVERY = 5.0  # s
+NEAR = 6  # samples over which a median is taken
+REST = 5.0  # s
+GROWTH, PER_100, SPARE = 1.05, 5.0, 3
+"""Of memory; MB; threads and handles that come and go."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """minute: since the start; server, children: MB that no other process shares; rss: MB of the server."""
+
+    minute: float
+    server: float
+    rss: float
+    children: float
+    processes: int
+    threads: int
+    handles: int
+
+
+def main() -> int:
+    """Watches as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--clients", type=int, default=8)
+    parser.add_argument("--reconnects", type=int, default=100)
+    parser.add_argument("--scene", default="iiwa14-hold")
+    parser.add_argument("--json", choices=["-"], default=None)
+    options = parser.parse_args()
+    server = PageServer(SceneChoice(options.scene), port=0, max_sessions=options.clients)
+    try:
+        with Viewers(server.url, "--clients", str(options.clients)) as viewers:
+            assert wait_until(lambda: len(server.sessions.learners) == options.clients, LONG), "not let in"
+            learners = server.sessions.learners
+            assert wait_until(lambda: all(simulated(each) > 0.5 for each in learners), LONG), "nothing runs"
+            samples = watched(options.minutes, viewers.pid)
+            cost = reconnected(viewers, options.reconnects)
+    finally:
+        server.close()
+    faults = judged(samples, min(FILL, options.minutes / 2), cost)
+    found = {"reconnects_mb_per_100": cost, "faults": faults, "samples": [asdict(each) for each in samples]}
+    print(json.dumps(found, indent=1) if options.json else table(samples, cost, faults))
+    return 1 if faults else 0
+
+
+def reconnected(viewers: Viewers, times: int) -> float | None:
+    """MB that the server keeps of a hundred reloads of a page, after some that warm it up."""
+    if not times:
+        return None
+    visit(viewers, max(5, times // 5))
+    before = rested(viewers.pid)
+    visit(viewers, times)
+    return round(100 / times * (rested(viewers.pid) - before), 2)
+
+
+def visit(viewers: Viewers, times: int) -> None:
+    """A browser reloads so often."""
+    came = viewers.reload(times)
+    assert came == times, f"of {times} visits only {came} saw a robot"
+
+
+def rested(client: int) -> float:
+    """MB of the server after a moment's rest."""
+    time.sleep(REST)
+    found: list[float] = []
+    for _ in range(NEAR):
+        time.sleep(0.5)
+        found.append(sample(0.0, client).server)
+    return median(found)
+
+
+def watched(minutes: float, client: int) -> list[Sample]:
+    """Samples over so many minutes."""
+    began, found = time.monotonic(), list[Sample]()
+    while (minute := (time.monotonic() - began) / 60) < minutes:
+        found.append(sample(minute, client))
+        time.sleep(EVERY)
+    return found
+
+
+def sample(minute: float, client: int) -> Sample:
+    """What server and children hold now. client: number of the process that is no part of the server."""
+    server = psutil.Process()
+    memory = server.memory_full_info()
+    own, processes = 0.0, 0
+    for child in server.children(recursive=True):
+        if child.pid == client:
+            continue
+        try:
+            own += child.memory_full_info().uss
+            processes += 1
+        except psutil.NoSuchProcess:
+            pass
+    return Sample(
+        minute=round(minute, 2),
+        server=round(1e-6 * memory.uss, 1),
+        rss=round(1e-6 * memory.rss, 1),
+        children=round(1e-6 * own, 1),
+        processes=processes,
+        threads=server.num_threads(),
+        handles=server.num_fds(),
+    )
+
+
+def judged(samples: list[Sample], fill: float, cost: float | None) -> list[str]:
+    """Sentences on what is over the figures; fill: minutes that do not count."""
+    later = [each for each in samples if each.minute >= fill]
+    if len(later) < 2 * NEAR:
+        return [f"Too short: {len(later)} samples after the first {fill:g} minutes."]
+    first, last = later[:NEAR], later[-NEAR:]
+    faults: list[str] = []
+    for name in ("server", "children"):
+        before, after = (median(getattr(each, name) for each in some) for some in (first, last))
+        if after > GROWTH * before:
+            faults.append(f"Memory of the {name} grew from {before:.1f} to {after:.1f} MB.")
+    for name in ("processes", "threads", "handles"):
+        before, after = (median(getattr(each, name) for each in some) for some in (first, last))
+        if after > before + SPARE:
+            faults.append(f"There were {before:g} {name}, then {after:g}.")
+    if cost is not None and cost > PER_100:
+        faults.append(f"100 reconnects cost {cost:.1f} MB.")
+    return faults
+
+
+def table(samples: list[Sample], cost: float | None, faults: list[str]) -> str:
+    """For people: about thirty lines."""
+    names = list(asdict(samples[0]))
+    lines = ["  ".join(name.rjust(9) for name in names)]
+    lines += [
+        "  ".join(str(value).rjust(9) for value in asdict(each).values())
+        for each in samples[:: max(1, len(samples) // 30)]
+    ]
+    if cost is not None:
+        lines.append(f"100 reconnects: {cost:.1f} MB")
+    return "\n".join([*lines, *(faults or ["Everything stayed as it was."])])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

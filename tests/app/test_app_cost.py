@@ -1,0 +1,127 @@
+"""What a page sends: only what is seen, as little as shows it, and no faster than it is taken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from websockets.sync.connection import Connection
+
+from app.adapter import private
+from app.client.corners import corners
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.panels.widgets.chart import _TOP, _axis
+from app.server.server import PageServer
+from benchmarks.client import Second, Viewer
+
+LONG = 60.0  # s
+TORQUE, STEP = "Torque, % of bound", "Control step, ms"
+
+
+@pytest.fixture(scope="module")
+def circling() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("planar3-circle"), port=0, max_sessions=1, grace=0.0)
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def alone(circling: PageServer) -> PageServer:
+    """The test before has left."""
+    assert wait_until(lambda: not circling.sessions.learners, LONG)
+    return circling
+
+
+def hear_until(viewer: Viewer, page: Connection, condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + LONG
+    while not condition():
+        assert time.monotonic() < end
+        viewer.hear(page, 0.2)
+
+
+def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
+    viewer = Viewer(alone.url, tab="Joints")
+    with viewer.connect() as page:
+        hear_until(viewer, page, lambda: TORQUE in viewer.drawn and bool(viewer.second.links))
+        for tab, seen, unseen in (("Errors", STEP, TORQUE), ("Joints", TORQUE, STEP)):
+            viewer.show(tab)
+            viewer.second = Second()
+            hear_until(viewer, page, lambda seen=seen: seen in viewer.drawn)  # what was under way has come
+            viewer.second = Second()
+            hear_until(viewer, page, lambda: max(viewer.second.plots.values(), default=0) >= 5)
+            assert seen in viewer.drawn and unseen not in viewer.drawn
+
+
+def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
+    viewer = Viewer(alone.url)
+    with viewer.connect() as page:
+        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+        viewer.show(None)
+        (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
+        hear_until(viewer, page, lambda: shown._stage is not None and shown._stage._in_view.asleep)
+        hear_until(viewer, page, lambda: _hears_nothing_drawn(viewer, page))
+        viewer.second = Second()
+        hear_until(viewer, page, lambda: viewer.second.messages >= 10)
+        assert not viewer.second.plots and not viewer.second.links
+        viewer.show("Joints")
+        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+
+
+def _hears_nothing_drawn(viewer: Viewer, page: Connection) -> bool:
+    """Whether a packet with neither plots nor poses came: the last pictures are through."""
+    viewer.second = Second()
+    viewer.hear(page, 0.2)
+    return bool(viewer.second.messages) and not viewer.second.plots and not viewer.second.links
+
+
+def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
+    viewer = Viewer(alone.url)
+    with viewer.connect(slow=True) as page:
+        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+        (client,) = alone._viser.get_clients().values()
+        (learner,) = alone.sessions.learners
+        # Nothing is read any more: what is written stays where it is.
+        assert wait_until(lambda: private.waiting(client) > 0, LONG)
+        status = learner.status
+        assert status is not None
+        waits = private.waiting(client)
+        assert wait_until(lambda: learner.status is not None and learner.status.t > status.t + 2.0, LONG)
+        assert private.waiting(client) < waits + 100  # texts, each of which takes its own former one's place
+        # What is read then is soon of now.
+        viewer.second = Second()
+        hear_until(viewer, page, lambda: private.waiting(client) == 0)
+        assert viewer.second.plots.total() < 100 and bool(viewer.second.links)
+
+
+def test_corners_show_the_curves() -> None:
+    rng = np.random.default_rng(5)
+    x = np.arange(320)
+    curves = np.array([np.sin(x / 40), 0.02 * rng.standard_normal(320), np.zeros(320)])
+    curves[2, 170] = 1.0  # a spike
+    for phase in (0, 7, -123):
+        kept = corners(curves, 0.05, phase)
+        drawn = np.array([np.interp(x, kept, curve[kept]) for curve in curves])
+        assert np.abs(drawn - curves).max() <= 0.1 and drawn[2, 170] == 1.0
+        assert kept[0] == 0 and kept[-1] == 319 and len(kept) < 200
+    assert corners(np.ones((2, 320)), 1e-9).tolist() == [0, 319]
+
+
+def test_curves_that_slide_past_keep_their_corners() -> None:
+    """Else they would shimmer."""
+    x = np.arange(400)
+    curve = np.sin(x / 25)[None]
+    now, then = (
+        set((start + corners(curve[:, start : start + 320], 0.01, start)).tolist()) for start in (20, 26)
+    )
+    inside = set(range(64, 300))
+    assert now & inside == then & inside
+
+
+def test_axes_have_a_few_round_ticks() -> None:
+    axis = _axis((-120.0, 120.0), log=False)
+    assert list(axis["values"]) == ["-100", "-50", "0", "50", "100"]  # pyright: ignore
+    assert np.allclose(axis["splits"], _TOP * (np.array([-100, -50, 0, 50, 100]) + 120) / 240)  # pyright: ignore
+    assert _axis((-3.0, 3.0), log=True)["values"][0] == "0.001"  # pyright: ignore
