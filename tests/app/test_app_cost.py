@@ -62,19 +62,12 @@ def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
         viewer.show(None)
         (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
         hear_until(viewer, page, lambda: shown._stage is not None and shown._stage._in_view.asleep)
-        hear_until(viewer, page, lambda: _hears_nothing_drawn(viewer, page))
-        viewer.second = Second()
-        hear_until(viewer, page, lambda: viewer.second.messages >= 10)
+        for _ in range(2):  # the last pictures may still be under way at first
+            viewer.second = Second()
+            hear_until(viewer, page, lambda: viewer.second.messages >= 30)
         assert not viewer.second.plots and not viewer.second.links
         viewer.show("Joints")
         hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
-
-
-def _hears_nothing_drawn(viewer: Viewer, page: Connection) -> bool:
-    """Whether a packet with neither plots nor poses came: the last pictures are through."""
-    viewer.second = Second()
-    viewer.hear(page, 0.2)
-    return bool(viewer.second.messages) and not viewer.second.plots and not viewer.second.links
 
 
 def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
