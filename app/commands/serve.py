@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import tyro
+
 from robots import InputError
 
 
@@ -16,7 +20,9 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     no_browser: bool = False,
-    trusted_origin: tuple[str, ...] = (),
+    trusted_origin: Annotated[
+        tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")
+    ] = (),
     no_token: bool = False,
 ) -> int:
     """Open the page: a robot under HIMPC whose target you can drag.

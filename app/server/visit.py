@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -45,6 +46,7 @@ class Visit:
         self._by_path = by_path
         self._page: Page | None = None
         self._left = False
+        self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
         self._notebook = Notebook(Progress(), lambda _: None)
         self._workers = Workers()
@@ -58,7 +60,11 @@ class Visit:
     async def arrive(self) -> None:
         """On viser's loop. A browser that does not answer is a new one."""
         keys = (_TOKENS, _DARK, _PROGRESS)
-        found = await private.read_storage(self._client, keys, STORAGE)
+        self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
+        try:
+            found = await self._asking
+        except asyncio.CancelledError:
+            return  # the tab was closed
         tokens, dark, progress = (text if text and len(text) <= _LONGEST else None for text in found)
         self._dark = dark == "1"
         self._notebook = Notebook(progress_from(progress), lambda text: self._keep(_PROGRESS, text))
@@ -68,6 +74,8 @@ class Visit:
         """The tab was closed. Returns at once."""
         if not self._left:
             self._left = True
+            if self._asking is not None:
+                self._server.get_event_loop().call_soon_threadsafe(self._asking.cancel)
             self._steps.submit(self._end).add_done_callback(told)
             self._steps.shutdown(wait=False)
 

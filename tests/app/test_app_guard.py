@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import http.client
 import socket
 import urllib.error
@@ -293,6 +294,17 @@ def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.Monke
         PageServer(SceneChoice("planar3-hold"), port=0)
     (sessions,) = made
     assert sessions.enter([]) is None and not sessions.learners
+
+
+def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
+    """It has begun, and is still asked what it keeps."""
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    with dial(server) as page:
+        page.send(pack(camera()))
+        assert wait_until(lambda: server.guard.taken > 0, LONG)
+        server.close()
+    gc.collect()
+    assert not [record for record in caplog.records if record.name == "asyncio"]
 
 
 def test_whoever_needs_longer_than_the_handshake_is_let_go(plain: PageServer) -> None:

@@ -1,0 +1,280 @@
+"""Who is not admitted reaches nothing, and who is silent or floods keeps nobody waiting: measured.
+
+    python -m benchmarks.visitors [--silent 200] [--seconds 5] [--no-browser]
+
+Starts the real server in a process of its own and tries to come in as other sites do: with a foreign origin,
+`null`, another port's, a rebinding name, and with 40 sockets from a page of another site in Chromium. Then a
+page is open while so many silent connections (half without a request, half web sockets without a word) and
+one that sends as fast as it can are there, and a newcomer comes. Prints JSON; exit 0 if nothing of the first
+kind was read, started or lost, the newcomer was answered within 2 s and the page kept at least half its rate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import http.server
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+from playwright.sync_api import sync_playwright
+from viser import __version__
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.sync.client import connect
+
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.server import PageServer
+from browsing.hands import CHROMIUM_ARGS, find_chromium
+from browsing.wire import camera, messages_of, nothing_kept, pack
+
+PROTOCOL: Any = [f"viser-v{__version__}"]
+LONG = 60.0
+_FOREIGN = """async ([url, protocol]) => {
+  const one = () => new Promise((done) => {
+    const socket = new WebSocket(url, [protocol]);
+    socket.binaryType = "arraybuffer";
+    let opened = 0;
+    socket.onopen = () => { opened = 1; socket.send(new Uint8Array(CAMERA)); };
+    socket.onclose = () => done(opened);
+    setTimeout(() => done(opened), 10000);
+  });
+  const opened = await Promise.all(Array.from({length: 40}, one));
+  return opened.reduce((a, b) => a + b, 0);
+}"""
+
+
+def serve(pipe: Any) -> None:
+    """The server's process: answers what it has seen until it is told to end."""
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=3, grace=600.0)
+    pipe.send(server.url)
+    while pipe.recv() == "seen":
+        pipe.send(
+            {
+                "messages": server.guard.taken,
+                "refused": server.guard.refused,
+                "connections": len(server.guard.crowd),
+                "learners": sorted(learner.token for learner in server.sessions.learners),
+                "attached": sum(learner.attached for learner in server.sessions.learners),
+            }
+        )
+    server.close()
+
+
+class Watched:
+    """An open page: counts the packets that come."""
+
+    def __init__(self, url: str) -> None:
+        self.packets = 0
+        self._socket = connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None)
+        self._socket.send(pack(camera()))
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                raw = self._socket.recv()
+                self.packets += 1
+                if self.packets < 100 and isinstance(raw, bytes):
+                    for message in messages_of(raw):
+                        if message["type"] == "LocalStorageGetItemRequestMessage":
+                            self._socket.send(pack(nothing_kept(message["request_uuid"])))
+
+    def rate(self, seconds: float) -> float:
+        """Packets per second from now on."""
+        before, began = self.packets, time.monotonic()
+        time.sleep(seconds)
+        return (self.packets - before) / (time.monotonic() - began)
+
+    def close(self) -> None:
+        self._socket.close()
+        self._reader.join(5.0)
+
+
+def shake(url: str, host: str, origin: str) -> int:
+    """A handshake with a frame sent along; the status of the answer."""
+    parts = urlsplit(url)
+    lines = [
+        "GET / HTTP/1.1",
+        f"Host: {host}",
+        f"Origin: {origin}",
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+        f"Sec-WebSocket-Protocol: {PROTOCOL[0]}",
+    ]
+    word = pack(camera())
+    frame = b"\x82\xfe" + len(word).to_bytes(2, "big") + bytes(4) + word
+    with socket.create_connection((parts.hostname or "", parts.port or 0), timeout=LONG) as stranger:
+        stranger.sendall("\r\n".join([*lines, "", ""]).encode() + 50 * frame)
+        return int((stranger.recv(100).split() or [b"", b"0"])[1])
+
+
+def strangers(url: str) -> dict[str, int]:
+    """The status each kind of other site gets, five times each."""
+    ours = urlsplit(url).netloc
+    kinds = {
+        "foreign origin": (ours, "https://evil.example"),
+        "null": (ours, "null"),
+        "rebinding host": ("evil.example", "http://evil.example"),
+        "other port": (ours, "http://127.0.0.1:1"),
+    }
+    return {kind: max(shake(url, host, origin) for _ in range(5)) for kind, (host, origin) in kinds.items()}
+
+
+def from_chromium(url: str) -> int:
+    """How many of 40 sockets a page of another site in Chromium gets open."""
+
+    class Quiet(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(b"<!doctype html><title>another site</title>")
+
+        def log_message(self, format: str, *args: Any) -> None:
+            """Says nothing."""
+
+    site = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet)
+    threading.Thread(target=site.serve_forever, daemon=True).start()
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
+            page = browser.new_page()
+            page.goto(f"http://127.0.0.1:{site.server_address[1]}/")
+            script = _FOREIGN.replace("CAMERA", json.dumps(list(pack(camera()))))
+            opened: int = page.evaluate(script, [url.replace("http", "ws"), PROTOCOL[0]])
+            browser.close()
+    finally:
+        site.shutdown()
+        site.server_close()
+    return opened
+
+
+@contextlib.contextmanager
+def besieged(url: str, silent: int) -> Iterator[subprocess.Popen[bytes]]:
+    """Silent connections, and one that floods from a process of its own."""
+    parts = urlsplit(url)
+    address = (parts.hostname or "", parts.port or 0)
+    with contextlib.ExitStack() as stack:
+        for _ in range(silent // 2):
+            stack.enter_context(socket.create_connection(address, timeout=LONG))
+        mute = []
+        for _ in range(silent - silent // 2):
+            with contextlib.suppress(InvalidHandshake, OSError):
+                mute.append(connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None))
+        flood = subprocess.Popen([sys.executable, "-m", "benchmarks.visitors", "--flood", url])
+        try:
+            yield flood
+        finally:
+            flood.kill()
+            flood.wait()
+            for each in mute:
+                with contextlib.suppress(Exception):
+                    each.socket.close()
+
+
+def flood(url: str) -> None:
+    """Sends as fast as it can; comes again when it is thrown out."""
+    word = pack(camera())
+    while True:
+        with (
+            contextlib.suppress(ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError),
+            connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None) as socket_,
+        ):
+            threading.Thread(target=_drain, args=(socket_,), daemon=True).start()
+            while True:
+                socket_.send(word)
+
+
+def _drain(connection: Any) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        for _ in connection:
+            pass
+
+
+def newcomer(url: str) -> float:
+    """s until a new page is answered: the document, the socket, the first packet after its first word."""
+    parts = urlsplit(url)
+    began = time.monotonic()
+    with socket.create_connection((parts.hostname or "", parts.port or 0), timeout=LONG) as plain:
+        plain.sendall(f"GET / HTTP/1.1\r\nHost: {parts.netloc}\r\nAccept-Encoding: gzip\r\n\r\n".encode())
+        while plain.recv(65536):
+            pass
+    with connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None, open_timeout=LONG) as page:
+        page.send(pack(camera()))
+        while True:
+            raw = page.recv(timeout=LONG)
+            kinds = {message["type"] for message in messages_of(raw)} if isinstance(raw, bytes) else set()
+            if "LocalStorageGetItemRequestMessage" in kinds:
+                return time.monotonic() - began
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--silent", type=int, default=200, metavar="K")
+    parser.add_argument("--seconds", type=float, default=5.0, help="of each measurement of the page's rate")
+    parser.add_argument("--no-browser", action="store_true", help="leave Chromium out")
+    parser.add_argument("--flood", metavar="URL", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.flood:
+        flood(options.flood)
+    import multiprocessing
+
+    context = multiprocessing.get_context("spawn")
+    pipe, theirs = context.Pipe()
+    server = context.Process(target=serve, args=(theirs,))
+    server.start()
+    url: str = pipe.recv()
+
+    def seen() -> dict[str, Any]:
+        pipe.send("seen")
+        return pipe.recv()
+
+    try:
+        pages = [Watched(url), Watched(url)]
+        wait_until(lambda: seen()["attached"] == 2, LONG)
+        pages.pop().close()  # one reloads: his place must be kept
+        wait_until(lambda: seen()["attached"] == 1, LONG)
+        page = pages[0]
+        time.sleep(3.0)
+        before = seen()
+        result: dict[str, Any] = {"answers": strangers(url)}
+        if not options.no_browser:
+            result["opened_in_chromium"] = from_chromium(url)
+        after = seen()
+        result["messages_read"] = after["messages"] - before["messages"]
+        result["learners_before_after"] = [len(before["learners"]), len(after["learners"])]
+        admitted = (
+            after["learners"] != before["learners"]
+            or result["messages_read"]
+            or result.get("opened_in_chromium")
+            or set(result["answers"].values()) != {403}
+        )
+        free = page.rate(options.seconds)
+        with besieged(url, options.silent):
+            time.sleep(1.0)
+            result["connections"] = seen()["connections"]
+            besieged_rate = page.rate(options.seconds)
+            result["newcomer_s"] = [round(newcomer(url), 2) for _ in range(3)]
+            besieged_rate = min(besieged_rate, page.rate(options.seconds))
+        result["packets_hz"] = {"free": round(free, 1), "besieged": round(besieged_rate, 1)}
+        result["kept"] = round(besieged_rate / free, 2) if free else 0.0
+        page.close()
+    finally:
+        pipe.send("end")
+        server.join(LONG)
+    print(json.dumps(result, indent=2))
+    return int(bool(admitted) or max(result["newcomer_s"]) > 2.0 or result["kept"] < 0.5)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,171 @@
+"""docs/serving.md: its nginx configuration, run as it is printed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import ssl
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from viser import __version__
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from app.__main__ import main
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.server import PageServer
+from browsing.wire import camera, pack
+
+PAGE = Path(__file__).parents[2] / "docs" / "serving.md"
+NAME = "lab.example.org"
+PROTOCOL: Any = [f"viser-v{__version__}"]
+LONG = 60.0
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture(scope="module")
+def nginx() -> str:
+    path = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin:/usr/local/sbin")
+    if path is None:
+        reason = "no nginx found: install one (Debian: apt-get install nginx) to test docs/serving.md"
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return path
+
+
+@pytest.fixture(scope="module")
+def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PageServer, int, Path]]:
+    """The page, the port nginx shows it at, and the certificate."""
+    folder, port = tmp_path_factory.mktemp("nginx"), free_port()
+    certificate, key = folder / "lab.pem", folder / "lab.key"
+    subprocess.run(
+        f"openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN={NAME} "
+        f"-addext subjectAltName=DNS:{NAME} -keyout {key} -out {certificate}".split(),
+        check=True,
+        capture_output=True,
+    )
+    origin = f"https://{NAME}:{port}"
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1, trusted_origins=[origin])
+    printed = re.findall(r"```nginx\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    assert len(printed) == 1
+    site = printed[0]
+    for text, here in (
+        ("listen 443 ssl", f"listen 127.0.0.1:{port} ssl"),
+        (f"/etc/ssl/certs/{NAME}.pem", str(certificate)),
+        (f"/etc/ssl/private/{NAME}.key", str(key)),
+        ("http://127.0.0.1:8080", server.url),
+    ):
+        assert site.count(text) == 1
+        site = site.replace(text, here)
+    folders = "".join(
+        f"{kind}_temp_path {folder}/{kind};\n"
+        for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    )
+    main = folder / "nginx.conf"
+    main.write_text(
+        f"daemon off; pid {folder}/pid; error_log {folder}/error.log;\nevents {{}}\n"
+        f"http {{\naccess_log off;\n{folders}{site}}}\n"
+    )
+    command = [nginx, "-c", str(main), "-e", str(folder / "start.log")]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        assert wait_until(lambda: answers(port) or process.poll() is not None, LONG)
+        assert process.poll() is None, (folder / "error.log").read_text()
+        yield server, port, certificate
+    finally:
+        process.terminate()
+        process.wait(LONG)
+        server.close()
+
+
+def answers(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def get(port: int, certificate: Path, path: str = "/", *, host: str = NAME, cookie: str = "") -> str:
+    """The answer's head."""
+    context = ssl.create_default_context(cafile=str(certificate))
+    with (
+        socket.create_connection(("127.0.0.1", port), timeout=LONG) as plain,
+        context.wrap_socket(plain, server_hostname=NAME) as wrapped,
+    ):
+        lines = [f"GET {path} HTTP/1.1", f"Host: {host}:{port}", f"Cookie: {cookie}", "Connection: close"]
+        wrapped.sendall("\r\n".join([*lines, "", ""]).encode())
+        head = b""
+        while b"\r\n\r\n" not in head and (more := wrapped.recv(4096)):
+            head += more
+        return head.partition(b"\r\n\r\n")[0].decode()
+
+
+def dial(port: int, certificate: Path, origin: str, cookie: str) -> Any:
+    return connect(
+        f"wss://{NAME}:{port}/",
+        sock=socket.create_connection(("127.0.0.1", port), timeout=LONG),
+        ssl=ssl.create_default_context(cafile=str(certificate)),
+        origin=origin,  # pyright: ignore[reportArgumentType]
+        additional_headers={"Cookie": cookie},
+        subprotocols=PROTOCOL,
+        max_size=None,
+        proxy=None,
+    )
+
+
+def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path]) -> None:
+    """With TLS, the token and web sockets; other origins and hosts stay out."""
+    server, port, certificate = proxied
+    origin = f"https://{NAME}:{port}"
+    assert " 403 " in get(port, certificate)
+    first = get(port, certificate, f"/?token={server.token}")
+    assert " 303 " in first and "; Secure" in first
+    found = re.search(r"Set-Cookie: ([^;]+)", first)
+    assert found is not None
+    cookie = found[1]
+    head = get(port, certificate, cookie=cookie)
+    assert " 200 " in head and "frame-ancestors 'none'" in head
+    assert " 403 " in get(port, certificate, cookie=cookie, host="evil.example")
+    for wrong, brought in (("https://evil.example", cookie), (origin, "")):
+        with pytest.raises(InvalidStatus) as refused:
+            dial(port, certificate, wrong, brought)
+        assert refused.value.response.status_code == 403
+    assert not server.sessions.learners
+    with dial(port, certificate, origin, cookie) as page:
+        page.send(pack(camera()))
+        assert page.recv(timeout=LONG)
+        assert wait_until(lambda: len(server.sessions.learners) == 1, LONG)
+
+
+def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several proxies too."""
+    from app.server import server
+
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(server, "serve", lambda _, **options: asked.update(options) or 0)
+    first, second = "https://lab.example.org", "https://b.example.org"
+    assert main(["--no-browser", "--trusted-origin", first, "--trusted-origin", second]) == 0
+    assert tuple(asked["trusted_origins"]) == (first, second) and asked["ask_token"]
+    assert main(["--no-browser", "--no-token"]) == 0
+    assert not asked["ask_token"]
+
+
+def test_the_page_names_options_that_exist() -> None:
+    """Every option it shows is one of the command's."""
+    from app.commands.serve import serve
+
+    shown = set(re.findall(r"--([a-z][a-z-]*)", PAGE.read_text()))
+    names = {name.replace("_", "-") for name in serve.__code__.co_varnames[: serve.__code__.co_argcount]}
+    assert {"host", "trusted-origin", "no-token"} <= shown
+    assert shown <= names
