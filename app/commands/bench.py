@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING
 
 from app.commands.output import print_table, write_json
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
 
 
 def bench(ticks: int = 300, json: str | None = None) -> int:
@@ -17,34 +22,45 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
         ticks: timed ticks per contender.
         json: write the result as JSON to this file, or to standard output for "-".
     """
+    from lessons.experiments.bench import SCENES, Timing, ratios
     from lessons.experiments.bench import bench as measure
-    from lessons.experiments.bench import ratios
     from robots import InputError
 
     if not 10 <= ticks <= 100_000:
         raise InputError(f"--ticks is {ticks}: give a number from 10 to 100000")
+    found: dict[str, list[Timing]] = {}
     if json is None and sys.stderr.isatty():
         from rich.progress import Progress
 
         with Progress(transient=True) as bar:
-            task = bar.add_task("bench …", total=1.0)
-            timings = measure(ticks=ticks, progress=lambda share: bar.update(task, completed=share))
+            for scene in SCENES:
+                task = bar.add_task(f"bench {scene} …", total=1.0)
+                found[scene] = measure(scene, ticks=ticks, progress=partial(_show, bar, task))
     else:
-        timings = measure(ticks=ticks)
+        found = {scene: measure(scene, ticks=ticks) for scene in SCENES}
     if json is not None:
-        rows = [asdict(timing) for timing in timings]
-        write_json({"scene": "iiwa14-circle", "timings": rows, "ratios": ratios(timings)}, json)
-        return 0
-    rows = [
-        [
-            str(timing.horizon),
-            timing.route,
-            timing.solver,
-            *(f"{timing.step_ms[key]:.2f}" for key in ("median", "p95", "p99")),
-            f"{timing.qp_ms:.3f}",
+        blocks = [
+            {"scene": scene, "timings": [asdict(timing) for timing in timings], "ratios": ratios(timings)}
+            for scene, timings in found.items()
         ]
-        for timing in timings
-    ]
+        write_json({**blocks[0], "dragged": blocks[1]}, json)
+        return 0
     columns = ("N", "route", "solver", "step ms, median", "p95", "p99", "of it QP solver, median")
-    print_table("Control step, iiwa14-circle, three levels", columns, rows)
+    for scene, timings in found.items():
+        rows = [
+            [
+                str(timing.horizon),
+                timing.route,
+                timing.solver,
+                *(f"{timing.step_ms[key]:.2f}" for key in ("median", "p95", "p99")),
+                f"{timing.qp_ms:.3f}",
+            ]
+            for timing in timings
+        ]
+        dragged = ", dragged" if scene == SCENES[1] else ""
+        print_table(f"Control step, {scene}{dragged}, three levels", columns, rows)
     return 0
+
+
+def _show(bar: Progress, task: TaskID, share: float) -> None:
+    bar.update(task, completed=share)

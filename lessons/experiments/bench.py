@@ -10,10 +10,13 @@ import numpy as np
 
 from himpc.cascade.cascade import Route
 from himpc.qp import Solver, is_installed
+from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 
 HORIZONS = (5, 10, 20, 30)
+SCENES = ("iiwa14-circle", "iiwa14-hold")
+"""A motion that is known beforehand, and targets that a hand drags."""
 CONTENDERS: tuple[tuple[Route, Solver], ...] = (
     ("compiled", "daqp"),
     ("explicit", "daqp"),
@@ -25,6 +28,8 @@ _LONGEST_EXPLICIT = 20
 """The explicit route is left out beyond this horizon: one step takes seconds there."""
 _TURN = 5
 """Ticks a contender runs before the next one has its turn: all of them see the same noise."""
+_DRAG_TICKS = 100
+"""Ticks from one drag to the next."""
 _BUDGET_S = 6.0
 """A contender that has used this much wall time stops early; its number of ticks is reported."""
 
@@ -68,6 +73,7 @@ def bench(
         for _ in range(-(-ticks // _TURN)):
             for key, session in sessions.items():
                 for _ in range(_TURN if sum(steps[key]) < 1e3 * _BUDGET_S else 0):
+                    _drag(session, len(steps[key]))
                     session.tick()
                     if session.plan is not None:
                         steps[key].append(session.plan.step_us / 1e3)
@@ -79,6 +85,14 @@ def bench(
         if progress is not None:
             progress((place + 1) / len(horizons))
     return timings
+
+
+def _drag(session: TorqueSession, tick: int) -> None:
+    """Puts the hand somewhere else now and then, where there is a target to drag."""
+    target = session.target("position")
+    if target is not None and tick % _DRAG_TICKS == _TURN:
+        away = 0.2 * np.cos(np.arange(3) + tick)
+        session.post(MoveTarget("position", tuple(target.value + away)))
 
 
 def _spread(times: list[float]) -> dict[str, float]:
