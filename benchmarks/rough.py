@@ -63,7 +63,7 @@ def main() -> int:
 def treat(kills: int, stops: int) -> dict[str, object]:
     """Everything in a row; see the module."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
-    before = _memory_left()
+    before, there = _memory_left(), set(psutil.Process().children(recursive=True))
     server = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=3)
     counts: dict[str, str] = {}
     treated = recovered = 0
@@ -94,8 +94,12 @@ def treat(kills: int, stops: int) -> dict[str, object]:
                 treated, recovered = treated + 1, recovered + _runs(learners[0])
     finally:
         server.close()
-    eventually(lambda: not psutil.Process().children(recursive=True), 5.0)
-    left = [f"process {child.pid}" for child in psutil.Process().children(recursive=True)]
+
+    def others() -> set[psutil.Process]:
+        return set(psutil.Process().children(recursive=True)) - there
+
+    eventually(lambda: not others(), 5.0)
+    left = [f"process {child.pid}" for child in others()]
     left += sorted(_memory_left() - before)
     return {
         "shared memory MB": round(shared / 1e6, 1),
@@ -165,7 +169,7 @@ def _upload(page: Wire, answers: list[str]) -> None:
     except (ConnectionClosed, OSError):
         answers.append("connection ended")
         return
-    answered = eventually(lambda: any(title == "Not uploaded" for title, _ in page.notices), LONG)
+    answered = eventually(lambda: any(title == "Not uploaded" for title, _ in page.notices), 10.0)
     answers.append("refused in a sentence" if answered else "no answer")
 
 
