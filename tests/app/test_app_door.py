@@ -86,6 +86,8 @@ def test_links_from_elsewhere_work_and_parts_of_other_pages_do_not() -> None:
         ("/", "himpc-lab-8080=\xe4"),
         ("/", "=;=;,;"),
     ],
+    # The token is another one in each process, and tests go by their names.
+    ids=["none", "empty", "no text", "too short", "too long", "of another lab", "foreign letters", "rubbish"],
 )
 def test_without_the_token_nothing(path: str, cookie: str, upgrade: dict[str, str]) -> None:
     answer = judged(TOKENED, path, Cookie=cookie, **upgrade)
