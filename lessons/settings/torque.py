@@ -122,6 +122,8 @@ class TorqueSettings(Settings):
         if self.options is not None:
             options = field_places(self.options, _part("options"), _with("options"))
         parts = [field_places(getattr(self, part), _part(part), _with(part), f"{part}.") for part in _PARTS]
+        fit = own["route"].fit
+        own["route"] = replace(own["route"], fit=lambda path, value: fit(path, _now(value)))
         return {
             **own,
             **options,
@@ -171,6 +173,11 @@ MAX_MS = 1e3
 
 _GAINS = ("K_p", "K_v")
 _PARTS = ("limits", "nominal", "plant")
+
+
+def _now(route: Any) -> Any:
+    """Codes and scripts of earlier versions may name a route that another one took the place of."""
+    return "compiled" if route == "structured" else route
 
 
 def _checked(settings: TorqueSettings) -> TorqueSettings:

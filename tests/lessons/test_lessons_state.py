@@ -27,6 +27,7 @@ from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession
 from lessons.settings.assignments import differences
 from lessons.settings.settings import settings_after
+from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
 find = cache(load_scene)
@@ -261,3 +262,10 @@ def test_priorities_of_now_are_part_of_a_state() -> None:
     assert again.settings_now == again.settings
     torque = TorqueSession(find("planar3-hold"))  # pyright: ignore[reportArgumentType]
     assert torque.settings_now is torque.settings
+
+
+def test_a_code_of_before_may_name_a_route_that_is_gone() -> None:
+    """What was structured is compiled now; the torques are the same."""
+    state = decode(encode(State("planar3-hold", set=("route=structured",))))
+    found = state.prepared().settings
+    assert isinstance(found, TorqueSettings) and found.route == "compiled"
