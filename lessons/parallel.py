@@ -61,7 +61,8 @@ def on_cores(function: Callable[[T], U], items: Sequence[T]) -> Generator[tuple[
     """
     orphans: list[int] = []
     with _pool(min(cores(), max(1, len(items)))) as pool:
-        places = {pool.submit(_guarded, function, item): place for place, item in enumerate(items)}
+        with _born_deaf():
+            places = {pool.submit(_guarded, function, item): place for place, item in enumerate(items)}
         for future in as_completed(places):
             try:
                 yield places[future], future.result()
@@ -137,8 +138,10 @@ def _sentence(error: BaseException) -> str:
 
 def _alone(function: Callable[[T], U], item: T) -> U | Failed:
     with _pool(1) as pool:
+        with _born_deaf():
+            future = pool.submit(_guarded, function, item)
         try:
-            return pool.submit(_guarded, function, item).result()
+            return future.result()
         except BrokenProcessPool:
             return Failed("its process died (out of memory, or a crash in a compiled library)")
 
@@ -157,6 +160,17 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _born_deaf() -> Iterator[None]:
+    """Children of this moment inherit that Ctrl-C is blocked: before any code of ours runs in them it would
+    end them with Python's own complaint."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _obey_the_owner() -> None:
