@@ -101,6 +101,9 @@ class Watcher:
     def choice_of(self, ready: Ready) -> SceneChoice:
         return self._shown.choice_of(ready)
 
+    def lecture_of(self, ready: Ready) -> Lecture | None:
+        return self._shown.lecture_of(ready)
+
     def read(self, look: Callable[[Block, History], T]) -> T | None:
         return self._shown.read(look)
 

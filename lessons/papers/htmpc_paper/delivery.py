@@ -23,7 +23,7 @@ def _layouts(quick: bool) -> list[tuple[int, ...]]:
 
 def _job(seats: tuple[int, ...], architecture: str) -> Job:
     listed = ",".join(map(str, seats))
-    return Job("ridgeback-ur10-delivery", set=(f"architecture={architecture}", f"seats=[{listed}]"))
+    return Job("ridgeback-ur10-delivery", "htmpc", set=(f"architecture={architecture}", f"seats=[{listed}]"))
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:

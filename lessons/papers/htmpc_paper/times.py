@@ -15,7 +15,7 @@ _WHY = "another machine and another solver (the paper: CasADi and Gurobi)"
 
 def _cases() -> dict[str, Job]:
     found: dict[str, Job] = {words: replace(example(c), timed=True) for c, words in METHODS.items()}
-    found["HTMPC with obstacles"] = Job("ridgeback-ur10-cluttered", duration=8.0, timed=True)
+    found["HTMPC with obstacles"] = Job("ridgeback-ur10-cluttered", "htmpc", duration=8.0, timed=True)
     return found
 
 

@@ -14,9 +14,9 @@ HEIGHTS = (0.5, 0.8, 1.2)
 def _cases() -> dict[str, Job]:
     scene = "ridgeback-ur10-waypoints"
     found: dict[str, Job] = {
-        f"HT, h = {height} m": Job(scene, set=(f"height={height}",)) for height in HEIGHTS
+        f"HT, h = {height} m": Job(scene, "htmpc", set=(f"height={height}",)) for height in HEIGHTS
     }
-    found["ST, h = 0.8 m"] = Job(scene, set=("architecture=single_task",))
+    found["ST, h = 0.8 m"] = Job(scene, "htmpc", set=("architecture=single_task",))
     return found
 
 
