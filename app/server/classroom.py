@@ -107,8 +107,8 @@ class Watcher:
     def read(self, look: Callable[[Block, History], T]) -> T | None:
         return self._shown.read(look)
 
-    def look(self) -> float | None:
-        return self._shown.look()
+    def look(self, rows: bool = True) -> float | None:
+        return self._shown.look(rows)
 
     def ask(self, timeout: float = 10.0) -> Told | None:
         return self._shown.ask(timeout)

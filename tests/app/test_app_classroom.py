@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
 import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -66,6 +67,15 @@ def test_watchers_have_what_pages_use() -> None:
     }
     assert {"send", "settings_of", "tape"} <= used
     assert {name for name in used if not hasattr(Watcher, name)} <= {"import"}
+    own = {
+        name: found for name, found in vars(Watcher).items() if inspect.isfunction(found) and name[0] != "_"
+    }
+    assert own
+    for name, found in own.items():
+        ours, theirs = (
+            inspect.signature(each).parameters.values() for each in (found, getattr(Learner, name))
+        )
+        assert [(each.name, each.default) for each in ours] == [(each.name, each.default) for each in theirs]
 
 
 def test_guesses_of_one_page_wait_for_each_other_only() -> None:
