@@ -14,7 +14,7 @@ Vector = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Set:
-    """A setting takes a new value; `path` as in `lessons.settings.torque`."""
+    """A setting takes a new value; `path` as in `lessons.settings.settings`."""
 
     path: str
     value: Any

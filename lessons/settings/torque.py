@@ -45,7 +45,7 @@ class TorqueSettings(Settings):
         M_bar_scale: factor on all of it.
         nominal: what model-based controllers believe the plant to be.
         deadline_ms: a torque that is found later than this after its tick began acts one tick later; see
-            `lessons.session.torque.deadline`. 0: lockstep, time stands still while the controller computes.
+            `lessons.session.deadline`. 0: lockstep, time stands still while the controller computes.
         solve_ms_per_knot: how long the computer is assumed to take for each of the N knots, so that runs are
             the same everywhere. 0: the time it really takes, and then no two runs are the same.
         plant: what the plant really is.

@@ -55,7 +55,7 @@ class Signal:
 
     Attributes:
         name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.layout_of`, and for velocity-level
-            scenes `lessons.session.torque.velocity_rows.layout_of`).
+            scenes `lessons.session.velocity_rows.layout_of`).
         unit: a key of UNITS.
         column: which component of the field; None: its Euclidean norm.
     """
