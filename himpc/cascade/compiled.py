@@ -135,9 +135,7 @@ class _FirstWord(event.Listener):
     def on_start(self, event: Any) -> None:
         if not self._said:
             self._said = True
-            getLogger(__name__).warning(
-                "compiling the controller's inner loops: up to half a minute, this once"
-            )
+            getLogger(__name__).warning("compiling the controller's inner loops: about a minute, this once")
 
     def on_end(self, event: Any) -> None:
         """Nothing: it was said."""
