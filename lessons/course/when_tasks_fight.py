@@ -27,8 +27,9 @@ PROJECTION = Step(
     The classical way to rank tasks: project task 2 into the null space of task 1, $J_{2|1} = J_2
     P_1$, and compute the force it takes there. That needs the inverse of $J_{2|1} M^{-1}
     J_{2|1}^\top$. Here the hand follows its circle and joint 1 swings to −120°, beyond what the
-    circle allows. At about 1.4 s the two motions need exactly the same joints: $J_{2|1}$ vanishes.
-    Its controller (OSF) has a model that is 20 % light. The torque limit of the motors is only
+    circle allows. From 1.3 s on links 2 and 3 come into line. When they are, they can no longer make
+    up for joint 1, so any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. Its controller (OSF)
+    has a model that is 20 % light. The torque limit of the motors is only
     measured here, not enforced.
     """,
     do="Switch to HIMPC in good time, and back, while the arm moves.",
@@ -63,6 +64,14 @@ PROJECTION = Step(
             2000.0,
             fails_with=("q1_amplitude_deg=20",),
             because="a swing of 20° does not conflict",
+        ),
+        Claim(
+            "Up to 1.3 s, links 2 and 3 still at an angle, it needs no more than the limit.",
+            Measure(TORQUE, until=1.3),
+            "at most",
+            100.0,
+            fails_with=("q1_amplitude_deg=-170",),
+            because="swinging further, joint 1 gets there sooner",
         ),
     ),
     set=("controller=osf",),
@@ -125,9 +134,10 @@ EQUALITY = Step(
     """,
     do="Watch joint 1 at 1.4 s and again where it comes back.",
     why=r"""
-    Level 2 wants something it cannot have. It presses against the edge of what level 1 leaves,
-    within the bounds on speed and torque; the torque stays small because a large one would buy
-    nothing.
+    Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links
+    2 and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge,
+    to and fro with 94°/s, a little more than once a second, until joint 1 is called back. Strict is
+    not calm. But torque and speed stay within their bounds, and the hand on its circle.
     """,
     claims=(
         Claim(
@@ -154,10 +164,26 @@ EQUALITY = Step(
             fails_with=("controller=hqp",),
             because="a one-step QP bounds torques, not speeds",
         ),
+        Claim(
+            "From 2.5 s on joint 3 swings, through more than 150°/s from one way to the other.",
+            Measure(Signal("v", "deg/s", column=2), "range", after=2.5),
+            "at least",
+            150.0,
+            fails_with=("q1_amplitude_deg=20",),
+            because="without a conflict there is no edge to swing about",
+        ),
+        Claim(
+            "It swings about the line: from 1.75 s on joint 3 is within 20° of straight.",
+            Measure(Signal("q", "deg", column=2), after=1.75),
+            "at most",
+            20.0,
+            fails_with=("q1_amplitude_deg=20",),
+            because="there the arm never has to straighten",
+        ),
     ),
-    duration=3.5,
+    duration=5.0,
     controls=(CONTROLLER, AMPLITUDE),
-    plots=(TORQUE, SPEED, HAND, Q1),
+    plots=(Signal("v", "deg/s", column=2), TORQUE, HAND, Q1),
 )
 
 LESSON = Lesson(

@@ -25,6 +25,7 @@ UNITS: dict[str, float] = {
     "deg": 180 / math.pi,
     "deg/s": 180 / math.pi,
     "rad/s": 1.0,
+    "rad/s²": 1.0,
     "N·m": 1.0,
     "m/s²": 1.0,
     "%": 100.0,
@@ -154,6 +155,29 @@ def _position_share(rows: Rows) -> Array:
     return np.where(np.isfinite(share), share, 0.0).max(axis=1, keepdims=True)
 
 
+_CLOSE = math.radians(0.05)
+_NEAR = math.radians(5.0)
+
+
+def _ahead(rows: Rows) -> Array:
+    """Distance of each joint from the end of its range that it moves to, (ticks, n) rad; 0 beyond it."""
+    forward = rows["v"] > 0.0
+    return np.maximum(np.where(forward, rows["q_upper"] - rows["q"], rows["q"] - rows["q_lower"]), 0.0)
+
+
+def _deceleration_to_stop(rows: Rows) -> Array:
+    """The largest q̇²/2d with d the distance ahead, (ticks, 1) rad/s²; from 0.05° on it is not defined."""
+    ahead = _ahead(rows)
+    found = np.where(ahead > _CLOSE, rows["v"] ** 2 / (2.0 * np.maximum(ahead, _CLOSE)), math.nan)
+    return np.fmax.reduce(found, axis=1, keepdims=True)
+
+
+def _speed_near_an_end(rows: Rows) -> Array:
+    """The largest speed of joints less than 5° before an end of their range, (ticks, 1) rad/s; or NaN."""
+    found = np.where(_ahead(rows) < _NEAR, np.abs(rows["v"]), math.nan)
+    return np.fmax.reduce(found, axis=1, keepdims=True)
+
+
 def _at(bit: int) -> Callable[[Rows], Array]:
     def found(rows: Rows) -> Array:
         bits = rows["at_bound"]
@@ -190,6 +214,8 @@ DERIVED: Mapping[str, Callable[[Rows], Array]] = {
     "torque share": lambda rows: _shares(rows, "tau_demand", "tau_upper"),
     "speed share": lambda rows: _shares(rows, "v", "v_limit"),
     "position share": _position_share,
+    "deceleration to stop": _deceleration_to_stop,
+    "speed within 5° of an end": _speed_near_an_end,
     "at a torque bound": _at(AT_TORQUE),
     "at a speed bound": _at(AT_VELOCITY),
     "at a position bound": _at(AT_POSITION),
