@@ -1,1 +1,48 @@
 """What is taught: scenes, the headless session, lessons and the papers' experiments."""
+
+from typing import TYPE_CHECKING
+
+from robots.lazy import lazily
+
+if TYPE_CHECKING:
+    from lessons.experiments.jobs import Job, perform_all
+    from lessons.experiments.tune import chosen, tune
+    from lessons.recording.arrays import arrays
+    from lessons.recording.recording import Recording
+    from lessons.recording.run import run
+    from lessons.recording.summary import summary
+    from lessons.scenes.catalog import load_scene, prepared, torque_scene
+    from lessons.session.start import begin
+
+__all__ = [
+    "Job",
+    "Recording",
+    "arrays",
+    "begin",
+    "chosen",
+    "load_scene",
+    "perform_all",
+    "prepared",
+    "run",
+    "summary",
+    "torque_scene",
+    "tune",
+]
+
+__getattr__ = lazily(
+    "lessons",
+    {
+        "Job": "experiments.jobs",
+        "Recording": "recording.recording",
+        "arrays": "recording.arrays",
+        "begin": "session.start",
+        "chosen": "experiments.tune",
+        "load_scene": "scenes.catalog",
+        "perform_all": "experiments.jobs",
+        "prepared": "scenes.catalog",
+        "run": "recording.run",
+        "summary": "recording.summary",
+        "torque_scene": "scenes.catalog",
+        "tune": "experiments.tune",
+    },
+)

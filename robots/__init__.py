@@ -6,6 +6,7 @@ from robots.lazy import lazily
 
 if TYPE_CHECKING:
     from robots.catalog import CATALOG
+    from robots.collision import Ball, Box, Floor
     from robots.errors import InputError
     from robots.inertia import convergence_gauge, suggest_M_bar
     from robots.load import check_urdf, load_robot, load_urdf_text
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CATALOG",
+    "Ball",
+    "Box",
     "Finding",
+    "Floor",
     "ImportReport",
     "InputError",
     "NominalModel",
@@ -41,7 +45,10 @@ __getattr__ = lazily(
     "robots",
     {
         "CATALOG": "catalog",
+        "Ball": "collision",
+        "Box": "collision",
         "Finding": "report",
+        "Floor": "collision",
         "ImportReport": "report",
         "InputError": "errors",
         "NominalModel": "nominal",

@@ -2,6 +2,7 @@
 
 from himpc.missions.manager import Active, Progress, advanced, insert, move, release, remove, reorder
 from himpc.missions.mission import Follow, Go, Mission, MissionTask
+from himpc.missions.where import where
 
 __all__ = [
     "Active",
@@ -16,4 +17,5 @@ __all__ = [
     "release",
     "remove",
     "reorder",
+    "where",
 ]

@@ -5,7 +5,7 @@ from himpc.references.curves import Circle, FigureEight, Sinusoid
 from himpc.references.hold import Hold
 from himpc.references.path import LAWS, Law, Path, segment
 from himpc.references.phase import Phase
-from himpc.references.preview import Preview, Reference
+from himpc.references.preview import Preview, Reference, previews
 from himpc.references.square_wave import SquareWave
 from himpc.references.target import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Caps, Target
 from himpc.references.waypoints import Waypoints
@@ -29,5 +29,6 @@ __all__ = [
     "Started",
     "Target",
     "Waypoints",
+    "previews",
     "segment",
 ]

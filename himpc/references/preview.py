@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple, Protocol
 
@@ -33,6 +34,11 @@ class Reference(Protocol):
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         """The desired motion at t, t + T_s, …, t + N·T_s (seconds)."""
         ...
+
+
+def previews(references: Mapping[str, Reference], t: float, T_s: float, N: int) -> dict[str, Preview]:
+    """What a controller's `step` takes: by task the preview of its reference at t (s)."""
+    return {name: reference.preview(t, T_s, N) for name, reference in references.items()}
 
 
 def sampled(position: Array, velocity: Array, acceleration: Array) -> Preview:

@@ -32,6 +32,8 @@ class Session(ABC):
         robot: the scene's robot.
         settings: the settings in force.
         layout: where the fields of a row lie.
+        plant: the simulation.
+        plan: the last plan, None before the first tick.
         diverged_at: simulated time at which control was lost, s; None if it was not.
         notices: sentences for the learner (refused events, divergence); drain them.
         log: (time, event) of every event that took effect.
@@ -40,6 +42,7 @@ class Session(ABC):
     settings: Any
     layout: Layout
     plant: Any
+    plan: Any
 
     def __init__(self, scene: Scene, seed: int) -> None:
         self.scene = scene

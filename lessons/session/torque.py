@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.controllers import make_controller
 from himpc.plan import Binding, Plan
-from himpc.references import Preview, Reference, Target
+from himpc.references import Preview, Reference, Target, previews
 from himpc.rotation import quaternion
 from himpc.stack import Stack
 from himpc.tasks import FramePosition, Task
@@ -152,9 +152,9 @@ class TorqueSession(Session):
         T_s, N, t = settings.T_s, settings.horizon, plant.t
         q, v = plant.q, plant.v
         state = plant.measure(T_s)
-        previews = {name: reference.preview(t, T_s, N) for name, reference in self.references.items()}
+        ahead = previews(self.references, t, T_s, N)
         self.controller = settled(self.controller)
-        plan = self.controller.step(state.q, state.v, previews, plant.tau)
+        plan = self.controller.step(state.q, state.v, ahead, plant.tau)
         row = self._row
         row.fill(np.nan)
         fields = self.layout.fields
@@ -162,7 +162,7 @@ class TorqueSession(Session):
         row[fields["q"]] = q
         row[fields["v"]] = v
         write_plan(row, self.layout, plan)
-        self._write_references(row, previews)
+        self._write_references(row, ahead)
         self._write_truth(row, plan, q)
         self.plan = plan
         late = settings.is_late(1e-3 * plan.step_us)
@@ -176,10 +176,10 @@ class TorqueSession(Session):
                 self._lost(t, notice=wild)
         return row
 
-    def _write_references(self, row: Array, previews: Mapping[str, Preview]) -> None:
+    def _write_references(self, row: Array, ahead: Mapping[str, Preview]) -> None:
         fields = self.layout.fields
         for task in self.layout.tasks:
-            preview = previews[task.name]
+            preview = ahead[task.name]
             value = preview.value
             row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
             row[fields[f"v_d/{task.name}"]] = preview.velocity[0]

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
 from himpc.htmpc.clearance import CollisionModel
-from himpc.missions import Progress, advanced, insert, move, release, remove, reorder
+from himpc.missions import Progress, advanced, insert, move, release, remove, reorder, where
 from himpc.plan import Binding
-from himpc.references import Reference
+from himpc.references import Reference, previews
 from himpc.stack import Level, Stack
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
 from lessons.scenes.velocity_scene import VelocityScene
@@ -191,10 +191,7 @@ class VelocitySession(Session):
         self.progress = advanced(self.progress, settings.options.L, t, points, speeds)
         controller, references = self._direct()
         ahead, htmpc = t + controller.settings.delay_s, settings.htmpc
-        previews = {
-            name: reference.preview(ahead, htmpc.dt, htmpc.horizon) for name, reference in references.items()
-        }
-        plan = controller.step(state.q, state.v, previews)
+        plan = controller.step(state.q, state.v, previews(references, ahead, htmpc.dt, htmpc.horizon))
         self.plan, self._solve_ms = plan, 1e-3 * plan.step_us
         if (felt := settings.felt(self._solve_ms)) != self.plant.settings:
             self.plant.configure(felt)
@@ -246,10 +243,7 @@ class VelocitySession(Session):
 
     def _points(self, q: Array, v: Array) -> tuple[dict[str, Array], dict[str, float]]:
         """Where each role's point is, and how fast it moves (m/s or rad/s)."""
-        at = Configuration(self.robot, self._data, q, v)
-        points = {name: task.value(at) for name, task in self.roles.items()}
-        speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ v)) for name, task in self.roles.items()}
-        return points, speeds
+        return where(Configuration(self.robot, self._data, q, v), self.roles)
 
     def _is_wild(self, row: Array) -> bool:
         """Not finite or far too fast. A large error is no sign here: missions send the robot metres away."""

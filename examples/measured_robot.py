@@ -1,0 +1,60 @@
+"""A robot that is measured, not simulated: feed q and v from your own source, take the torque to your bus.
+
+`read` and `write` are all that the loop needs of a robot: joints in the order of the URDF, rad, rad/s, N·m.
+The ones here stand for a driver with encoders of 0.001° that once breaks a reading. Prints the number of
+ticks, how many came late, what happened at the broken reading, and where the hand is at the end.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
+from himpc.references import Hold, Target, previews
+from robots import Plant, PlantSettings, load_robot
+
+T_S = 1e-3
+
+
+class Driver:
+    """Replace it by yours. `write` returns the torque that really acts."""
+
+    def __init__(self) -> None:
+        self.plant = Plant(load_robot("iiwa14"), PlantSettings(encoder_resolution_deg=0.001))
+
+    def read(self) -> tuple[np.ndarray, np.ndarray]:
+        state = self.plant.measure(T_S)
+        return (state.q * math.nan if round(state.t / T_S) == 100 else state.q), state.v
+
+    def write(self, tau: np.ndarray) -> np.ndarray:
+        return self.plant.step(tau, T_S)
+
+
+def main(seconds: float = 2.0) -> None:
+    """Prints what the module's docstring says."""
+    robot, driver = load_robot("iiwa14"), Driver()
+    tasks = FramePosition(name="hand"), FrameOrientation(name="wrist"), Posture(name="posture")
+    controller = HIMPC(robot, Settings(tuple(Level((task,)) for task in tasks), tuple(robot.M_bar)))
+    rotation, position = driver.plant.frame_pose(robot.tip)
+    hand = Target(position)
+    hand.move(position + np.array([0.0, 0.0, 0.05]))
+    references = {"hand": hand, "wrist": Hold(rotation), "posture": Hold(robot.home)}
+    tau = driver.plant.tau
+    controller.reset(tau)
+    late, ticks = 0, round(seconds / T_S)
+    for tick in range(ticks):
+        q, v = driver.read()
+        plan = controller.step(q, v, previews(references, tick * T_S, T_S, 5), tau)
+        if plan.unsolved:
+            print(f"broken reading: torque held to {np.abs(plan.tau - tau).max():.1e} N·m")
+        late += plan.step_us > 1e6 * T_S
+        tau = driver.write(plan.tau)
+    print(f"ticks: {ticks}, of them late: {late}")
+    off = np.linalg.norm(driver.plant.frame_pose(robot.tip)[1] - hand.raw)
+    print(f"hand: {1e3 * off:.2f} mm from its goal")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,28 @@
+"""Where a robot's points are: what the task manager is told at every control period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.tasks import Task
+
+Array = NDArray[np.float64]
+
+
+def where(at: Configuration, roles: Mapping[str, Task]) -> tuple[dict[str, Array], dict[str, float]]:
+    """`points` and `speeds` of `advanced`, by role.
+
+    Args:
+        at: the measured state.
+        roles: the task of each role.
+
+    Returns:
+        where each role's point is, (m,) m or a rotation matrix (3, 3); how fast it moves, m/s or rad/s.
+    """
+    points = {name: task.value(at) for name, task in roles.items()}
+    speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ at.v)) for name, task in roles.items()}
+    return points, speeds
