@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +14,9 @@ from numpy.typing import NDArray
 from robots import Robot
 from robots.errors import unknown_name
 
+if TYPE_CHECKING:
+    from himpc.references import Preview
+
 Array = NDArray[np.float64]
 
 
@@ -19,7 +24,8 @@ class Configuration:
     """Frames and Jacobians at the measured q_k and at the knots q*_{k+j|k−1}, j = 1 … N−1.
 
     Jacobians are taken once per frame and tick, whatever the number of tasks on it. Only geometry
-    is read: no mass, inertia or gravity, so the controller stays free of a dynamic model.
+    is read, no inertia or gravity, so the controller stays free of a dynamic model; a task of the centre of
+    mass alone reads masses.
 
     Args:
         robot: gives geometry and names.
@@ -27,19 +33,27 @@ class Configuration:
         q: measured joint positions, (n,) rad or m.
         v: measured joint velocities, (n,).
         knots: predicted joint positions at knots 1 … N−1, (N−1, n); empty for N = 1.
+        previews: references by task, for tasks whose coordinates depend on where their target is.
     """
 
     def __init__(
-        self, robot: Robot, data: pin.Data, q: Array, v: Array, knots: Array | Sequence[Array] = ()
+        self,
+        robot: Robot,
+        data: pin.Data,
+        q: Array,
+        v: Array,
+        knots: Array | Sequence[Array] = (),
+        previews: Mapping[str, Preview] = MappingProxyType({}),
     ) -> None:
         self.robot = robot
         self.q = q
         self.v = v
         self.knots = knots
+        self.previews = previews
         self.horizon = len(knots) + 1
         self._data = data
         self._jacobians: dict[str, Array] = {}
-        self._placements: dict[str, pin.SE3] = {}
+        self._placements: dict[str, list[pin.SE3]] = {}
 
     def frame_jacobians(self, frame: str = "") -> Array:
         """(N, 6, n) frame Jacobians, linear over angular, world axes, at the frame's origin."""
@@ -51,19 +65,32 @@ class Configuration:
             found = np.empty((self.horizon, 6, self.q.size))
             # Of a single joint Pinocchio hands out the column without its second axis.
             columns = found if self.q.size > 1 else found[:, :, 0]
-            # The measured state comes last: data.oMf then holds its placement.
-            for j in range(self.horizon - 1, 0, -1):
-                columns[j] = compute(model, data, self.knots[j - 1], index, axes)
-            columns[0] = compute(model, data, self.q, index, axes)
-            self._placements[frame] = data.oMf[index].copy()
+            placed = self._placements[frame] = []
+            for j, q in enumerate((self.q, *self.knots)):
+                columns[j] = compute(model, data, q, index, axes)
+                placed.append(data.oMf[index].copy())
             self._jacobians[frame] = found
         return found
 
     def placement(self, frame: str = "") -> pin.SE3:
         """Placement of a frame in the world at the measured state."""
+        return self.placements(frame)[0]
+
+    def placements(self, frame: str = "") -> list[pin.SE3]:
+        """Placements of a frame in the world at every knot; the first is the measured state's."""
         if frame not in self._placements:
             self.frame_jacobians(frame)
         return self._placements[frame]
+
+    def centre_of_mass(self) -> Array:
+        """Centre of all moving masses at the measured state by the robot's own description, (3,) m, world."""
+        return np.array(pin.centerOfMass(self.robot.model, self._data, self.q))
+
+    def centre_of_mass_jacobians(self) -> Array:
+        """(N, 3, n) of the centre of mass, world axes."""
+        model, data, n = self.robot.model, self._data, self.q.size
+        knots = (self.q, *self.knots)
+        return np.array([pin.jacobianCenterOfMass(model, data, q).reshape(3, n) for q in knots])
 
     def joint_indices(self, joints: tuple[str, ...]) -> list[int]:
         """Columns of the named joints; all of them for an empty tuple."""

@@ -95,6 +95,17 @@ class StackForm:
         blocks = [task.jacobian(configuration) for task in self.tasks]
         return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
 
+    def asked(self, configuration: Configuration, previews: Mapping[str, Preview]) -> Mapping[str, Preview]:
+        """The references in the coordinates of the tasks, see `Task.asked`."""
+        if all(type(task).asked is Task.asked for task in self.tasks):
+            return previews
+        asked = {
+            task.name: task.asked(configuration, previews[task.name])
+            for task in self.tasks
+            if task.name in previews
+        }
+        return {**previews, **asked}
+
     def free(
         self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int
     ) -> Array:

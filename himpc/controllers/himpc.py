@@ -142,7 +142,7 @@ class HIMPC:
         errors: dict[str, Array] = {}
         with np.errstate(all="ignore"):
             if self._off:
-                here = Configuration(self.robot, self._data, q, v)
+                here = Configuration(self.robot, self._data, q, v, previews=previews)
                 measure(self._off, here, previews, values, errors)
             rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, self._limits, N, T_s)
             found = self._search(Tick(state, memory, previews, rows, values, errors))
@@ -197,7 +197,7 @@ class HIMPC:
     def _solve(self, tick: Tick, knots: Array) -> Found | None:
         """The cascade with the Jacobians taken at q_k and at `knots`, (N−1, n)."""
         state, memory, settings = tick.state, tick.memory, self._settings
-        configuration = Configuration(self.robot, self._data, state.q, state.v, knots)
+        configuration = Configuration(self.robot, self._data, state.q, state.v, knots, tick.previews)
         problems, x_dot = self._problems(
             self._form, configuration, memory, tick.previews, tick.values, tick.errors
         )
@@ -236,10 +236,11 @@ class HIMPC:
         x_dot = J[0] @ configuration.v
         before = memory.x_dot
         if before is None or memory.form is not form:
-            past = Configuration(self.robot, self._data, memory.q, memory.v)
+            past = Configuration(self.robot, self._data, memory.q, memory.v, previews=previews)
             before = form.jacobian(past)[0] @ memory.v
         error = measure(form.tasks, configuration, previews, values, errors)
-        free = form.free(error, x_dot, (x_dot - before) / memory.period, previews, configuration.horizon)
+        asked = form.asked(configuration, previews)
+        free = form.free(error, x_dot, (x_dot - before) / memory.period, asked, configuration.horizon)
         if not math.isfinite(float(free.sum())):
             return None, x_dot
         B = J / self._M_bar

@@ -167,13 +167,15 @@ class OneStepController(ABC):
     ) -> list[Demand]:
         """The demands of a form's levels; x and x̃ of every task are written to `values` and `errors`."""
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
-        configuration = Configuration(self.robot, self._data, q, v, np.array((q + h * v, q - h * v)))
+        both = np.array((q + h * v, q - h * v))
+        configuration = Configuration(self.robot, self._data, q, v, both, previews)
         J, ahead, behind = form.jacobian(configuration)
         drift = (ahead - behind) @ v / (2 * h)
         error = measure(form.tasks, configuration, previews, values, errors)
         if self._off:
             measure(self._off, configuration, previews, values, errors)
         wanted = np.zeros((2, error.size))
+        previews = form.asked(configuration, previews)
         start = 0
         for task, rows in zip(form.tasks, form.sizes, strict=True):
             if not isinstance(task, Damping):

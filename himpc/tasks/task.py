@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
+    from himpc.references import Preview
     from robots import Robot
 
 Array = NDArray[np.float64]
@@ -49,6 +50,15 @@ class Task:
     def jacobian(self, configuration: Configuration) -> Array:
         """J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
         raise NotImplementedError
+
+    def target(self, configuration: Configuration) -> Array:
+        """x_d at which the error is zero now: where a draggable target starts."""
+        return self.value(configuration)
+
+    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+        """The reference in the task's coordinates; another one than `preview` only if a target is something
+        else than a value of them."""
+        return preview
 
     def gains(self, m: int) -> tuple[Array, Array]:
         """K_p and K_v as (m,) arrays."""

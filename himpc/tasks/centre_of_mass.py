@@ -1,0 +1,36 @@
+"""Where the robot's mass is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from himpc.tasks.axes import AXES, OnAxes
+from himpc.tasks.task import Array
+
+if TYPE_CHECKING:
+    from himpc.configuration import Configuration
+
+
+@dataclass(frozen=True, kw_only=True)
+class CentreOfMass(OnAxes):
+    """x = centre of mass of all links along the chosen world axes, m (Pink and Mink: ComTask).
+
+    The one task that reads masses, those of the robot's own description: a payload is not in it.
+
+    Attributes:
+        axes: world axes that are controlled, any non-empty subset of "xyz".
+    """
+
+    axes: str = AXES
+
+    unit: ClassVar[Literal["m", "rad"]] = "m"
+
+    def value(self, configuration: Configuration) -> Array:
+        return configuration.centre_of_mass()[self.components]
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return value - desired
+
+    def jacobian(self, configuration: Configuration) -> Array:
+        return configuration.centre_of_mass_jacobians()[:, self.components]

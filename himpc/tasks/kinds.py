@@ -1,0 +1,59 @@
+"""The kinds of tasks by the word that names them in settings and menus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from himpc.tasks.centre_of_mass import CentreOfMass
+from himpc.tasks.frame_orientation import FrameOrientation
+from himpc.tasks.frame_position import FramePosition
+from himpc.tasks.joints import Damping, Joints, Posture
+from himpc.tasks.plane_distance import PlaneDistance
+from himpc.tasks.pointing import Pointing
+from himpc.tasks.relative import RelativeOrientation, RelativePosition
+from himpc.tasks.task import Task
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of task.
+
+    Attributes:
+        says: what it is, one line.
+        makes: the classes; of more than one, tasks of equal priority, named NAME_SUFFIX.
+        suffixes: see there; empty for one class.
+    """
+
+    says: str
+    makes: tuple[type[Task], ...]
+    suffixes: tuple[str, ...] = ("",)
+
+
+_BOTH = ("_position", "_orientation")
+
+KINDS: dict[str, Kind] = {
+    "position": Kind("a frame's origin in the world", (FramePosition,)),
+    "orientation": Kind("how a frame is turned in the world", (FrameOrientation,)),
+    "pose": Kind("both at once, with equal priority", (FramePosition, FrameOrientation), _BOTH),
+    "joints": Kind("some joints", (Joints,)),
+    "posture": Kind("all joints", (Posture,)),
+    "damping": Kind("all joints come to rest, wherever they are", (Damping,)),
+    "com": Kind("the centre of mass", (CentreOfMass,)),
+    "relative_position": Kind("where a frame is, seen from another frame", (RelativePosition,)),
+    "relative_orientation": Kind("how a frame is turned, seen from another frame", (RelativeOrientation,)),
+    "relative_pose": Kind("both, seen from another frame", (RelativePosition, RelativeOrientation), _BOTH),
+    "pointing": Kind("an axis of a frame toward a point", (Pointing,)),
+    "plane_distance": Kind("a frame's distance from a plane", (PlaneDistance,)),
+}
+"""Every kind; the words are those of Pink and Mink where these mean the same (frame, com, relative frame,
+posture, damping)."""
+
+
+def word_of(task: Task) -> str:
+    """The word of a task's kind. Raises KeyError if it is of none."""
+    return _WORDS[type(task)]
+
+
+_WORDS: dict[type[Task], str] = {
+    kind.makes[0]: word for word, kind in KINDS.items() if len(kind.makes) == 1
+}

@@ -1,0 +1,121 @@
+"""An axis of a frame toward a point: a camera that looks at something, a torch that shines on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from himpc.references.preview import Preview
+from himpc.tasks.axes import AXES
+from himpc.tasks.task import Array, Task
+from robots.errors import unknown_name
+
+if TYPE_CHECKING:
+    from himpc.configuration import Configuration
+    from robots import Robot
+
+DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
+AHEAD = 0.5
+"""m from the frame's origin at which a target starts, on the axis."""
+_NEAREST = 0.02
+"""m: a point nearer than this is taken to be this far; the direction to it could turn arbitrarily fast."""
+_ASIDE = 1e-3
+"""Sine of the angle to the opposite direction below which ‖J‖ grows no further."""
+_STRAIGHT = 1e-9
+"""Sine of the angle below which the axis counts as pointing at the point."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pointing(Task):
+    """x = φ ŝ⊥, rad: by what angle φ, and to which side, the axis a of the frame misses a point c.
+
+    s = Rᵀ(c − p) is the point as the frame sees it, ŝ⊥ the direction of its part across a. x̃ = x, since the
+    coordinates count from the target: x_d is the point c, (3,) m in the world. φ = π is singular.
+
+    Attributes:
+        frame: name of a frame of the robot; empty means the robot's tip.
+        axis: of the frame, one of x, y, z, -x, -y, -z.
+    """
+
+    frame: str = ""
+    axis: str = "z"
+    K_p: float | tuple[float, ...] = 50.0
+    K_v: float | tuple[float, ...] = 5.0
+
+    unit: ClassVar[Literal["m", "rad"]] = "rad"
+
+    def __post_init__(self) -> None:
+        """Raises InputError for an axis that is none."""
+        if self.axis not in DIRECTIONS:
+            raise unknown_name(f"axis of task '{self.name}'", self.axis, DIRECTIONS)
+
+    def coordinates(self, robot: Robot) -> tuple[str, ...]:
+        return tuple(AXES[axis] for axis in self._across)
+
+    @property
+    def _along(self) -> int:
+        return AXES.index(self.axis[-1])
+
+    @property
+    def _across(self) -> list[int]:
+        return [(self._along + 1) % 3, (self._along + 2) % 3]
+
+    def _direction(self) -> Array:
+        axis = np.zeros(3)
+        axis[self._along] = -1.0 if self.axis[0] == "-" else 1.0
+        return axis
+
+    def target(self, configuration: Configuration) -> Array:
+        return configuration.placement(self.frame).act(AHEAD * self._direction())
+
+    def _point(self, configuration: Configuration) -> Array:
+        preview = configuration.previews.get(self.name)
+        return self.target(configuration) if preview is None else preview.value
+
+    def _seen(self, point: Array) -> tuple[Array, Array]:
+        """x (2,) and ∂x/∂s (2, 3) for a point s as the frame sees it, (3,) m."""
+        distance = float(np.linalg.norm(point))
+        if distance < _NEAREST:
+            point = point * (_NEAREST / distance) if distance > 0.0 else _NEAREST * self._direction()
+            distance = _NEAREST
+        across, ahead = point[self._across], float(point @ self._direction())
+        aside = float(np.linalg.norm(across))
+        angle = np.arctan2(aside, ahead)
+        steep = ahead < 0.0 or aside > _STRAIGHT * distance
+        ratio = angle / max(aside, _ASIDE * distance if ahead < 0.0 else 0.0) if steep else 1.0 / distance
+        side = across / aside if aside > 0.0 else np.zeros(2)
+        slope = np.zeros((2, 3))
+        slope[:, self._across] = ratio * np.eye(2)
+        slope[:, self._across] += (ahead / distance**2 - ratio) * np.outer(side, side)
+        slope -= np.outer(across / distance**2, self._direction())
+        return ratio * across, slope
+
+    def value(self, configuration: Configuration) -> Array:
+        place = configuration.placement(self.frame)
+        return self._seen(place.actInv(self._point(configuration)))[0]
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return value
+
+    def jacobian(self, configuration: Configuration) -> Array:
+        point, rows = self._point(configuration), configuration.frame_jacobians(self.frame)
+        found = np.empty((len(rows), 2, rows.shape[2]))
+        for j, place in enumerate(configuration.placements(self.frame)):
+            seen, turn = place.actInv(point), place.rotation.T
+            # ṡ = −Rᵀṗ − Rᵀω × s
+            moved = np.cross(seen, turn @ rows[j, 3:], axisb=0).T - turn @ rows[j, :3]
+            found[j] = self._seen(seen)[1] @ moved
+        return found
+
+    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+        """A point that moves by Δc changes x by ∂x/∂c Δc; that much is asked for back."""
+        place = configuration.placement(self.frame)
+        back = self._seen(place.actInv(preview.value))[1] @ -place.rotation.T
+        return Preview(
+            preview.value,
+            preview.displacement @ back.T,
+            preview.velocity @ back.T,
+            preview.acceleration @ back.T,
+        )
