@@ -77,8 +77,9 @@ class Layout:
     """Where each field of a row lies.
 
     Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`,
-    `v_d/<task>`, `a_d/<task>` (m each); per level the fields cost, kkt, rung (index into RUNGS),
-    time_us, leak and active (number of binding constraints), NaN where the level was not solved.
+    `v_d/<task>`, `a_d/<task>` (m each; three where the target is a point to look at); per level the fields
+    cost, kkt, rung (index into RUNGS), time_us, leak and active (number of binding constraints), NaN where
+    the level was not solved.
     """
 
     size: int
@@ -131,11 +132,12 @@ def arranged(
         for task in level.tasks:
             coordinates = task.coordinates(robot)
             tasks.append(TaskInfo(task.name, level.name, coordinates, task.unit))
-            width = 4 if task.value(probe).ndim == 2 else len(coordinates)
-            add(f"x/{task.name}", width)
-            add(f"x_d/{task.name}", width)
-            for name in ("error", "v_d", "a_d"):
-                add(f"{name}/{task.name}", len(coordinates))
+            value, target = task.value(probe), task.target(probe)
+            add(f"x/{task.name}", 4 if value.ndim == 2 else value.size)
+            add(f"x_d/{task.name}", 4 if target.ndim == 2 else target.size)
+            add(f"error/{task.name}", len(coordinates))
+            for name in ("v_d", "a_d"):
+                add(f"{name}/{task.name}", len(coordinates) if target.ndim == 2 else target.size)
             for name in per_task:
                 add(f"{name}/{task.name}", 1)
     for level in levels:

@@ -23,7 +23,7 @@ from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL
 from himpc.tick.problems import increments_of
 from himpc.tick.tables import LevelTable
-from himpc.tick.tick import CompiledTick, is_built_in
+from himpc.tick.tick import CompiledTick
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -106,10 +106,8 @@ class HIMPC:
         self._settings = settings
         self.kernel = self._compile() if settings.route == "compiled" else None
 
-    def _compile(self) -> CompiledTick | None:
-        """The kernel with these settings; None where a task is not one that it knows."""
-        if not is_built_in(self._form, self._off):
-            return None
+    def _compile(self) -> CompiledTick:
+        """The kernel with these settings."""
         levels = [] if self._idle else [LevelTable.of(level) for level in self._form.levels]
         return CompiledTick(self.robot, self._settings, self._form, self._off, levels)
 

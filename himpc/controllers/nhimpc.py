@@ -8,7 +8,7 @@ from himpc.cascade.level import LevelSolution
 from himpc.controllers.himpc import HIMPC, Found, Tick
 from himpc.controllers.settings import Settings
 from himpc.tick.tables import LevelTable
-from himpc.tick.tick import CompiledTick, is_built_in
+from himpc.tick.tick import CompiledTick
 from robots import Robot
 
 TOLERANCE = 1e-6
@@ -47,9 +47,7 @@ class NHIMPC(HIMPC):
         self.max_iterations = max_iterations
         super().__init__(robot, settings)
 
-    def _compile(self) -> CompiledTick | None:
-        if not is_built_in(self._form, self._off):
-            return None
+    def _compile(self) -> CompiledTick:
         levels = [] if self._idle else [LevelTable.of(level) for level in self._form.levels]
         most = self.max_iterations if levels else 1
         return CompiledTick(self.robot, self._settings, self._form, self._off, levels, self.tolerance, most)

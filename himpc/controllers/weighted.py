@@ -17,7 +17,7 @@ from himpc.plan import Plan
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL
 from himpc.tick.tables import LevelTable
-from himpc.tick.tick import CompiledTick, is_built_in
+from himpc.tick.tick import CompiledTick
 
 Array = NDArray[np.float64]
 
@@ -47,9 +47,7 @@ class Weighted(HIMPC):
         plan = super().step(q, v, previews, tau_applied)
         return replace(plan, step_us=plan.step_us - self._evidence_us)
 
-    def _compile(self) -> CompiledTick | None:
-        if not is_built_in(self._form, self._off):
-            return None
+    def _compile(self) -> CompiledTick:
         levels = [] if self._idle else list(accumulated(self._form.levels))
         tick = CompiledTick(self.robot, self._settings, self._form, self._off, levels)
         for place, level in enumerate(self._form.levels):

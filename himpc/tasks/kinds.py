@@ -54,6 +54,4 @@ def word_of(task: Task) -> str:
     return _WORDS[type(task)]
 
 
-_WORDS: dict[type[Task], str] = {
-    kind.makes[0]: word for word, kind in KINDS.items() if len(kind.makes) == 1
-}
+_WORDS: dict[type[Task], str] = {kind.makes[0]: word for word, kind in KINDS.items() if len(kind.makes) == 1}

@@ -35,8 +35,8 @@ class PlaneDistance(Task):
         """Raises InputError for a normal that is no direction."""
         if len(self.normal) != 3 or not 0.0 < float(np.linalg.norm(self.normal)) < np.inf:
             raise InputError(
-                f"normal of task '{self.name}' is {list(self.normal)}: give three finite numbers that are not "
-                "all zero, e.g. [0, 0, 1]"
+                f"normal of task '{self.name}' is {list(self.normal)}: give three finite numbers, "
+                "not all of them zero, e.g. [0, 0, 1]"
             )
         if not np.isfinite(self.offset):
             raise InputError(f"offset of task '{self.name}' is {self.offset}: give a finite number, in m")

@@ -10,7 +10,7 @@ from himpc.controllers.settings import Settings
 from himpc.geometry import geometry
 from himpc.limits import LimitsInForce
 from himpc.limits.rows import REACTION, approached, toeplitz
-from himpc.tasks import Damping, FrameOrientation, Joints, Task
+from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
 from himpc.tasks.frame import AXES, FrameTask
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
@@ -18,10 +18,20 @@ from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
 from robots import Robot
 
+Span = tuple[int, Task, slice]
+"""The place of a task among all, the task, and its rows."""
+
+_BUILT_IN = (FramePosition, FrameOrientation, Joints, Posture, Damping)
+
+
+def is_built_in(task: Task) -> bool:
+    """Whether the kernel knows the task; its rows are handed in otherwise."""
+    return type(task) in _BUILT_IN
+
 
 def arena_for(
     robot: Robot, settings: Settings, form: StackForm, off: Sequence[Task], levels: Sequence[LevelTable]
-) -> tuple[Arena, list[tuple[int, Task, slice]]]:
+) -> tuple[Arena, list[Span]]:
     """An arena with the tables of a robot and its settings, and where the rows of each task are.
 
     Args:
@@ -33,6 +43,7 @@ def arena_for(
     tasks = (*form.tasks, *off)
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
+    given = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
     N, solved = settings.horizon, sum(form.sizes)
     paper = settings.limits.position == "paper"
     arena = sizes(
@@ -44,14 +55,20 @@ def arena_for(
         (3 if paper else 2) * N,
         len(tasks),
         max(len(frames), 1),
+        max(given, 1),
     )
     f = arena.f
     _write_geometry(arena, robot, frames)
-    spans, start = [], 0
+    spans, start, given = [], 0, 0
     for place, (task, count) in enumerate(zip(tasks, counts, strict=True)):
         span = slice(start, start + count)
         spans.append((place, task, span))
-        _write_task(arena, robot, task, place, span, frames)
+        if is_built_in(task):
+            _write_task(arena, robot, task, place, span, frames)
+        else:
+            arena.i["task"][place] = kinematics.GIVEN, 0, start, count
+            arena.i["part"][span] = range(given, given + count)
+            given += count
         start += count
     model = form.model
     f["M_bar"][:] = settings.M_bar

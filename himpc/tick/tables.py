@@ -76,7 +76,15 @@ def write_effects(arena: Arena, rows: slice, root_Q: Array, weighted_C: Array) -
 
 
 def sizes(
-    n: int, N: int, rows: int, solved: int, levels: int, bounds: int, tasks: int = 1, frames: int = 1
+    n: int,
+    N: int,
+    rows: int,
+    solved: int,
+    levels: int,
+    bounds: int,
+    tasks: int = 1,
+    frames: int = 1,
+    given: int = 1,
 ) -> Arena:
     """An arena for n joints and N knots.
 
@@ -84,6 +92,7 @@ def sizes(
         n, N: see there.
         rows, solved: rows of all tasks, and how many of them, the first, are solved for.
         levels, bounds, tasks, frames: how many.
+        given: rows of tasks that the kernel does not know, at least 1.
     """
     arena = Arena(
         n=n,
@@ -93,10 +102,12 @@ def sizes(
         r=max(levels, 1),
         T=tasks,
         F=frames,
+        G=given,
         J=n + 1,
         b=bounds,
         w=N * n,
         k=N * n + 1,
     )
     arena.i["sizes"][:9] = n, N, rows, solved, levels, tasks, frames, bounds, N * n
+    arena.i["sizes"][10] = given
     return arena

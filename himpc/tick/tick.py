@@ -16,8 +16,9 @@ from himpc.limits import LimitsInForce, Rows
 from himpc.limits.rows import Kind
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
-from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
+from himpc.tasks import Damping, Task
 from himpc.tick.configure import arena_for, write_limits
+from himpc.tick.given import GivenRows
 from himpc.tick.kernel.arena import Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
@@ -25,13 +26,6 @@ from himpc.tick.ladder import solve_levels
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, write_effects
 from robots import Robot
-
-_BUILT_IN = (FramePosition, FrameOrientation, Joints, Posture, Damping)
-
-
-def is_built_in(form: StackForm, off: list[Task]) -> bool:
-    """Whether the kernel knows all tasks."""
-    return all(type(task) in _BUILT_IN for task in (*form.tasks, *off))
 
 
 class CompiledTick:
@@ -60,6 +54,7 @@ class CompiledTick:
     ) -> None:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
+        self._given = GivenRows(robot, self.arena, self._spans)
         self._kinds: tuple[Kind, ...] = ("torque", "velocity")
         if settings.limits.position == "paper":
             self._kinds = ("torque", "velocity", "position")
@@ -147,6 +142,7 @@ class CompiledTick:
                 before = arena.f["U"].copy()
             else:
                 before = None
+            self._given.write(previews)
             if not look(*arena.arguments):
                 return None
             rungs = solve_levels(arena, self._kinds, damped) if self._levels else []
@@ -171,7 +167,7 @@ class CompiledTick:
             self._limits = limits
             write_limits(self.arena, limits, len(self._kinds) == 3)
         reach = self._settings.horizon + 1
-        for place, task, span in self._spans:
+        for place, task, span in self._given.spans:
             if isinstance(task, Damping):
                 continue
             value, displacement, velocity, acceleration = previews[task.name]
@@ -201,7 +197,7 @@ class CompiledTick:
         def evidence() -> Evidence:
             R, value, error = found("R_now"), found("value"), found("error")
             values = {
-                task.name: R[place] if isinstance(task, FrameOrientation) else value[span]
+                task.name: R[place] if task.name in self._given.turning else value[span]
                 for place, task, span in self._spans
             }
             stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None

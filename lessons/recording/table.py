@@ -64,4 +64,4 @@ def _words(layout: Layout, field: str, width: int) -> tuple[str, ...]:
     task = next(task for task in layout.tasks if task.name == name)
     if width == len(task.coordinates) and not (kind in ("x", "x_d") and width == 4):
         return task.coordinates
-    return ("x", "y", "z", "w")
+    return ("x", "y", "z", "w")[:width]

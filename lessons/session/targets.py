@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Reference, Target
 from himpc.rotation import from_quaternion
-from himpc.tasks import FrameOrientation, FramePosition, Task
+from himpc.tasks import Pointing, Task
+from himpc.tasks.axes import OnAxes
 from robots import InputError
 from robots.errors import unknown_name
 
@@ -17,16 +18,17 @@ Array = NDArray[np.float64]
 
 
 def target_at(task: Task, value: Array) -> Target:
-    """A draggable target of a task that starts at a value of it."""
-    if isinstance(task, FrameOrientation):
-        return Target(value, ROTATION_CAPS, task.components)
-    return Target(value, POSITION_CAPS if task.unit == "m" else JOINT_CAPS)
+    """A draggable target of a task that starts at one of its `Task.target`s."""
+    if value.ndim == 2:
+        return Target(value, ROTATION_CAPS, task.components if isinstance(task, OnAxes) else None)
+    in_space = task.unit == "m" or isinstance(task, Pointing)
+    return Target(value, POSITION_CAPS if in_space else JOINT_CAPS)
 
 
 def move_target(
     tasks: Mapping[str, Task], references: Mapping[str, Reference], name: str, value: tuple[float, ...]
 ) -> None:
-    """Puts a task's target somewhere: position (m), quaternion (x y z w) or joints (rad).
+    """Puts a task's target somewhere: position, point or distance (m), quaternion (x y z w) or joints (rad).
 
     Raises:
         InputError: no such task, a reference that is no target, or a value that does not fit the task.
@@ -42,12 +44,12 @@ def move_target(
     if not np.isfinite(array).all():
         raise InputError(f"the target of task '{name}' is not finite: give finite numbers")
     task = tasks[name]
-    if isinstance(task, FrameOrientation):
+    if target.raw.ndim == 2:
         if array.size != 4 or not array.any():
             raise InputError(f"the target of task '{name}' must be a quaternion x y z w")
         target.move(from_quaternion(array))
         return
-    if isinstance(task, FramePosition) and array.size == 3:
+    if isinstance(task, OnAxes) and array.size == 3:
         array = array[task.components]
     if array.shape != target.raw.shape:
         raise InputError(f"the target of task '{name}' needs {target.raw.size} numbers, not {array.size}")

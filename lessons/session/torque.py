@@ -97,7 +97,7 @@ class TorqueSession(Session):
         start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
         for task in _tasks(self.settings.levels):
             if task.name not in given:
-                given[task.name] = target_at(task, task.value(start))
+                given[task.name] = target_at(task, task.target(start))
         return given
 
     def target(self, task: str) -> Target | None:

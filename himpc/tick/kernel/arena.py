@@ -15,8 +15,8 @@ Whole = Any
 """Whole numbers, NDArray[np.intp]: an element of them is a number, which type checkers do not know."""
 
 # Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
-# F frames; J = n + 1 places, the world first; b rows of bounds (kinds · N); w = N · n coordinates of a level,
-# and k = w + 1 rows that can hold its point, one of them about to be replaced.
+# F frames; G rows that are given; J = n + 1 places, the world first; b rows of bounds (kinds · N); w = N · n
+# coordinates of a level, and k = w + 1 rows that can hold its point, one of them about to be replaced.
 NUMBERS = {
     # What a tick is given.
     "q": "n",
@@ -27,6 +27,7 @@ NUMBERS = {
     "displacement": "N1 M",
     "velocity_d": "N1 M",
     "acceleration_d": "N1 M",
+    "given": "N1 G n",
     # What is remembered from the tick before.
     "q_was": "n",
     "v_was": "n",
@@ -110,7 +111,7 @@ NUMBERS = {
 """Every array of numbers and its shape."""
 
 WHOLES = {
-    "sizes": "10",
+    "sizes": "11",
     # What is remembered, and whether `x_dot_was` and `U_was` are known.
     "known": "2",
     "pressed_row": "r k",

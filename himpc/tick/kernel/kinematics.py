@@ -7,8 +7,8 @@ import math
 from himpc.cascade.compiled import piece
 from himpc.tick.kernel.arena import Array, Whole
 
-POSITION, ORIENTATION, JOINTS, DAMPING = range(4)
-"""Kinds of tasks."""
+POSITION, ORIENTATION, JOINTS, DAMPING, GIVEN = range(5)
+"""Kinds of tasks; rows of a GIVEN one are handed in, with its value and error."""
 
 
 @piece
@@ -66,21 +66,26 @@ def jacobian(
     z: Array,
     frame_joint: Whole,
     point: Array,
+    given: Array,
     J: Array,
 ) -> None:
     """J_i of (3) of all tasks, one below the other, (M, n), world axes at the frames' origins.
 
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
-        part: (M,) which axis or joint a row is about.
+        part: (M,) which axis, joint or given row a row is about.
         parent, turns, placed, z: as in `place`.
         frame_joint, point: the joint that carries each frame, and its origin.
+        given: rows that are handed in, (G, n).
         J: the result.
     """
     J[:] = 0.0
     for t in range(len(task)):
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
         for i in range(first, first + size):
+            if kind == GIVEN:
+                J[i] = given[part[i]]
+                continue
             if kind >= JOINTS:
                 J[i, part[i]] = 1.0
                 continue

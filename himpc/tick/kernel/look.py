@@ -10,6 +10,7 @@ from himpc.tick.kernel.arena import AT, PERIOD, REACTION, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (
     DAMPING,
+    GIVEN,
     JOINTS,
     ORIENTATION,
     frame_rotation,
@@ -30,8 +31,8 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
 
     The knots q*_{k+j|k−1} are the last prediction re-rooted at the measured q.
     """
-    s = vector(whole, whole_where[WHOLE_AT.sizes], 10)
-    n, N, M, m, T, F, b = s[0], s[1], s[2], s[3], s[5], s[6], s[7]
+    s = vector(whole, whole_where[WHOLE_AT.sizes], 11)
+    n, N, M, m, T, F, b, G = s[0], s[1], s[2], s[3], s[5], s[6], s[7], s[10]
     scalars = vector(data, where[AT.scalars], 4)
     period, T_s, reaction = scalars[PERIOD], scalars[T_S], scalars[REACTION]
     q, v = vector(data, where[AT.q], n), vector(data, where[AT.v], n)
@@ -59,13 +60,13 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         vector(data, where[AT.x_d], M),
     )
     R_now, R_d = matrices(data, where[AT.R_now], T, 3, 3), matrices(data, where[AT.R_d], T, 3, 3)
-    at = vector(data, where[AT.z], n)
+    at, given = vector(data, where[AT.z], n), matrices(data, where[AT.given], N + 1, G, n)
 
     known = vector(whole, whole_where[WHOLE_AT.known], 2)
     if not known[0]:
         place(q_was, parent, turns, turn, shift, axis, placed, z)
         points(placed, frame_joint, frame_shift, point)
-        jacobian(task, part, parent, turns, placed, z, frame_joint, point, B[0])
+        jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[N], B[0])
         for i in range(M):
             x_dot_was[i] = dot(B[0, i], v_was, n)
         known[0] = 1
@@ -74,7 +75,7 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
             at[a] = path[1 + j, a] + (q[a] - path[1, a]) if j else q[a]
         place(at, parent, turns, turn, shift, axis, placed, z)
         points(placed, frame_joint, frame_shift, point)
-        jacobian(task, part, parent, turns, placed, z, frame_joint, point, B[j])
+        jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[j], B[j])
     turned = vector(data, where[AT.slope], 3)
     for t in range(T):
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
@@ -83,6 +84,8 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
             turned_away(R_now[t], R_d[t], turned)
         for i in range(first, first + size):
             x_dot[i] = dot(B[0, i], v, n)
+            if kind == GIVEN:
+                continue
             if kind == ORIENTATION:
                 error[i] = turned[part[i]]
                 continue

@@ -1,0 +1,73 @@
+"""Rows of tasks that the kernel does not know, evaluated in Python along the knots and handed to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from himpc.configuration import Configuration
+from himpc.references import Preview
+from himpc.tasks import FrameOrientation, Task
+from himpc.tick.configure import Span, is_built_in
+from himpc.tick.kernel.arena import Arena, Array
+from robots import Robot
+
+
+class GivenRows:
+    """The tasks that `is_built_in` does not name. What they find stands in the arena before `look` reads it.
+
+    Attributes:
+        spans: the other tasks, whose rows the kernel finds itself.
+        turning: names of the tasks whose value is a rotation matrix.
+    """
+
+    def __init__(self, robot: Robot, arena: Arena, spans: Sequence[Span]) -> None:
+        self._robot, self._data, self._arena = robot, robot.model.createData(), arena
+        self.spans = [each for each in spans if is_built_in(each[1])]
+        self._given: list[tuple[int, Task, slice, slice]] = []
+        home = Configuration(robot, self._data, robot.home, np.zeros(robot.n))
+        self.turning = {task.name for _, task, _ in spans if isinstance(task, FrameOrientation)}
+        start = 0
+        for place, task, span in spans:
+            if not is_built_in(task):
+                end = start + span.stop - span.start
+                self._given.append((place, task, span, slice(start, end)))
+                start = end
+                if task.value(home).ndim == 2:
+                    self.turning.add(task.name)
+
+    def write(self, previews: Mapping[str, Preview]) -> None:
+        """J at the knots of the last prediction (30), value, error and reference of each task.
+
+        Args:
+            previews: of every task. The arena holds the measured state and what is remembered.
+        """
+        if not self._given:
+            return
+        f, known = self._arena.f, bool(self._arena.i["known"][0])
+        q, v, path = f["q"], f["v"], f["path"]
+        with np.errstate(all="ignore"):
+            knots = path[2:] + (q - path[1])
+            here = Configuration(self._robot, self._data, q, v, knots, previews)
+            past = Configuration(self._robot, self._data, f["q_was"], f["v_was"], previews=previews)
+            for place, task, span, rows in self._given:
+                f["given"][: len(knots) + 1, rows] = task.jacobian(here)
+                if not known:
+                    f["given"][-1, rows] = task.jacobian(past)[0]
+                preview, value = previews[task.name], task.value(here)
+                self._note(place, span, value)
+                f["error"][span] = task.error(value, preview.value)
+                self._ask(span, task.asked(here, preview))
+
+    def _note(self, place: int, span: slice, value: Array) -> None:
+        if value.ndim == 2:
+            self._arena.f["R_now"][place] = value
+        else:
+            self._arena.f["value"][span] = value
+
+    def _ask(self, span: slice, asked: Preview) -> None:
+        f, reach = self._arena.f, len(self._arena.f["displacement"])
+        f["displacement"][:, span] = asked.displacement[:reach]
+        f["velocity_d"][:, span] = asked.velocity[:reach]
+        f["acceleration_d"][:, span] = asked.acceleration[:reach]

@@ -1,0 +1,212 @@
+"""Every kind of task: its Jacobian is the derivative of its value, and its rows reach the torque."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.references import Hold, Preview
+from himpc.rotation import exp3, quaternion
+from himpc.stack import Level
+from himpc.tasks import (
+    KINDS,
+    CentreOfMass,
+    FrameOrientation,
+    FramePosition,
+    Joints,
+    PlaneDistance,
+    Pointing,
+    Posture,
+    RelativeOrientation,
+    RelativePosition,
+    Task,
+)
+from lessons.events import MoveTarget
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
+from robots import CATALOG, InputError, Robot, load_robot
+
+Array = NDArray[np.float64]
+H = 1e-6
+
+
+@cache
+def robot_of(name: str) -> Robot:
+    return load_robot(name)
+
+
+def tasks_of(robot: Robot, rng: np.random.Generator) -> list[Task]:
+    """One task of every class, on links that are drawn at random."""
+    frame, root = (str(each) for each in rng.choice(robot.frames, 2, replace=False))
+    axes = str(rng.choice(["xyz", "xy", "z"]))
+    normal = tuple(rng.normal(size=3).tolist())
+    return [
+        FramePosition(name="position", frame=frame, axes=axes),
+        FrameOrientation(name="orientation", frame=frame, axes=axes),
+        Joints(name="joints", joints=robot.joint_names[:2]),
+        Posture(name="posture"),
+        CentreOfMass(name="com", axes=axes),
+        RelativePosition(name="relative_position", frame=frame, root=root, axes=axes),
+        RelativeOrientation(name="relative_orientation", frame=frame, root=root, axes=axes),
+        Pointing(name="pointing", frame=frame, axis=str(rng.choice(["x", "y", "z", "-x", "-y", "-z"]))),
+        PlaneDistance(name="plane", frame=frame, normal=normal, offset=float(rng.normal())),
+    ]
+
+
+def change(after: Array, before: Array) -> Array:
+    """after ⊖ before, of coordinates or of rotations."""
+    return pin.log3(after @ before.T) if after.ndim == 2 else after - before
+
+
+@pytest.mark.parametrize("name", CATALOG)
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=15)
+def test_jacobians_are_derivatives(name: str, seed: int) -> None:
+    """Central differences of every kind's value along every joint, at the measured state and at a knot."""
+    robot, rng = robot_of(name), np.random.default_rng(seed)
+    data, n = robot.model.createData(), robot.n
+    q, knot = rng.uniform(-1.5, 1.5, (2, n))
+    tasks = tasks_of(robot, rng)
+    previews = {"pointing": Hold(rng.normal(size=3) * 2).preview(0.0, 1e-3, 2)}
+
+    def at(q: Array) -> Configuration:
+        return Configuration(robot, data, q, np.zeros(n), previews=previews)
+
+    both = Configuration(robot, data, q, np.zeros(n), [knot], previews)
+    for task in tasks:
+        J = task.jacobian(both)
+        m = len(task.coordinates(robot))
+        assert J.shape == (2, m, n)
+        for place, where in enumerate((q, knot)):
+            value = task.value(at(where))
+            if isinstance(task, Pointing) and np.linalg.norm(value) > 3.0:
+                continue  # next to the opposite direction there is no derivative
+            for joint, nudge in enumerate(H * np.eye(n)):
+                moved = change(task.value(at(where + nudge)), task.value(at(where - nudge))) / (2 * H)
+                if moved.size != m:
+                    moved = moved[task.components]  # pyright: ignore[reportAttributeAccessIssue]
+                np.testing.assert_allclose(
+                    J[place, :, joint], moved, atol=3e-6 * (1 + np.abs(J[place]).max()), err_msg=task.name
+                )
+        target = task.target(at(q))
+        if not isinstance(task, Pointing):
+            np.testing.assert_allclose(task.error(task.value(at(q)), target), np.zeros(m), atol=1e-9)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=40)
+def test_a_point_that_moves_asks_for_what_it_takes(seed: int) -> None:
+    """Pointing: −∂x/∂c ċ is asked for, so that x stays where it is while J q̇ meets it."""
+    robot, rng = robot_of("iiwa14"), np.random.default_rng(seed)
+    task, data = Pointing(name="look", axis="-y"), robot.model.createData()
+    q, c, c_dot = rng.uniform(-1.5, 1.5, 7), rng.normal(size=3) * 2, rng.normal(size=3)
+
+    def preview(point: Array) -> Preview:
+        return Preview(point, np.tile(c_dot, (2, 1)), np.tile(c_dot, (2, 1)), np.tile(c_dot, (2, 1)))
+
+    def at(point: Array) -> Configuration:
+        return Configuration(robot, data, q, np.zeros(7), previews={"look": preview(point)})
+
+    if np.linalg.norm(task.value(at(c))) > 3.0:
+        return
+    moved = (task.value(at(c + H * c_dot)) - task.value(at(c - H * c_dot))) / (2 * H)
+    asked = task.asked(at(c), preview(c))
+    for each in (asked.displacement, asked.velocity, asked.acceleration):
+        np.testing.assert_allclose(each[1], -moved, atol=1e-5 * (1 + np.abs(moved).max()))
+
+
+def test_pointing_is_told_by_its_angle() -> None:
+    """‖x‖ is the angle between axis and point; it is zero where the target starts, and finite everywhere."""
+    robot = robot_of("iiwa14")
+    task, data = Pointing(name="look"), robot.model.createData()
+    here = Configuration(robot, data, robot.home, np.zeros(7))
+    place = here.placement()
+    for point in (task.target(here), place.translation, place.translation - place.rotation[:, 2]):
+        previews = {"look": Hold(np.array(point)).preview(0.0, 1e-3, 1)}
+        told = Configuration(robot, data, robot.home, np.zeros(7), previews=previews)
+        assert np.isfinite(task.value(told)).all()
+        assert np.isfinite(task.jacobian(told)).all()
+        assert np.isfinite(task.asked(told, previews["look"]).velocity).all()
+    ahead, aside = place.rotation[:, 2], place.rotation[:, 0]
+    previews = {
+        "look": Hold(place.translation + np.cos(0.4) * ahead + np.sin(0.4) * aside).preview(0, 1e-3, 1)
+    }
+    told = Configuration(robot, data, robot.home, np.zeros(7), previews=previews)
+    np.testing.assert_allclose(task.value(told), [0.4, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: CentreOfMass(name="a", axes="xq"), "give some of x, y and z"),
+        (lambda: Pointing(name="a", axis="w"), "-x"),
+        (lambda: PlaneDistance(name="a", normal=(0.0, 0.0, 0.0)), "normal"),
+        (lambda: PlaneDistance(name="a", normal=(1.0, 0.0)), "normal"),
+        (lambda: PlaneDistance(name="a", offset=float("nan")), "offset"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(wrong: object, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        wrong()  # pyright: ignore[reportCallIssue]
+
+
+def test_every_kind_says_what_it_is() -> None:
+    for kind in KINDS.values():
+        assert kind.says
+        assert len(kind.makes) == len(kind.suffixes)
+
+
+# ------------------------------------------------------------------ rows that the kernel does not know
+
+
+GIVEN = {
+    "com": lambda: CentreOfMass(name="x", axes="xy", K_p=60.0, K_v=15.0),
+    "relative": lambda: RelativePosition(name="x", root="link_3", K_p=60.0, K_v=15.0),
+    "relative_turn": lambda: RelativeOrientation(name="x", root="link_3", K_p=60.0, K_v=15.0),
+    "pointing": lambda: Pointing(name="x", frame="link_5", K_p=60.0, K_v=15.0),
+    "plane": lambda: PlaneDistance(name="x", normal=(1.0, 0.0, 1.0), K_p=60.0, K_v=15.0),
+}
+
+
+@pytest.mark.parametrize(
+    ("controller", "place"), [("himpc", 0), ("himpc", 1), ("nhimpc", 0), ("weighted", 0)]
+)
+@pytest.mark.parametrize("kind", GIVEN)
+def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: int, controller: str) -> None:
+    """Closed loops side by side while the target moves; the kernel takes the rows as they are handed in."""
+    scene = torque_scene("iiwa14-hold")
+    levels = list(scene.settings.levels)
+    levels.insert(place, Level((GIVEN[kind](),)))
+    taken = replace(scene.settings, levels=tuple(levels), controller=controller)
+    compiled, printed = (
+        TorqueSession(replace(scene, settings=replace(taken, route=route)))
+        for route in ("compiled", "explicit")
+    )
+    assert getattr(compiled.controller, "kernel", None) is not None
+    worst = moved = 0.0
+    for k in range(60):
+        for session in (compiled, printed):
+            target = session.target("x")
+            assert target is not None
+            if k == 5:
+                turned = target.raw.ndim == 2
+                value = quaternion(exp3(np.full(3, 0.1)) @ target.raw) if turned else target.raw + 0.1
+                session.post(MoveTarget("x", tuple(value)))
+            session.tick()
+        assert compiled.plan is not None
+        assert printed.plan is not None
+        worst = max(worst, float(np.abs(compiled.plan.tau - printed.plan.tau).max()))
+        moved = max(moved, float(np.abs(compiled.plan.errors["x"]).max()))
+        for name, value in printed.plan.values.items():
+            np.testing.assert_allclose(compiled.plan.values[name], value, atol=1e-9)
+            np.testing.assert_allclose(compiled.plan.errors[name], printed.plan.errors[name], atol=1e-9)
+    assert moved > 1e-4
+    assert worst <= (1e-7 if controller == "weighted" else 1e-8)
