@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 from urllib.parse import urlsplit
 
-from lessons.orphans import end_with_parent
+from robots.orphans import end_with_parent
 from robots import InputError
 
 T = TypeVar("T")

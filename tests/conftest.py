@@ -33,8 +33,7 @@ _COMPILE = "from himpc.cascade.compiling import compile_all; compile_all(lambda 
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """A process that runs no test compiles: what it has in memory differs by a rounding from the code that
-    all others load from disk, and whether runs are equal to the last bit is among the tests."""
+    """What is compiled is compiled before the tests: it takes a minute, for which none of them waits."""
     if not hasattr(config, "workerinput"):
         root = Path(__file__).parents[1]
         subprocess.run([sys.executable, "-c", _COMPILE], cwd=root, check=True, capture_output=True)

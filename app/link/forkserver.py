@@ -25,7 +25,7 @@ from typing import NoReturn
 
 from app.link.children import Forked, one_thread_each
 from app.link.wire import Handle, Wire, packed
-from lessons.orphans import end_with
+from robots.orphans import end_with
 
 PATIENCE = 10.0
 """s after which a server that is ready but does not fork counts as stuck."""

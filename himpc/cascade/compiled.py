@@ -1,11 +1,12 @@
-"""The door to Numba: functions compiled when their module is first imported, and kept on disk."""
+"""The door to Numba: functions on disk, loaded when their module is first imported; what is not there is
+compiled first, by a process of its own, see `compiler`."""
 
 from __future__ import annotations
 
 import os
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from hashlib import sha256
 from logging import getLogger
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Any
 
 from numba import boolean, float64, int64, intp, njit, types
 from numba.core import config, event
+
+from himpc.cascade.compiler import compile_apart, compiles_here
 
 try:
     import fcntl
@@ -95,10 +98,41 @@ def entry(*arguments: Any) -> Callable[[Function], Any]:
 
 
 def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
-    with _one_at_a_time(fast.stats.cache_path):
+    place, module = fast.stats.cache_path, fast.py_func.__module__
+    if place is not None and not compiles_here() and module != "__main__" and not _loaded(fast, arguments):
+        with _one_at_a_time(place, "waiting"):
+            if not _loaded(fast, arguments):
+                compile_apart(module, lambda name: event.end_event(_APART, name))
+    with _one_at_a_time(place, "compiling"):
         fast.compile(arguments)
     fast.disable_compile()
     return fast
+
+
+def _loaded(fast: Any, arguments: tuple[Any, ...]) -> bool:
+    """Whether a function was on disk. If so, it now is here."""
+    try:
+        with event.install_listener("numba:compile", _Refusal(fast)):
+            fast.compile(arguments)
+    except _NotOnDisk:
+        return False
+    return True
+
+
+class _NotOnDisk(Exception):
+    pass
+
+
+class _Refusal(event.Listener):
+    def __init__(self, fast: Any) -> None:
+        self._fast = fast
+
+    def on_start(self, event: Any) -> None:
+        if event.data["dispatcher"] is self._fast:
+            raise _NotOnDisk
+
+    def on_end(self, event: Any) -> None:
+        """Nothing: it never comes so far."""
 
 
 def _temporary_folder() -> str | None:
@@ -116,12 +150,12 @@ def _temporary_folder() -> str | None:
 
 
 @contextmanager
-def _one_at_a_time(folder: str | None) -> Iterator[None]:
+def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
     """Processes that need the same code wait for the first one, and then find it on disk."""
     if fcntl is None or folder is None:
         yield
         return
-    with open(Path(folder, "himpc-lab.lock"), "w") as lock:
+    with open(Path(folder, f"himpc-lab-{what}.lock"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
@@ -130,7 +164,7 @@ class _FirstWord(event.Listener):
     """What takes so long, once: whoever looks at a terminal would think that nothing happens."""
 
     def __init__(self) -> None:
-        self._said = False
+        self._said = compiles_here()  # then somebody else did
 
     def on_start(self, event: Any) -> None:
         if not self._said:
@@ -144,6 +178,9 @@ class _FirstWord(event.Listener):
 event.register("numba:compile", _FirstWord())
 
 
+_APART = "himpc-lab:compiled-apart"
+
+
 class _Compiled(event.Listener):
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
@@ -152,10 +189,16 @@ class _Compiled(event.Listener):
         """Nothing: only what is done counts."""
 
     def on_end(self, event: Any) -> None:
-        function = event.data["dispatcher"].py_func
-        self._tell(f"{function.__module__}.{function.__qualname__}")
+        if event.kind == _APART:
+            self._tell(event.data)
+        elif tuple(event.data["args"]) in event.data["dispatcher"].overloads:
+            function = event.data["dispatcher"].py_func
+            self._tell(f"{function.__module__}.{function.__qualname__}")
 
 
-def told(tell: Callable[[str], None]) -> AbstractContextManager[Any]:
+@contextmanager
+def told(tell: Callable[[str], None]) -> Iterator[None]:
     """While it is open, `tell` hears the dotted name of every function that had to be compiled."""
-    return event.install_listener("numba:compile", _Compiled(tell))
+    heard = _Compiled(tell)
+    with event.install_listener("numba:compile", heard), event.install_listener(_APART, heard):
+        yield

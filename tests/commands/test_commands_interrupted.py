@@ -74,8 +74,8 @@ When = Callable[[Program], bool]
 PHASES: dict[str, tuple[list[str], bool, When]] = {
     "imports": (["run", "iiwa14-circle"], False, lambda it: it.loaded("numpy")),
     "imports of the page": (["--no-browser", "--port", "0"], False, lambda it: it.loaded("numpy")),
-    "compiling": (["run", "iiwa14-circle"], True, lambda it: it.has_said("compiling")),
-    "compiling for the page": (["--no-browser", "--port", "0"], True, lambda it: it.has_said("compiling")),
+    "compiling": (["run", "iiwa14-circle"], True, lambda it: bool(it.children)),
+    "compiling for the page": (["--no-browser", "--port", "0"], True, lambda it: len(it.children) > 1),
     "serving": (["--no-browser", "--port", "0"], False, lambda it: it.has_said("ready at")),
     "running": (["run", "iiwa14-circle", "--duration", "600"], False, lambda it: it.loaded("libmujoco")),
     "checking": (["lessons", "--check", "one-task"], False, lambda it: len(it.children) > 1),

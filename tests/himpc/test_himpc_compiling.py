@@ -11,6 +11,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from himpc.cascade.compiled import told
 from himpc.cascade.compiling import compile_all, compiled_functions
 from himpc.catalog import CONTROLLERS
@@ -117,6 +119,34 @@ def test_processes_that_start_together_compile_once(tmp_path: Path) -> None:
     shared.mkdir()
     together = [start(tmp_path, NUMBA_CACHE_DIR=str(shared)) for _ in range(3)]
     assert sorted(compiled_and_place(each)[0] for each in together) == [0, 0, 2]
+
+
+def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
+    """In memory a compiler holds something else than what it writes down, by the last digit."""
+    script = LOAD + "print(sum(small.twice.stats.cache_hits.values()), file=sys.stderr)"
+    for _ in range(2):
+        process = start(tmp_path, script)
+        assert process.communicate(timeout=120)[1].splitlines()[-1] == "1"
+
+
+def test_the_first_run_equals_the_second(tmp_path: Path) -> None:
+    """To the bit, from a machine on which nothing was compiled."""
+    runs = []
+    for name in ("first", "second"):
+        file = tmp_path / f"{name}.npz"
+        command = ["run", "planar3-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
+        done = subprocess.run(
+            [sys.executable, "-m", "app", *command],
+            cwd=ROOT,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert ("compiling" in done.stderr) == (name == "first")
+        with np.load(file) as found:
+            runs.append({key: found[key].tobytes() for key in ("q", "v", "tau")})
+    assert runs[0] == runs[1]
 
 
 def test_one_word_tells_of_it_once(tmp_path: Path) -> None:
