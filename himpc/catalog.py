@@ -1,6 +1,9 @@
-"""The controllers by name, one line each: for lists and menus, which need none of them loaded."""
+"""The controllers by name, one line each, and their routes: for lists and menus, which need none of them
+loaded."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 CONTROLLERS: dict[str, str] = {
     "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
@@ -22,3 +25,7 @@ VELOCITY_CONTROLLERS: dict[str, str] = {
     "htidkc": "hierarchical-task inverse differential kinematics: cascaded QPs, no prediction",
 }
 """Velocity level."""
+
+Route = Literal["compiled", "explicit"]
+ROUTES: tuple[Route, ...] = ("compiled", "explicit")
+"""How a tick is computed: by the kernel, or with all rows as printed."""

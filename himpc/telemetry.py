@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.cascade import RUNGS
-from himpc.cascade.level import ActiveRows
+from himpc.cascade.level import RUNGS, ActiveRows
 from himpc.configuration import Configuration
 from himpc.limits import Rows
 from himpc.plan import Plan

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 from urllib.parse import urlsplit
 
-from robots.orphans import end_with_parent
 from robots import InputError
+from robots.orphans import end_with_parent
 
 T = TypeVar("T")
 U = TypeVar("U")

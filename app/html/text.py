@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from latex2mathml.converter import convert
 
-from app.html.palette import BAD, RGB, css
+from app.html.palette import BAD, GOOD, RGB, css
 
 esc = html.escape
 
@@ -64,9 +64,10 @@ It counts while an HTML element with it is shown."""
 
 def in_trouble(state: str, sentence: str) -> str:
     """What a page shows about a simulation that died, hangs or takes long."""
+    colour = GOOD if state == "PREPARING" else BAD
     return block(
-        f"{badge(state, BAD)} {esc(sentence)}",
-        f"border-left:3px solid {css(BAD)};margin:0.4em 0",
+        f"{badge(state, colour)} {esc(sentence)}",
+        f"border-left:3px solid {css(colour)};margin:0.4em 0",
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate, pairwise
 from time import perf_counter_ns
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +13,12 @@ from himpc.cascade.explicit import solve_explicit
 from himpc.cascade.last_resort import containing, last_resort, softened
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution, Point, Rung
 from himpc.cascade.null_space import nested_bases, whole_space
+from himpc.catalog import Route
 from himpc.limits.rows import Rows
 from himpc.qp import Solver
 from himpc.tick.problems import solve_problems
 
 Array = NDArray[np.float64]
-Route = Literal["compiled", "explicit"]
-ROUTES: tuple[Route, ...] = ("compiled", "explicit")
-RUNGS: tuple[Rung, ...] = ("solve", "soften", "previous", "inherit", "damping", "hold")
 
 
 def solve_cascade(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from himpc.limits.rows import Kind, Rows
 
 Array = NDArray[np.float64]
 Rung = Literal["solve", "soften", "previous", "inherit", "damping", "hold"]
+RUNGS: tuple[Rung, ...] = get_args(Rung)
 
 
 class LevelProblem(NamedTuple):

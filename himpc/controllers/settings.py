@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from himpc.cascade.cascade import ROUTES, Route
+from himpc.catalog import ROUTES, Route
 from himpc.limits import Limits
 from himpc.qp import SOLVERS, Solver, is_installed
 from himpc.stack import Stack, check_names

@@ -1,11 +1,16 @@
 """Hierarchical-task MPC: velocity-level control of mobile manipulators (the HTMPC paper, RA-L 2024)."""
 
-from himpc.htmpc.htidkc import HTIDKC
-from himpc.htmpc.htmpc import HTMPC
-from himpc.htmpc.kinematics import G, base_joints
-from himpc.htmpc.plan import LevelEvidence, VelocityPlan
-from himpc.htmpc.settings import FORMULATIONS, LEXICOGRAPHIC, Bounds, HTMPCSettings, MotionLimits, bounds
-from himpc.htmpc.stmpc import HTMPC_WPT, STMPC
+from typing import TYPE_CHECKING
+
+from robots.lazy import lazily
+
+if TYPE_CHECKING:
+    from himpc.htmpc.base import G, base_joints
+    from himpc.htmpc.htidkc import HTIDKC
+    from himpc.htmpc.htmpc import HTMPC
+    from himpc.htmpc.plan import LevelEvidence, VelocityPlan
+    from himpc.htmpc.settings import FORMULATIONS, LEXICOGRAPHIC, Bounds, HTMPCSettings, MotionLimits, bounds
+    from himpc.htmpc.stmpc import HTMPC_WPT, STMPC
 
 __all__ = [
     "FORMULATIONS",
@@ -23,3 +28,23 @@ __all__ = [
     "base_joints",
     "bounds",
 ]
+
+__getattr__ = lazily(
+    "himpc.htmpc",
+    {
+        "FORMULATIONS": "settings",
+        "HTIDKC": "htidkc",
+        "HTMPC": "htmpc",
+        "HTMPC_WPT": "stmpc",
+        "LEXICOGRAPHIC": "settings",
+        "STMPC": "stmpc",
+        "Bounds": "settings",
+        "G": "base",
+        "HTMPCSettings": "settings",
+        "LevelEvidence": "plan",
+        "MotionLimits": "settings",
+        "VelocityPlan": "plan",
+        "base_joints": "base",
+        "bounds": "settings",
+    },
+)

@@ -1,10 +1,9 @@
-"""The system and task model of section IV-A: G(q) of (4), and the tasks' errors (6) along a prediction."""
+"""The task model of section IV-A: the tasks' errors (6) along a prediction."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, lru_cache
-from typing import Literal
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -16,43 +15,11 @@ from himpc.references import Preview
 from himpc.rotation import exp3
 from himpc.tasks import FramePosition, Task
 from himpc.tasks.frame import FrameTask
-from robots import InputError, Robot
+from robots import Robot
 
 Array = NDArray[np.float64]
 Desired = list[Array] | Array
 """r of (6), knot by knot."""
-Base = Literal["holonomic", "unicycle"]
-UNICYCLE = (
-    "base is 'unicycle': its G(q) depends on the heading, and the condensed prediction needs G = I; "
-    "describe a holonomic base by two prismatic joints and one revolute joint instead"
-)
-BASES: tuple[Base, ...] = ("holonomic", "unicycle")
-
-
-def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:
-    """G(q) of (4), q̇ = G(q) v, (n, n).
-
-    The joints of our robots are coordinates of their own: a holonomic base is two prismatic joints along
-    world axes and a revolute one, its velocities are world velocities, and G is the identity, as for an arm.
-
-    Raises:
-        InputError: a unicycle base, whose forward speed moves it along its heading.
-    """
-    if base == "unicycle":
-        raise InputError(UNICYCLE)
-    return np.eye(robot.n)
-
-
-@lru_cache(maxsize=64)
-def base_joints(robot: Robot) -> tuple[int, ...]:
-    """Columns of the joints that make up a mobile base: the unbounded ones at the root of the tree."""
-    count = 0
-    for joint in range(1, robot.n + 1):
-        chained = robot.model.parents[joint] == joint - 1
-        if not chained or np.isfinite(robot.q_lower[joint - 1]) or np.isfinite(robot.q_upper[joint - 1]):
-            break
-        count = joint
-    return tuple(range(count)) if count >= 3 else ()
 
 
 class Knots:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kinematics import BASES, UNICYCLE, Base, base_joints
+from himpc.htmpc.base import BASES, UNICYCLE, Base, base_joints
 from himpc.qp import SOLVERS, Solver, is_installed
 from himpc.stack import Stack, Weight, check_names
 from robots import InputError, Robot

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from himpc.cascade.cascade import Route
+from himpc.catalog import Route
 from himpc.qp import Solver, is_installed
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene

@@ -30,6 +30,21 @@ finally:
 """
 
 
+SHOWN = """
+import sys
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+running = PageServer(SceneChoice("{scene}"), port=0)
+try:
+    with Wire(running.url) as page:
+        assert eventually(lambda: page.shows("RUNNING"), 110.0)
+    print("numba" in sys.modules)
+finally:
+    running.close()
+"""
+
+
 @pytest.mark.parametrize(
     "choice",
     ["SceneChoice('iiwa14-hold')", "SceneChoice('ridgeback-ur10-square')", "SceneChoice.opening('one-task')"],
@@ -42,6 +57,17 @@ def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []
+
+
+@pytest.mark.parametrize("scene", ["iiwa14-hold", "ridgeback-ur10-square"])
+def test_the_process_of_the_pages_compiles_nothing(scene: str) -> None:
+    """It shows a robot that runs and has not even loaded the compiler."""
+    code = SHOWN.replace("{scene}", scene)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["False"]
 
 
 def test_names_are_judged_without_loading_and_files_by_loading() -> None:

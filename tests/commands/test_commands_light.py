@@ -56,7 +56,7 @@ def test_help_names_every_command() -> None:
     assert all(f"  {name} " in printed and line in printed for name, line in COMMANDS.items())
 
 
-@pytest.mark.parametrize("package", ["robots", "himpc"])
+@pytest.mark.parametrize("package", ["robots", "himpc", "himpc.controllers", "himpc.htmpc"])
 def test_a_lazy_package_has_all_it_names(package: str) -> None:
     """Every public name is found, the same object each time, and no other name is."""
     module = import_module(package)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.cascade import Route, solve_cascade
+from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import LevelProblem, LevelSolution
+from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.prediction.task import residual_model
 from himpc.qp import Solver

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy
 
 from himpc import qp
-from himpc.cascade.cascade import Route
+from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.rows import least_slack
 from himpc.tick import ladder, problems

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy, shifted
 
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
-from himpc.cascade.cascade import Route
+from himpc.catalog import Route
 from himpc.references import Hold
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look

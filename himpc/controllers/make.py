@@ -1,0 +1,39 @@
+"""A controller by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from himpc.catalog import CONTROLLERS
+from himpc.controllers.controller import Controller
+from himpc.controllers.himpc import HIMPC
+from himpc.controllers.hiqp import HIQP
+from himpc.controllers.hqp import HQP
+from himpc.controllers.nhimpc import NHIMPC
+from himpc.controllers.null_space_control import DAMPED
+from himpc.controllers.osf import OSF
+from himpc.controllers.settings import Settings
+from himpc.controllers.tdeosf import TDEOSF
+from himpc.controllers.weighted import Weighted
+from robots import Robot
+from robots.errors import unknown_name
+
+_MAKERS: dict[str, Callable[[Robot, Settings], Controller]] = {
+    "himpc": HIMPC,
+    "hiqp": HIQP,
+    "nhimpc": NHIMPC,
+    "weighted": Weighted,
+    "osf": OSF,
+    "tdeosf": TDEOSF,
+    "osf_damped": partial(OSF, damping=DAMPED),
+    "tdeosf_damped": partial(TDEOSF, damping=DAMPED),
+    "hqp": HQP,
+}
+
+
+def make_controller(name: str, robot: Robot, settings: Settings) -> Controller:
+    """A controller by its name. Raises InputError: unknown name, or settings that do not fit the robot."""
+    if name not in _MAKERS:
+        raise unknown_name("controller", name, CONTROLLERS)
+    return _MAKERS[name](robot, settings)
