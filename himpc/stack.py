@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.tasks import Damping, Task
 from robots import InputError, Robot
+from robots.ranges import Range, check_fields
 
 Array = NDArray[np.float64]
 Weight = float | tuple[float, ...]
@@ -29,9 +31,9 @@ class Level:
     """
 
     tasks: tuple[Task, ...]
-    Q: Weight = 200.0
-    R: Weight = 10.0
-    horizon: int | None = None
+    Q: Annotated[Weight, Range(0.0, above=True)] = 200.0
+    R: Annotated[Weight, Range(0.0, above=True)] = 10.0
+    horizon: Annotated[int | None, Range(1)] = None
     enabled: bool = True
 
     @property
@@ -42,20 +44,9 @@ class Level:
     def __post_init__(self) -> None:
         if not self.tasks:
             raise InputError("a level needs at least one task: add one or remove the level")
-        for field in ("Q", "R"):
-            values = np.asarray(getattr(self, field), float)
-            if not (np.isfinite(values).all() and (values > 0).all()):
-                raise InputError(
-                    f"{field} of level '{self.name}' is {getattr(self, field)}: "
-                    "give finite numbers above 0, e.g. " + ("200" if field == "Q" else "10")
-                )
-        if self.horizon is not None and self.horizon < 1:
-            raise InputError(f"horizon of level '{self.name}' is {self.horizon}: give 1 or more knots")
+        check_fields(self, f"level '{self.name}': ")
         for task in self.tasks:
-            for field in ("K_p", "K_v"):
-                values = np.asarray(getattr(task, field), float)
-                if not (np.isfinite(values).all() and (values >= 0).all()):
-                    raise InputError(f"{field} of task '{task.name}' is not a finite number ≥ 0")
+            check_fields(task, f"task '{task.name}': ")
 
 
 Stack = tuple[Level, ...]

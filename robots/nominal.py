@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from robots.ranges import Range, check_fields
 from robots.robot import Robot
-from robots.settings import PlantSettings
+from robots.settings import PerJoint, PlantSettings
 from robots.truth import true_model
 
 Array = NDArray[np.float64]
@@ -25,15 +27,15 @@ class NominalSettings:
     Raises InputError, naming the field, for values that cannot be.
     """
 
-    payload_kg: float = 0.0
-    damping: float | tuple[float, ...] = 0.0
-    armature: float | tuple[float, ...] = 0.0
-    mass_scale: float | tuple[float, ...] = 1.0
-    inertia_scale: float | tuple[float, ...] = 1.0
+    payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
+    damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    armature: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    mass_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
+    inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
     gravity: bool = True
 
     def __post_init__(self) -> None:
-        self.as_plant()
+        check_fields(self, "nominal.")
 
     def as_plant(self) -> PlantSettings:
         """The same numbers as a plant would have them."""

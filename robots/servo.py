@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 
-from robots.errors import InputError, unknown_name
 from robots.plant import Plant
+from robots.ranges import Range, check_fields
 from robots.robot import Robot
-from robots.settings import PlantSettings
+from robots.settings import PerJoint, PlantSettings
 from robots.signals import Motors, PlantState, as_vector
 
 Mode = Literal["ideal", "servo"]
 MODES: tuple[Mode, ...] = ("ideal", "servo")
 
 _STEP = 1e-3  # s, at which servos work
-_RANGES = {
-    "bandwidth": (1.0, 300.0),
-    "lag_ms": (0.0, 1e3),
-    "delay_ms": (0.0, 1e3),
-    "position_noise": (0.0, 1.0),
-    "velocity_noise": (0.0, 10.0),
-}
 
 
 @dataclass(frozen=True)
@@ -45,25 +38,19 @@ class VelocityPlantSettings:
     """
 
     mode: Mode = "ideal"
-    bandwidth: float = 100.0
-    lag_ms: float = 0.0
-    delay_ms: float = 0.0
-    position_noise: float = 0.0
-    velocity_noise: float = 0.0
-    payload_kg: float = 0.0
-    friction: float | tuple[float, ...] = 0.0
-    damping: float | tuple[float, ...] = 0.0
+    bandwidth: Annotated[float, Range(1.0, 300.0)] = 100.0
+    lag_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
+    delay_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
+    position_noise: Annotated[float, Range(0.0, 1.0)] = 0.0
+    velocity_noise: Annotated[float, Range(0.0, 10.0)] = 0.0
+    payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
+    friction: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
     saturate: bool = True
 
     def __post_init__(self) -> None:
-        if self.mode not in MODES:
-            raise unknown_name("plant.mode", str(self.mode), MODES)
-        for field in fields(self):
-            low, high = _RANGES.get(field.name, (0.0, math.inf))
-            value = getattr(self, field.name)
-            if field.name in _RANGES and not (math.isfinite(value) and low <= value <= high):
-                raise InputError(f"plant.{field.name} is {value}; give a number from {low:g} to {high:g}.")
-        self.mechanics()
+        check_fields(self, "plant.")
+        self.mechanics()  # checks saturate
 
     def mechanics(self) -> PlantSettings:
         """The settings of the mechanics below the servos."""

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
 
 from robots.errors import InputError
+from robots.ranges import Range, check_fields
 
-PER_JOINT = ("friction", "damping", "armature", "mass_scale", "inertia_scale", "diagonal_scale")
-_MAX = {
-    "payload_kg": 1e3,
-    "friction": 1e4,
-    "damping": 1e4,
-    "armature": 1e4,
-    "mass_scale": 1e3,
-    "inertia_scale": 1e3,
-    "diagonal_scale": 10.0,
-    "encoder_resolution_deg": 45.0,
-    "torque_lag_ms": 1e3,
-    "delay_ms": 1e3,
-}
-# Below, a link is practically massless, or M(q) all but surely indefinite, and the simulation meaningless.
-_MIN = {"mass_scale": 1e-3, "inertia_scale": 1e-3, "diagonal_scale": 0.1}
+PerJoint = float | tuple[float, ...]
+"""One number for all joints, or one per joint."""
 
 
 @dataclass(frozen=True)
@@ -50,37 +38,32 @@ class PlantSettings:
     Raises InputError, naming the field, for values that are not finite, negative or absurdly large.
     """
 
-    payload_kg: float = 0.0
-    friction: float | tuple[float, ...] = 0.0
-    damping: float | tuple[float, ...] = 0.0
-    armature: float | tuple[float, ...] = 0.0
-    mass_scale: float | tuple[float, ...] = 1.0
-    inertia_scale: float | tuple[float, ...] = 1.0
-    diagonal_scale: float | tuple[float, ...] = 1.0
-    encoder_resolution_deg: float = 0.0
-    torque_lag_ms: float = 0.0
-    delay_ms: float = 0.0
+    payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
+    friction: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    armature: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    # Below, a link is practically massless, or M(q) all but surely indefinite: the simulation is meaningless.
+    mass_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
+    inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
+    diagonal_scale: Annotated[PerJoint, Range(0.1, 10.0)] = 1.0
+    encoder_resolution_deg: Annotated[float, Range(0.0, 45.0)] = 0.0
+    torque_lag_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
+    delay_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
     saturate: bool = True
     gravity: bool = True
 
     def __post_init__(self) -> None:
+        check_fields(self, "plant.")
+        for name in ("saturate", "gravity"):
+            if not isinstance(getattr(self, name), (bool, np.bool_)):
+                raise InputError(f"plant.{name} is {getattr(self, name)!r}; give true or false.")
+        # Arrays and NumPy's numbers as plain ones: settings are compared and written as text.
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name in ("saturate", "gravity"):
-                if not isinstance(value, (bool, np.bool_)):
-                    raise InputError(f"plant.{field.name} is {value!r}; give true or false.")
-                object.__setattr__(self, field.name, bool(value))
-            elif field.name in PER_JOINT and isinstance(value, (Sequence, np.ndarray)):
-                if isinstance(value, str):
-                    raise InputError(
-                        f"plant.{field.name} is '{value}'; give a number or one number per joint."
-                    )
-                checked = tuple(
-                    _number(field.name, each) for each in np.ravel(np.asarray(value, dtype=object))
-                )
-                object.__setattr__(self, field.name, checked)
-            else:
-                object.__setattr__(self, field.name, _number(field.name, value))
+            if isinstance(value, (Sequence, np.ndarray)):
+                value = tuple(float(each) for each in value)
+            plain_value = value if isinstance(value, tuple) else type(field.default)(value)
+            object.__setattr__(self, field.name, plain_value)
 
     def per_joint(self, name: str, n: int) -> np.ndarray:
         """(n,) the values of a per-joint field, one number repeated. Raises InputError for a wrong length."""
@@ -92,16 +75,3 @@ class PlantSettings:
                 )
             return np.array(value, dtype=float)
         return np.full(n, float(value))
-
-
-def _number(name: str, value: object) -> float:
-    try:
-        if isinstance(value, (bool, str)):
-            raise TypeError
-        number = float(value)  # pyright: ignore[reportArgumentType]
-    except (TypeError, ValueError):
-        raise InputError(f"plant.{name} is {value!r}; give a number.") from None
-    low = _MIN.get(name, 0.0)
-    if not math.isfinite(number) or number < low or number > _MAX[name]:
-        raise InputError(f"plant.{name} is {number}; give a finite number from {low:g} to {_MAX[name]:g}.")
-    return number

@@ -13,7 +13,7 @@ from app.link.messages import Status
 from app.page.scene_ui import Context
 from app.panels.run.joints import JointPlots
 from app.panels.torque.controller import ControllerPanel
-from app.panels.torque.plant import PlantPanel
+from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
@@ -49,7 +49,7 @@ class TorqueFace:
         with tabs.add_tab("Control"):
             self._controller = ControllerPanel(gui, bindings, settings, ready.robot)
         with tabs.add_tab("Plant"):
-            PlantPanel(gui, bindings, settings, ready.robot)
+            add_plant(gui, bindings, settings, ready.robot)
         self._start.on_theme = context.theme
         self._start.on_recall = self._recall
 

@@ -14,7 +14,7 @@ from app.page.scene_ui import Context
 from app.panels.run.joints import ACCELERATION, JointPlots
 from app.panels.velocity.controller import HtmpcPanel
 from app.panels.velocity.mission import MissionPanel, swap
-from app.panels.velocity.plant import ServoPanel
+from app.panels.velocity.plant import add_servo_plant
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
@@ -66,7 +66,7 @@ class VelocityFace:
         with tabs.add_tab("Control"):
             self._controller = HtmpcPanel(gui, bindings, context.settings, ready.robot, self._settings)
         with tabs.add_tab("Plant"):
-            ServoPanel(gui, bindings, context.settings)
+            add_servo_plant(gui, bindings, context.settings)
         self._begin.on_theme = context.theme
         self._begin.on_swap = self._swap
         self._begin.on_look = self._look

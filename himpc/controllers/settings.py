@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
-from himpc.catalog import ROUTES, Route
+from himpc.catalog import Route
 from himpc.limits import Limits
-from himpc.qp import SOLVERS, Solver, is_installed
+from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, check_names
 from robots import InputError, NominalSettings
-from robots.errors import unknown_name
+from robots.ranges import Range, check_fields
 
 MAX_HORIZON = 60
+Horizon = Annotated[int, Range(1, MAX_HORIZON)]
+Period = Annotated[float, Range(1e-4, 0.02)]
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,9 @@ class Settings:
     """
 
     stack: Stack
-    M_bar: tuple[float, ...]
-    horizon: int = 5
-    T_s: float = 1e-3
+    M_bar: Annotated[tuple[float, ...], Range(0.0, above=True)]
+    horizon: Horizon = 5
+    T_s: Period = 1e-3
     limits: Limits = field(default_factory=Limits)
     route: Route = "compiled"
     solver: Solver = "daqp"
@@ -45,15 +46,7 @@ class Settings:
     nominal: NominalSettings = field(default_factory=NominalSettings)
 
     def __post_init__(self) -> None:
-        if not 1 <= self.horizon <= MAX_HORIZON:
-            raise InputError(f"horizon is {self.horizon}: give a whole number from 1 to {MAX_HORIZON}")
-        if not 1e-4 <= self.T_s <= 0.02:
-            raise InputError(f"T_s is {self.T_s} s: give a period from 0.0001 to 0.02, e.g. 0.001")
-        if not all(math.isfinite(value) and value > 0 for value in self.M_bar):
-            raise InputError(f"M_bar is {list(self.M_bar)}: every entry must be a finite number above 0")
-        for name, choices in (("route", ROUTES), ("solver", SOLVERS), ("R_on", ("torque", "acceleration"))):
-            if getattr(self, name) not in choices:
-                raise unknown_name(name, str(getattr(self, name)), choices)
+        check_fields(self)
         if not is_installed(self.solver):
             raise InputError(
                 f"solver '{self.solver}' needs CasADi, which is not here: pip install casadi, or take daqp"

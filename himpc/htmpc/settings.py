@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.base import BASES, UNICYCLE, Base, base_joints
-from himpc.qp import SOLVERS, Solver, is_installed
+from himpc.htmpc.base import UNICYCLE, Base, base_joints
+from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, Weight, check_names
 from robots import InputError, Robot
 from robots.collision import Obstacle
-from robots.errors import unknown_name
+from robots.ranges import Range, check_fields
 
 Array = NDArray[np.float64]
 Formulation = Literal["proximal", "paper"]
@@ -39,16 +38,13 @@ class MotionLimits:
     velocity: bool = True
     acceleration: bool = True
     jerk: bool = True
-    velocity_scale: float = 1.0
-    acceleration_scale: float = 1.0
-    jerk_scale: float = 1.0
-    jerk_limit: Weight | None = None
+    velocity_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    acceleration_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    jerk_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    jerk_limit: Annotated[Weight | None, Range(0.0)] = None
 
     def __post_init__(self) -> None:
-        for name in ("velocity_scale", "acceleration_scale", "jerk_scale"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"limits.{name} is {value}: give a finite number above 0, e.g. 1")
+        check_fields(self, "limits.")
 
 
 @dataclass(frozen=True)
@@ -86,55 +82,32 @@ class HTMPCSettings:
     """
 
     stack: Stack
-    horizon: int = 10
-    dt: float = 0.1
-    rate_hz: float = 10.0
-    terminal: float = 10.0
-    velocity_effort: Weight = 0.1
-    input_effort: Weight | None = None
-    change_effort: Weight | None = None
+    horizon: Annotated[int, Range(1, MAX_HORIZON)] = 10
+    dt: Annotated[float, Range(0.005, 1.0)] = 0.1
+    rate_hz: Annotated[float, Range(1.0, 200.0)] = 10.0
+    terminal: Annotated[float, Range(0.0, 1e6)] = 10.0
+    velocity_effort: Annotated[Weight, Range(0.0)] = 0.1
+    input_effort: Annotated[Weight | None, Range(0.0)] = None
+    change_effort: Annotated[Weight | None, Range(0.0)] = None
     formulation: Formulation = "proximal"
     lexicographic: Lexicographic = "per_coordinate"
-    delta_m: float = 0.01
-    max_iter: int = 1
+    delta_m: Annotated[float, Range(0.0, 1.0)] = 0.01
+    max_iter: Annotated[int, Range(1, 200)] = 1
     limits: MotionLimits = field(default_factory=MotionLimits)
     obstacles: tuple[Obstacle, ...] = ()
-    margin_m: float = 0.05
+    margin_m: Annotated[float, Range(0.0, 1.0)] = 0.05
     self_collision: bool = False
-    delay_s: float = 0.0
+    delay_s: Annotated[float, Range(0.0, 1.0)] = 0.0
     hold: tuple[str, ...] = ()
     base: Base = "holonomic"
-    gains: tuple[float, ...] = (0.5, 0.3)
-    rho: float = 0.01
+    gains: Annotated[tuple[float, ...], Range(0.0)] = (0.5, 0.3)
+    rho: Annotated[float, Range(1e-8, 1e3)] = 0.01
     solver: Solver = "daqp"
 
     def __post_init__(self) -> None:
-        if not 1 <= self.horizon <= MAX_HORIZON:
-            raise InputError(f"horizon is {self.horizon}: give a whole number from 1 to {MAX_HORIZON}")
-        if not 1 <= self.max_iter <= 200:
-            raise InputError(f"max_iter is {self.max_iter}: give a whole number from 1 to 200")
-        for name, low, high, hint in (
-            ("dt", 0.005, 1.0, "0.1 s"),
-            ("rate_hz", 1.0, 200.0, "10"),
-            ("terminal", 0.0, 1e6, "10"),
-            ("delta_m", 0.0, 1.0, "0.01"),
-            ("margin_m", 0.0, 1.0, "0.05"),
-            ("delay_s", 0.0, 1.0, "0"),
-            ("rho", 1e-8, 1e3, "0.01"),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise InputError(f"{name} is {value}: give a number from {low:g} to {high:g}, e.g. {hint}")
-        if not self.gains or not all(0.0 <= gain <= self.rate_hz for gain in self.gains):
+        check_fields(self)
+        if not self.gains or not all(gain <= self.rate_hz for gain in self.gains):
             raise InputError(f"gains are {list(self.gains)}: give numbers from 0 to rate_hz, e.g. 0.5, 0.3")
-        for name, choices in (
-            ("formulation", FORMULATIONS),
-            ("lexicographic", LEXICOGRAPHIC),
-            ("base", BASES),
-            ("solver", SOLVERS),
-        ):
-            if getattr(self, name) not in choices:
-                raise unknown_name(name, str(getattr(self, name)), choices)
         if not is_installed(self.solver):
             raise InputError(f"solver '{self.solver}' comes with CasADi: pip install casadi, or take daqp")
         if self.base == "unicycle":

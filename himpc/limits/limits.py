@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import InputError, Robot
+from robots.ranges import Range, check_fields
 
 Array = NDArray[np.float64]
 PositionMode = Literal["viability", "paper", "off"]
@@ -34,22 +35,17 @@ class Limits:
     torque: bool = True
     velocity: bool = True
     position: PositionMode = "viability"
-    torque_scale: float = 1.0
-    velocity_scale: float = 1.0
-    velocity_approach: float = 15.0
+    torque_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    velocity_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    velocity_approach: Annotated[float, Range(0.0, 1e4)] = 15.0
 
     def __post_init__(self) -> None:
-        for field in ("torque_scale", "velocity_scale"):
-            value = getattr(self, field)
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"limits.{field} is {value}: give a finite number above 0, e.g. 1")
-        rate = self.velocity_approach
-        if not (rate == 0 or 1 <= rate <= 1e4):
+        check_fields(self, "limits.")
+        if 0 < self.velocity_approach < 1:
             raise InputError(
-                f"limits.velocity_approach is {rate}: give 1 to 10000 (1/s), or 0 for (32e) as printed"
+                f"limits.velocity_approach is {self.velocity_approach}: "
+                "give 1 to 10000 (1/s), or 0 for (32e) as printed"
             )
-        if self.position not in ("viability", "paper", "off"):
-            raise InputError(f"limits.position is '{self.position}': choose viability, paper or off")
 
 
 POSITION_MARGIN = 0.007

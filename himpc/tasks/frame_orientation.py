@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from himpc.rotation import log3
 from himpc.tasks.frame import FrameTask
-from himpc.tasks.task import Array
+from himpc.tasks.task import Array, Gain
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
@@ -20,8 +20,8 @@ class FrameOrientation(FrameTask):
     The value is the rotation matrix R (3, 3); the error is in radians along the chosen world axes.
     """
 
-    K_p: float | tuple[float, ...] = 50.0
-    K_v: float | tuple[float, ...] = 5.0
+    K_p: Gain = 50.0
+    K_v: Gain = 5.0
 
     first_row: ClassVar[int] = 3
     unit: ClassVar[Literal["m", "rad"]] = "rad"

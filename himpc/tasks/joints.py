@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from himpc.tasks.task import Array, Task
+from himpc.tasks.task import Array, Gain, Task
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
@@ -23,8 +23,8 @@ class Joints(Task):
     """
 
     joints: tuple[str, ...] = ()
-    K_p: float | tuple[float, ...] = 50.0
-    K_v: float | tuple[float, ...] = 5.0
+    K_p: Gain = 50.0
+    K_v: Gain = 5.0
 
     unit: ClassVar[Literal["m", "rad"]] = "rad"
 
@@ -54,8 +54,8 @@ class Damping(Joints):
     accelerates that direction for ever. This task, as the last level, is the cure.
     """
 
-    K_p: float | tuple[float, ...] = 0.0
-    K_v: float | tuple[float, ...] = 5.0
+    K_p: Gain = 0.0
+    K_v: Gain = 5.0
 
     def error(self, value: Array, desired: Array) -> Array:
         return np.zeros_like(value)

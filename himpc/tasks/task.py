@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from robots.ranges import Range
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from robots import Robot
 
 Array = NDArray[np.float64]
-Gain = float | tuple[float, ...]
+Gain = Annotated[float | tuple[float, ...], Range(0.0)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from himpc.stack import Level, Stack
 from himpc.tasks import FramePosition, Joints
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import SceneOptions, TorqueSettings
-from robots import InputError, NominalSettings, PlantSettings, Robot, load_robot
+from robots import NominalSettings, PlantSettings, Robot, load_robot
+from robots.ranges import Range, check_fields
 
 OMEGA = 2 * math.pi / 8
 """rad/s; every circle takes 8 s."""
@@ -45,12 +47,10 @@ class CircleOptions(SceneOptions):
         q1_amplitude_deg: how far q₁ swings and comes back, degrees.
     """
 
-    q1_amplitude_deg: float
+    q1_amplitude_deg: Annotated[float, Range(-360.0, 360.0)]
 
     def __post_init__(self) -> None:
-        value = self.q1_amplitude_deg
-        if not abs(value) <= 360:
-            raise InputError(f"q1_amplitude_deg is {value}: give a number from -360 to 360, in degrees")
+        check_fields(self)
 
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
         """Circle r = 0.1 m about (0.5, 0.3), phase ωt − sin ωt; q₁ = amplitude·(1 − cos ωt)/2."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from himpc.missions import Follow, Go, Mission, MissionTask
 from himpc.references import Hold, SquareWave
 from robots import InputError
 from robots.collision import Ball, Box, Floor, Obstacle
-from robots.errors import unknown_name
+from robots.ranges import Range, check_fields
 
 Array = NDArray[np.float64]
 Home = Mapping[str, Array]
@@ -67,8 +67,7 @@ class ArchitectureOptions(MissionOptions):
 
     def __post_init__(self) -> None:
         """Raises InputError for choices that cannot be."""
-        if self.architecture not in ARCHITECTURES:
-            raise unknown_name("architecture", self.architecture, ARCHITECTURES)
+        check_fields(self)
 
     @property
     def L(self) -> int:
@@ -125,15 +124,14 @@ class SquareOptions(OrderOptions):
     """
 
     peak: tuple[float, ...] = (0.4, -1.75)
-    half_period: float = 8.0
+    half_period: Annotated[float, Range(0.0, above=True)] = 8.0
 
     parts: ClassVar[tuple[str, ...]] = ("peak", "valley")
 
     def __post_init__(self) -> None:
         if len(self.peak) != 2:
             raise InputError(f"peak has {len(self.peak)} numbers: give x and y, e.g. [-2, 1]")
-        if not self.half_period > 0:
-            raise InputError(f"half_period is {self.half_period} s: give a number above 0")
+        check_fields(self)
 
     @property
     def part_s(self) -> float:
@@ -219,7 +217,7 @@ class DeliveryOptions(ArchitectureOptions):
     """
 
     seats: tuple[float, ...] = (0, 2, 5)
-    rounds: int = 4
+    rounds: Annotated[int, Range(1, MAX_VISITS)] = 4
     hold_s: float | None = 1.0
     cruise: float = CRUISE
 
@@ -229,8 +227,6 @@ class DeliveryOptions(ArchitectureOptions):
             raise InputError(f"seats are {list(self.seats)}: give whole numbers from 0 to {len(SEATS) - 1}")
         if len(self.seats) > MAX_VISITS:
             raise InputError(f"seats has {len(self.seats)} entries: give at most {MAX_VISITS}")
-        if not 1 <= self.rounds <= MAX_VISITS:
-            raise InputError(f"rounds is {self.rounds}: give 1 to {MAX_VISITS}")
 
     def person(self, task: str) -> int | None:
         visits = {_visit("ee", visit): visit for visit in range(1, len(self.seats) * self.rounds + 1)}
@@ -259,7 +255,7 @@ class HandoverOptions(DeliveryOptions):
     """The start of a delivery round in which every ball waits until it is taken (event Release)."""
 
     seats: tuple[float, ...] = (1, 3)
-    rounds: int = 1
+    rounds: Annotated[int, Range(1, MAX_VISITS)] = 1
     hold_s: float | None = None
 
 

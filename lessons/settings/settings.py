@@ -6,13 +6,15 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, ClassVar, Self, TypeVar, get_type_hints
+from typing import Any, ClassVar, Self, TypeVar
 
 from himpc.stack import Level, Stack
 from lessons.events import Event, Set
-from lessons.settings.values import fitting, weight
+from lessons.settings.entry import Entry, entry_at
+from lessons.settings.values import NUMBER, Form, form_of
 from robots import InputError
 from robots.errors import unknown_name
+from robots.ranges import field_types
 
 S = TypeVar("S", bound="Settings")
 
@@ -24,15 +26,40 @@ class Place:
     Attributes:
         read: the value in some settings.
         write: the settings with a value instead, which `fit` returned.
-        fit: the value as it is stored. Raises InputError for one of the wrong type, naming the path.
+        form: what the value may be.
+        own_fit: the value as it is stored, where the form does not tell. Raises InputError for one that
+            cannot be, naming the path.
         shorthand: a second way to what other paths reach, or to several values at once; `read` then gives the
             first of them.
     """
 
     read: Callable[[Any], Any]
     write: Callable[[Any, Any], Any]
-    fit: Callable[[str, Any], Any]
+    form: Form
+    own_fit: Callable[[str, Any], Any] | None = None
     shorthand: bool = False
+
+    def fit(self, path: str, value: Any) -> Any:
+        """The value as it is stored. Raises InputError, naming the path and what is allowed, for others."""
+        return self.form.fit(path, value) if self.own_fit is None else self.own_fit(path, value)
+
+    def element(self, at: int, count: int) -> Place:
+        """Where one of the `count` numbers of a list leads; one number for all is spread over it first, and
+        the last of too few serves the rest."""
+
+        def spread(settings: Any) -> list[Any]:
+            now = self.read(settings)
+            values = list(now) if isinstance(now, tuple) else [float(now)]
+            return values + values[-1:] * (count - len(values))
+
+        return Place(
+            read=lambda settings: spread(settings)[at],
+            write=lambda settings, value: self.write(
+                settings, tuple(value if k == at else old for k, old in enumerate(spread(settings)))
+            ),
+            form=Form(NUMBER, range=self.form.range),
+            shorthand=True,
+        )
 
 
 class Settings(ABC):
@@ -40,6 +67,8 @@ class Settings(ABC):
 
     controllers: ClassVar[Mapping[str, str]]
     """One line per controller that fits."""
+    entries: ClassVar[tuple[Entry, ...]]
+    """What people are told of every path."""
     controller: str
     levels: Stack
     """Highest priority first."""
@@ -61,13 +90,30 @@ class Settings(ABC):
     def places(self) -> dict[str, Place]:
         """Where every path leads, by path."""
 
-    def special(self, path: str, value: Any) -> Self | None:
-        """The settings after a path that stands in no list, None if it is none either. Raises InputError for
-        a value that does not fit."""
-        return None
+    def elements(self, path: str) -> int:
+        """How many numbers a path has that can be changed one by one, as "M_bar.3"; 0: none."""
+        return 0
+
+    def place(self, path: str) -> Place:
+        """Where a path leads, one that stands in no list as well. Raises InputError, naming the nearest, for
+        one that leads nowhere."""
+        places = self.places()
+        if path in places:
+            return places[path]
+        whole, _, at = path.rpartition(".")
+        count = self.elements(whole) if at.isdecimal() and whole in places else 0
+        if not count:
+            raise unknown_name("setting", path, places)
+        if not 1 <= int(at[:4]) <= count:
+            raise InputError(f"{path}: there is no place {at[:9]}; give one from 1 to {count}")
+        return places[whole].element(int(at) - 1, count)
+
+    def entry(self, path: str) -> Entry:
+        """What people are told of a path."""
+        return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
-        """Paths and values of what `special` can change, where other settings of the same scene differ."""
+        """Paths, none of `places`, and values that other settings of the same scene differ in."""
         return []
 
     def takes(self, event: Event) -> bool:
@@ -84,13 +130,8 @@ class Settings(ABC):
         Raises:
             InputError: unknown path (naming the nearest), or a value of the wrong type or range.
         """
-        special = self.special(path, value)
-        if special is not None:
-            return special
-        places = self.places()
-        if path not in places:
-            raise unknown_name("setting", path, places)
-        return places[path].write(self, places[path].fit(path, value))
+        place = self.place(path)
+        return place.write(self, place.fit(path, value))
 
     def as_data(self) -> dict[str, Any]:
         """All of it as JSON-ready data."""
@@ -98,12 +139,12 @@ class Settings(ABC):
         return json.loads(json.dumps(data, default=str))
 
     def paths(self) -> list[str]:
-        """Every path that `changed` takes, but for special ones."""
+        """Every path that `changed` takes, but for single numbers of lists and for obstacles."""
         return list(self.places())
 
     def value_at(self, path: str) -> Any:
-        """The value at one of `paths`; of several at once the first one's."""
-        return self.places()[path].read(self)
+        """The value at a path; of several at once the first one's. Raises InputError like `place`."""
+        return self.place(path).read(self)
 
 
 Part = Callable[[S], Any]
@@ -127,60 +168,86 @@ def field_places(
         return Place(
             read=lambda settings: getattr(read(settings), name),
             write=lambda settings, value: write(settings, replace(read(settings), **{name: value})),
-            fit=lambda path, value: fitting(path, hint, value),
+            form=form_of(hint),
         )
 
-    hints = get_type_hints(type(owner))
+    hints = field_types(type(owner))
     names = [each.name for each in fields(owner) if each.name not in without]
     return {prefix + name: place(name, hints[name]) for name in names}
 
 
-Fit = Callable[[str, Any], Any]
-LevelKeys = Mapping[str, tuple[Callable[[Level], Any], Callable[[Level, Any], Level], Fit, bool]]
-"""Per key of a level: its value, the level with another one, `Place.fit` and `Place.shorthand`."""
+@dataclass(frozen=True, eq=False)
+class LevelKey:
+    """A key of a level: its value, the level with another one, and as of `Place`."""
+
+    read: Callable[[Level], Any]
+    write: Callable[[Level, Any], Level]
+    form: Form
+    shorthand: bool = False
+
+
+def level_key(name: str) -> LevelKey:
+    """The key of a field of Level."""
+    return LevelKey(
+        lambda level: getattr(level, name),
+        lambda level, value: replace(level, **{name: value}),
+        form_of(field_types(Level)[name]),
+    )
 
 
 def level_places(
-    stack: Stack, keys: LevelKeys, read: Callable[[S], Stack], write: Callable[[S, Stack], S]
+    stack: Stack, keys: Mapping[str, LevelKey], read: Callable[[S], Stack], write: Callable[[S, Stack], S]
 ) -> dict[str, Place]:
     """Places "levels.NAME.KEY" and, as shorthands, "levels.PLACE.KEY" with 1 for the highest priority."""
 
-    def place(at: int, key: str, by_place: bool) -> Place:
-        get, put, fit, shorthand = keys[key]
+    def place(find: Callable[[Stack], int], key: LevelKey, by_place: bool) -> Place:
+        def put(settings: S, value: Any) -> S:
+            levels = read(settings)
+            at = find(levels)
+            return write(settings, (*levels[:at], key.write(levels[at], value), *levels[at + 1 :]))
+
         return Place(
-            read=lambda settings: get(read(settings)[at]),
-            write=lambda settings, value: write(settings, _with_level(read(settings), at, put, value)),
-            fit=fit,
-            shorthand=shorthand or by_place,
+            read=lambda settings: key.read(read(settings)[find(read(settings))]),
+            write=put,
+            form=key.form,
+            shorthand=key.shorthand or by_place,
         )
 
-    by_name = {
-        f"levels.{level.name}.{key}": place(at, key, False) for at, level in enumerate(stack) for key in keys
+    def by_name(name: str) -> Callable[[Stack], int]:
+        return lambda levels: next(at for at, level in enumerate(levels) if level.name == name)
+
+    named = {
+        f"levels.{level.name}.{key}": place(by_name(level.name), keys[key], False)
+        for level in stack
+        for key in keys
     }
-    by_place = {f"levels.{at + 1}.{key}": place(at, key, True) for at in range(len(stack)) for key in keys}
-    return {**by_name, **by_place}
-
-
-def _with_level(stack: Stack, at: int, put: Callable[[Level, Any], Level], value: Any) -> Stack:
-    return (*stack[:at], put(stack[at], value), *stack[at + 1 :])
+    placed = {
+        f"levels.{at + 1}.{key}": place(lambda _, at=at: at, keys[key], True)
+        for at in range(len(stack))
+        for key in keys
+    }
+    return {**named, **placed}
 
 
 def every_level(stack: Stack, key: str, read: Callable[[S], Stack], write: Callable[[S, Stack], S]) -> Place:
     """A weight of all levels at once: one number, or one per level."""
+
+    form = form_of(field_types(Level)[key])
 
     def fit(path: str, value: Any) -> list[Any]:
         values = value if isinstance(value, (list, tuple)) else [value] * len(stack)
         if len(values) != len(stack):
             raise InputError(f"{key} has {len(values)} values: give one number, or one per level")
         return [
-            weight(f"{key} of level '{level.name}'", each) for level, each in zip(stack, values, strict=True)
+            form.fit(f"{key} of level '{level.name}'", each)
+            for level, each in zip(stack, values, strict=True)
         ]
 
     def put(settings: S, values: list[Any]) -> S:
         levels = zip(read(settings), values, strict=True)
         return write(settings, tuple(replace(level, **{key: value}) for level, value in levels))
 
-    return Place(lambda settings: getattr(read(settings)[0], key), put, fit, shorthand=True)
+    return Place(lambda settings: getattr(read(settings)[0], key), put, form, fit, shorthand=True)
 
 
 def settings_after(settings: S, events: Iterable[Event]) -> S:

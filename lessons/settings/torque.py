@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar, Literal, get_type_hints
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal
 
-from himpc.catalog import CONTROLLERS
+from himpc.catalog import CONTROLLERS, Route
 from himpc.controllers import Settings as ControllerSettings
+from himpc.controllers.settings import Horizon, Period
 from himpc.limits import Limits
+from himpc.qp import Solver
 from himpc.references import Reference
 from himpc.stack import Level, Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
+from lessons.settings.entry import Entry
 from lessons.settings.levels import moved, ordered
-from lessons.settings.settings import Fit, LevelKeys, Place, Settings, every_level, field_places, level_places
-from lessons.settings.values import fitting, number, weight
-from robots import InputError, NominalSettings, PlantSettings, Robot
+from lessons.settings.settings import (
+    LevelKey,
+    Place,
+    Settings,
+    every_level,
+    field_places,
+    level_key,
+    level_places,
+)
+from lessons.settings.torque_entries import TORQUE_ENTRIES
+from lessons.settings.values import WORD, Form, form_of
+from robots import NominalSettings, PlantSettings, Robot
 from robots.errors import unknown_name
-from robots.settings import PER_JOINT
+from robots.ranges import Range, check_fields, field_types
 
 
 @dataclass(frozen=True)
@@ -33,6 +44,9 @@ class SceneOptions(ABC):
     @abstractmethod
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
         """A fresh reference per task name, like `TorqueScene.references`."""
+
+
+Milliseconds = Annotated[float, Range(0.0, 1e3)]
 
 
 @dataclass(frozen=True)
@@ -53,19 +67,20 @@ class TorqueSettings(Settings):
     """
 
     controllers: ClassVar[Mapping[str, str]] = CONTROLLERS
+    entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
 
     levels: Stack
-    M_bar: tuple[float, ...]
+    M_bar: Annotated[tuple[float, ...], Range(0.0, above=True)]
     controller: str = "himpc"
-    M_bar_scale: float = 1.0
-    horizon: int = 5
-    T_s: float = 1e-3
+    M_bar_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    horizon: Horizon = 5
+    T_s: Period = 1e-3
     R_on: Literal["torque", "acceleration"] = "torque"
-    route: Literal["compiled", "explicit"] = "compiled"
-    solver: Literal["daqp", "proxqp", "qpoases"] = "daqp"
+    route: Route = "compiled"
+    solver: Solver = "daqp"
     damping: bool = True
-    deadline_ms: float = 0.0
-    solve_ms_per_knot: float = 0.1
+    deadline_ms: Milliseconds = 0.0
+    solve_ms_per_knot: Milliseconds = 0.1
     limits: Limits = field(default_factory=Limits)
     nominal: NominalSettings = field(default_factory=NominalSettings)
     plant: PlantSettings = field(default_factory=PlantSettings)
@@ -75,11 +90,7 @@ class TorqueSettings(Settings):
         """The controller's part. Raises InputError for values that cannot be."""
         if self.controller not in CONTROLLERS:
             raise unknown_name("controller", self.controller, CONTROLLERS)
-        if not (math.isfinite(self.M_bar_scale) and self.M_bar_scale > 0):
-            raise InputError(f"M_bar_scale is {self.M_bar_scale}: give a finite number above 0, e.g. 1")
-        for name in ("deadline_ms", "solve_ms_per_knot"):
-            if not 0.0 <= getattr(self, name) <= MAX_MS:
-                raise InputError(f"{name} is {getattr(self, name)}: give a number from 0 to {MAX_MS:g}")
+        check_fields(self)
         return ControllerSettings(
             stack=self.levels,
             M_bar=tuple(float(value) * self.M_bar_scale for value in self.M_bar),
@@ -115,21 +126,24 @@ class TorqueSettings(Settings):
         """Fields ("horizon", "M_bar", …) and those of the scene's options; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
-        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY"."""
+        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". Where a
+        value holds one number per joint, a place 1 … n behind it is that joint's alone: "M_bar.3"."""
         without = ("levels", "options", *_PARTS)
         own = field_places(self, lambda settings: settings, lambda _, new: _checked(new), without=without)
         options = {}
         if self.options is not None:
             options = field_places(self.options, _part("options"), _with("options"))
         parts = [field_places(getattr(self, part), _part(part), _with(part), f"{part}.") for part in _PARTS]
+        own["controller"] = replace(own["controller"], form=Form(WORD, words=tuple(CONTROLLERS)))
         fit = own["route"].fit
-        own["route"] = replace(own["route"], fit=lambda path, value: fit(path, _now(value)))
+        own["route"] = replace(own["route"], own_fit=lambda path, value: fit(path, _now(value)))
         return {
             **own,
             **options,
             "order": Place(
                 lambda s: tuple(level.name for level in s.levels),
                 _with("levels"),
+                Form(None, WORD),
                 lambda _, value: ordered(self.levels, value),
             ),
             **{key: every_level(self.levels, key, _levels, _with("levels")) for key in ("Q", "R")},
@@ -143,33 +157,11 @@ class TorqueSettings(Settings):
             **{path: place for part in parts for path, place in part.items()},
         }
 
-    def special(self, path: str, value: Any) -> TorqueSettings | None:
-        """Where a value holds one number per joint ("M_bar", "plant.inertia_scale", …), a place 1 … n behind
-        it means that joint's alone: "M_bar.3"."""
-        whole, _, place = path.rpartition(".")
-        if not place.isdigit() or whole not in self._per_joint():
-            return None
-        n = len(self.M_bar)
-        if not 1 <= int(place) <= n:
-            raise InputError(f"{path}: there is no joint {place}; give a place from 1 to {n}")
-        now = self.value_at(whole)
-        values = list(now) if isinstance(now, tuple) else [float(now)] * n
-        values[int(place) - 1] = number(path, value)
-        return self.changed(whole, tuple(values))
+    def elements(self, path: str) -> int:
+        form = self.places()[path].form
+        per_joint = path.startswith(("M_bar", "nominal.", "plant.")) and form.elements is not None
+        return len(self.M_bar) if per_joint else 0
 
-    def _per_joint(self) -> list[str]:
-        """Paths whose value may be one number per joint."""
-        parts = [
-            f"{part}.{each.name}"
-            for part in ("nominal", "plant")
-            for each in fields(getattr(self, part))
-            if each.name in PER_JOINT
-        ]
-        return ["M_bar", *parts]
-
-
-MAX_MS = 1e3
-"""Largest deadline and time per knot."""
 
 _GAINS = ("K_p", "K_v")
 _PARTS = ("limits", "nominal", "plant")
@@ -197,24 +189,16 @@ def _levels(settings: TorqueSettings) -> Stack:
     return settings.levels
 
 
-def _level_key(key: str) -> tuple[Callable[[Level], Any], Callable[[Level, Any], Level], Fit, bool]:
-    hint = get_type_hints(Level)[key]
-
-    def put(level: Level, value: Any) -> Level:
-        return replace(level, **{key: value})
-
-    return lambda level: getattr(level, key), put, lambda path, value: fitting(path, hint, value), False
-
-
-def _level_gain(key: str) -> tuple[Callable[[Level], Any], Callable[[Level, Any], Level], Fit, bool]:
+def _level_gain(key: str) -> LevelKey:
     def put(level: Level, value: Any) -> Level:
         return replace(level, tasks=tuple(replace(task, **{key: value}) for task in level.tasks))
 
-    return lambda level: getattr(level.tasks[0], key), put, weight, True
+    return LevelKey(lambda level: getattr(level.tasks[0], key), put, _GAIN_FORMS[key], shorthand=True)
 
 
-_LEVEL_KEYS: LevelKeys = {
-    **{key: _level_key(key) for key in ("Q", "R", "horizon", "enabled")},
+_GAIN_FORMS = {key: form_of(field_types(Task)[key]) for key in _GAINS}
+_LEVEL_KEYS = {
+    **{key: level_key(key) for key in ("Q", "R", "horizon", "enabled")},
     **{key: _level_gain(key) for key in _GAINS},
 }
 
@@ -230,4 +214,4 @@ def _gain(name: str, key: str) -> Place:
         levels = (replace(level, tasks=tuple(map(put, level.tasks))) for level in settings.levels)
         return replace(settings, levels=tuple(levels))
 
-    return Place(lambda settings: getattr(task(settings), key), write, weight)
+    return Place(lambda settings: getattr(task(settings), key), write, _GAIN_FORMS[key])

@@ -1,84 +1,118 @@
-"""Values a user gives for a setting, checked."""
+"""What a setting may be, from how its field is declared; and values a user gives for it, checked."""
 
 from __future__ import annotations
 
 import math
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import InputError
+from robots.errors import unknown_name
+from robots.ranges import ANY, Range, alternatives, plain
+
+NUMBER = "number"
+WHOLE = "whole number"
+SWITCH = "switch"
+WORD = "word"
 
 
-def weight(path: str, value: Any) -> float | tuple[float, ...]:
-    """A number, or a tuple of them from a list. Raises InputError, naming the path, for anything else."""
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return tuple(number(path, each) for each in value)
-    return number(path, value)
+@dataclass(frozen=True)
+class Form:
+    """What a setting may be.
 
-
-def number(path: str, value: Any) -> float:
-    """A finite number. Raises InputError, naming the path, for anything else."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InputError(f"{path} is {value!r}: give a number")
-    try:
-        finite_number = float(value)
-    except OverflowError:
-        raise InputError(f"{path} has {len(str(abs(value)))} digits: give a smaller number") from None
-    if not math.isfinite(finite_number):
-        raise InputError(f"{path} is {value}: give a finite number")
-    return finite_number
-
-
-def typed(path: str, old: Any, value: Any) -> Any:
-    """The value in the type of the one it replaces. Raises InputError, naming the path, if it has another."""
-    if isinstance(old, bool):
-        if isinstance(value, bool):
-            return value
-        raise InputError(f"{path} is {value!r}: give true or false")
-    if isinstance(old, str):
-        if isinstance(value, str):
-            return value
-        raise InputError(f"{path} is {value!r}: give a word")
-    if isinstance(old, int):
-        whole = number(path, value)
-        if whole != int(whole):
-            raise InputError(f"{path} is {value}: give a whole number")
-        return int(whole)
-    per_joint = path.startswith(("nominal.", "plant."))
-    if isinstance(old, float) and not per_joint:
-        return number(path, value)
-    if isinstance(old, tuple) and not isinstance(value, (list, tuple, np.ndarray)):
-        number(path, value)
-        if per_joint:
-            return float(value)
-        raise InputError(f"{path} is {value!r}: give a list of {len(old)} numbers, e.g. {list(old)}")
-    return weight(path, value)
-
-
-def fitting(path: str, hint: Any, value: Any) -> Any:
-    """The value as the type a field is declared with: numbers, words, true or false, lists of them, null.
-
-    Raises:
-        InputError: it does not fit, naming the path and what would.
+    Attributes:
+        kind: NUMBER, WHOLE, SWITCH or WORD; None: a list only.
+        elements: the same of what a list may hold; None: it may be no list.
+        words: the words to choose from; empty: any.
+        null: it may be none at all.
+        range: of every number.
     """
-    kinds = get_args(hint) if get_origin(hint) in (UnionType, Union) else (hint,)
-    if value is None and NoneType in kinds:
-        return None
-    if bool in kinds:
-        return typed(path, True, value)
-    if int in kinds:
-        return typed(path, 0, value)
-    if any(kind is str or get_origin(kind) is Literal for kind in kinds):
-        return typed(path, "", value)
-    elements = {get_args(kind)[0] for kind in kinds if get_origin(kind) is tuple}
-    if isinstance(value, (list, tuple, np.ndarray)) and elements:
-        return tuple(fitting(path, elements.copy().pop(), each) for each in value)
-    if float in kinds:
-        return number(path, value)
-    raise InputError(f"{path} is {value!r}: give a list, e.g. {[] if str in elements else [0.5, 0.5]}")
+
+    kind: str | None
+    elements: str | None = None
+    words: tuple[str, ...] = ()
+    null: bool = False
+    range: Range = ANY
+
+    def __str__(self) -> str:
+        """For people: "a whole number from 1 to 60"; "viability, paper or off"."""
+        found = [] if self.kind is None else [self._one(self.kind)]
+        if self.elements is not None:
+            found.append(
+                f"a list of {self.elements}s {self.range}".strip() if not found else "a list of such"
+            )
+        return " or ".join(found + ["null"] * self.null)
+
+    def _one(self, kind: str) -> str:
+        if kind == SWITCH:
+            return "true or false"
+        if kind == WORD:
+            *first, last = self.words or ("a word",)
+            return f"{', '.join(first)} or {last}" if first else last
+        return f"a {kind} {self.range}".strip()
+
+    def fit(self, path: str, value: Any) -> Any:
+        """The value as it is stored. Raises InputError, naming the path and what is allowed, for others."""
+        if value is None and self.null:
+            return None
+        if isinstance(value, (list, tuple, np.ndarray)) and self.elements is not None:
+            return tuple(self._element(self.elements, path, each) for each in value)
+        if self.kind is None:
+            example = [] if self.elements == WORD else [0.5, 0.5]
+            raise InputError(f"{path} is {_quoted(value)}: give a list, e.g. {example}")
+        return self._element(self.kind, path, value)
+
+    def _element(self, kind: str, path: str, value: Any) -> Any:
+        match kind:
+            case "switch":
+                fits = isinstance(value, (bool, np.bool_))
+                found: Any = bool(value) if fits else None
+            case "word":
+                if isinstance(value, str) and self.words and value not in self.words:
+                    raise unknown_name(path, value, self.words)
+                fits, found = isinstance(value, str), value
+            case _:
+                fits = _is_number(value) and self.range.holds(float(value))
+                fits = fits and (kind == NUMBER or value == int(value))
+                found = (int(value) if kind == WHOLE else float(value)) if fits else None
+        if not fits:
+            raise InputError(f"{path} is {_quoted(value)}: give {self}")
+        return found
+
+
+@cache
+def form_of(hint: Any) -> Form:
+    """What a field that is declared with a type may be: a number, word or switch, a list of them, null."""
+    inner, allowed = plain(hint)
+    kind: str | None = None
+    elements: str | None = None
+    words: tuple[str, ...] = ()
+    for each in alternatives(inner):
+        if get_origin(each) is tuple:
+            elements = form_of(get_args(each)[0]).kind
+        elif get_origin(each) is Literal:
+            kind, words = WORD, get_args(each)
+        elif each is not type(None):
+            kind = {bool: SWITCH, int: WHOLE, str: WORD}.get(each, NUMBER)
+    return Form(kind, elements, words, type(None) in alternatives(inner), allowed)
+
+
+def _is_number(value: Any) -> bool:
+    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    # A whole number may be too long for a float.
+    return number and bool(abs(value) <= 1e300 and math.isfinite(value))
+
+
+def _quoted(value: Any) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of thousands of digits
+        return "a number without end"
+    return text if len(text) <= 80 else text[:60] + " …"
 
 
 def peak(values: NDArray[np.float64]) -> float | None:
@@ -94,8 +128,3 @@ def finite(value: Any) -> Any:
     if isinstance(value, list):
         return [finite(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def choices_of(owner: type, name: str) -> tuple[str, ...]:
-    """The words a field may hold, as its annotation lists them."""
-    return get_args(get_type_hints(owner)[name])

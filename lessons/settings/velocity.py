@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -10,10 +10,12 @@ from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import HTMPCSettings
 from himpc.stack import Stack
 from lessons.events import Appear, Event
+from lessons.settings.entry import Entry
 from lessons.settings.levels import ordered
 from lessons.settings.missions import MissionOptions, Stay
-from lessons.settings.settings import LevelKeys, Place, Settings, every_level, field_places, level_places
-from lessons.settings.values import typed, weight
+from lessons.settings.settings import Place, Settings, every_level, field_places, level_key, level_places
+from lessons.settings.values import NUMBER, WORD, Form
+from lessons.settings.velocity_entries import VELOCITY_ENTRIES
 from robots import InputError, VelocityPlantSettings
 from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
@@ -40,6 +42,7 @@ class VelocitySettings(Settings):
     """
 
     controllers: ClassVar[Mapping[str, str]] = VELOCITY_CONTROLLERS
+    entries: ClassVar[tuple[Entry, ...]] = VELOCITY_ENTRIES
 
     htmpc: HTMPCSettings
     controller: str = "htmpc"
@@ -99,7 +102,11 @@ class VelocitySettings(Settings):
         own = field_places(self, lambda s: s, lambda _, new: new, without=("htmpc", "plant", "options"))
         found = {
             **own,
-            "controller": replace(own["controller"], write=_with_controller),
+            "controller": replace(
+                own["controller"],
+                write=_with_controller,
+                form=Form(WORD, words=tuple(VELOCITY_CONTROLLERS)),
+            ),
             **field_places(options, lambda s: s.options, lambda s, new: replace(s, options=new)),
             **field_places(htmpc, _htmpc, _with_htmpc, without=("stack", "limits", "obstacles", "delay_s")),
             **field_places(
@@ -114,25 +121,29 @@ class VelocitySettings(Settings):
         }
         found["formulation"] = replace(found["formulation"], write=_with_formulation)
         if "order" in found:
-            found["order"] = replace(found["order"], fit=self._order)
+            found["order"] = replace(found["order"], own_fit=self._order)
         return found
 
     def _order(self, path: str, value: Any) -> tuple[str, ...]:
         return tuple(level.name for level in ordered(self.htmpc.stack, value))
 
-    def special(self, path: str, value: Any) -> VelocitySettings | None:
-        """ "obstacles.NAME": a ball [x, y, z, radius], new or instead of the obstacle of that name, where one
-        is now, [x, y, z], or None to take it away."""
+    def elements(self, path: str) -> int:
+        return max(len(self.htmpc.gains), len(self.levels)) if path == "gains" else 0
+
+    def place(self, path: str) -> Place:
+        """Also "obstacles.NAME": a ball [x, y, z, radius], new or instead of the obstacle of that name, where
+        one is now, [x, y, z], or None to take it away."""
         head, _, name = path.partition(".")
         if head != "obstacles" or not name:
-            return None
-        obstacles = self.htmpc.obstacles
-        known = {each.name: each for each in obstacles if not isinstance(each, Floor)}
-        if value is not None:
-            return self.with_obstacle(_obstacle(known, path, name, value))
-        if name not in known:
-            raise unknown_name("obstacle", name, known)
-        return _with_htmpc(self, replace(self.htmpc, obstacles=_without(obstacles, name)))
+            return super().place(path)
+        known = {each.name: each for each in self.htmpc.obstacles if not isinstance(each, Floor)}
+
+        def fit(path: str, value: Any) -> Obstacle | None:
+            if value is None and name not in known:
+                raise unknown_name("obstacle", name, known)
+            return None if value is None else _obstacle(known, path, name, value)
+
+        return Place(lambda settings: _seen(settings, name), _put(name), _BALL, fit)
 
     def special_differences(self, wanted: VelocitySettings) -> list[tuple[str, Any]]:
         """Obstacles that went, appeared or were moved: the latter two stand at the end, in the order in which
@@ -183,15 +194,24 @@ def _with_formulation(settings: VelocitySettings, name: Any) -> VelocitySettings
     return _with_htmpc(settings, replace(htmpc, stack=tuple(stack)))
 
 
-_LEVEL_KEYS: LevelKeys = {
-    "Q": (lambda level: level.Q, lambda level, value: replace(level, Q=value), weight, False),
-    "enabled": (
-        lambda level: level.enabled,
-        lambda level, value: replace(level, enabled=value),
-        lambda path, value: typed(path, True, value),
-        False,
-    ),
-}
+_LEVEL_KEYS = {key: level_key(key) for key in ("Q", "enabled")}
+_BALL = Form(None, NUMBER, null=True)
+
+
+def _seen(settings: VelocitySettings, name: str) -> Any:
+    found = [each for each in settings.htmpc.obstacles if each.name == name and not isinstance(each, Floor)]
+    return _as_setting(found[0])[1] if found else None
+
+
+def _put(name: str) -> Callable[[VelocitySettings, Obstacle | None], VelocitySettings]:
+    def write(settings: VelocitySettings, obstacle: Obstacle | None) -> VelocitySettings:
+        if obstacle is not None:
+            return settings.with_obstacle(obstacle)
+        return _with_htmpc(
+            settings, replace(settings.htmpc, obstacles=_without(settings.htmpc.obstacles, name))
+        )
+
+    return write
 
 
 def _split(obstacles: tuple[Obstacle, ...], last: int) -> tuple[tuple[Obstacle, ...], tuple[Obstacle, ...]]:
@@ -209,7 +229,7 @@ def _without(obstacles: tuple[Obstacle, ...], name: str) -> tuple[Obstacle, ...]
 
 
 def _obstacle(known: Mapping[str, Ball | Box], path: str, name: str, value: Any) -> Obstacle:
-    numbers = weight(path, value)
+    numbers = value if not isinstance(value, (list, tuple)) else _BALL.fit(path, value)
     if isinstance(numbers, tuple) and len(numbers) == 4:
         x, y, z, radius = numbers
         return Ball(name, (x, y, z), radius)

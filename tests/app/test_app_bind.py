@@ -23,7 +23,6 @@ from app.panels.widgets.window import Window
 from lessons.events import Event, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.settings.torque import TorqueSettings
-from lessons.settings.values import choices_of
 
 
 @pytest.fixture(scope="module")
@@ -175,8 +174,7 @@ def test_menus_offer_every_word_a_setting_may_hold(
     """A code may bring any of them: a menu that does not know its own value is no page."""
     monkeypatch.setattr("himpc.controllers.settings.is_installed", lambda _: True)  # CasADi is an extra
     scene, bindings = torque_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
-    owner: Any = scene.settings.limits if path.startswith("limits.") else scene.settings
-    words = choices_of(type(owner), path.removeprefix("limits."))
+    words = scene.settings.place(path).form.words
     assert len(words) > 1
     for word in words:
         viser_server.gui.reset()

@@ -13,7 +13,7 @@ from app.html.markdown import rendered, rendered_line
 from app.html.text import figure, readable
 from app.link.exercise import Curve
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
-from app.panels.widgets.path_control import STEPS, place_of, value_at
+from app.panels.widgets.logarithmic import STEPS, place_of, value_at
 from lessons.course import COURSE, load_lesson
 
 

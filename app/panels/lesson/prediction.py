@@ -13,7 +13,7 @@ from app.html.palette import BAD, GOOD, LEVELS, css
 from app.html.text import badge, block, figure, readable
 from app.link.exercise import Answer, Lecture
 from app.panels.lesson.drawing import scale, sketch
-from app.panels.widgets.path_control import STEPS, only_track, place_of, value_at
+from app.panels.widgets.logarithmic import STEPS, only_track, place_of, value_at
 from lessons.teaching.prediction import Choice, Prediction, Sketch, Value
 
 _LETTERS = "ABCDEFG"

@@ -17,8 +17,8 @@ from app.link.messages import Post, Predict, ResetAll, RunStep
 from app.panels.lesson.claims import after, heading, idea, pictures, state
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.command import add_command
+from app.panels.widgets.controls import add_control
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.path_control import add_control
 from lessons.events import Event
 from lessons.settings.settings import Settings
 from lessons.teaching.challenge import Challenge

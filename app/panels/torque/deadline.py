@@ -7,9 +7,8 @@ from collections import deque
 import viser
 
 from app.html.text import block
-from app.panels.widgets.mirror import Bindings
+from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import Snapshot
-from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 
 _LOOKS = 9
@@ -19,38 +18,11 @@ _LOOKS = 9
 class DeadlineFolder:
     """Two sliders and one line."""
 
-    def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
-    ) -> None:
+    def __init__(self, gui: viser.GuiApi, controls: Controls[TorqueSettings]) -> None:
         with gui.add_folder("Deadline"):
-            deadline = gui.add_slider(
-                "Due after [ms]",
-                min=0.0,
-                max=max(5.0, settings.deadline_ms),
-                step=0.1,
-                initial_value=settings.deadline_ms,
-                hint="A torque that is found later acts one tick later; until then the one before is held. "
-                "0: lockstep, time stands still while the controller computes",
-            )
-            with gui.add_folder(None):
-                per_knot = gui.add_slider(
-                    "Per knot [ms]",
-                    min=0.0,
-                    max=max(0.5, settings.solve_ms_per_knot),
-                    step=0.01,
-                    initial_value=settings.solve_ms_per_knot,
-                    hint="What the computer is assumed to take, times N. 0: what this one really takes",
-                )
+            controls.add("deadline_ms", "solve_ms_per_knot")
             self._line = gui.add_html("")
         self._counts: deque[tuple[int, int]] = deque(maxlen=_LOOKS)
-        bindings.bind(
-            deadline, lambda s: float(s.deadline_ms), lambda value: Set("deadline_ms", float(value))
-        )
-        bindings.bind(
-            per_knot,
-            lambda s: float(s.solve_ms_per_knot),
-            lambda value: Set("solve_ms_per_knot", float(value)),
-        )
 
     def update(self, now: Snapshot[TorqueSettings]) -> None:
         ticks, late = now.status.ticks, now.status.late

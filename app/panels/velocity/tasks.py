@@ -9,8 +9,8 @@ import viser
 from app.client.wish import Wish
 from app.html.palette import BAD, DAMPING, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
-from app.panels.widgets.mirror import Bindings, scalar
-from app.panels.widgets.sliders import add_slider
+from app.panels.widgets.controls import Controls
+from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
 from lessons.events import Set
@@ -77,16 +77,7 @@ class _Card:
         with self._folder:
             self._live = gui.add_html("")
             on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
-            add_slider(
-                gui,
-                bindings,
-                settings,
-                "Q",
-                f"levels.{name}.Q",
-                (0.1, 100.0, 0.1),
-                lambda s: scalar(_find(s, name).Q),
-                "Weight of this level's errors against its effort",
-            )
+            Controls(gui, bindings, settings).add(f"levels.{name}.Q")
         bindings.bind(
             on, lambda s: _find(s, name).enabled, lambda value: Set(f"levels.{name}.enabled", bool(value))
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from lessons.experiments.jobs import Job
 from lessons.settings.settings import Settings
+from lessons.settings.values import WHOLE
 from robots import InputError
 
 MAX_CELLS = 100_000
@@ -97,7 +98,7 @@ def _axis(text: str, settings: Settings) -> Axis:
         ) from None
     if count < 1 or (count > 1 and not low < high):
         raise InputError(f"--over {text}: needs lo < hi and n of 1 or more")
-    whole = _takes_whole_numbers(settings, path, low)
+    whole = settings.place(path).form.kind == WHOLE
     log = parts[3] == "log" if parts[3:] else low > 0 and high >= _DECADE * low and not whole
     if log and low <= 0:
         raise InputError(f"--over {text}: equal ratios need lo above 0; take …:lin")
@@ -108,12 +109,3 @@ def _axis(text: str, settings: Settings) -> Axis:
     for value in values:
         settings.changed(path, value)
     return Axis(path, values, log)
-
-
-def _takes_whole_numbers(settings: Settings, path: str, low: float) -> bool:
-    settings.changed(path, round(low) if low == round(low) else low)
-    try:
-        settings.changed(path, math.floor(low) + 0.5)
-    except InputError as error:
-        return "whole number" in str(error)
-    return False

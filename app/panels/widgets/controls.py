@@ -1,0 +1,198 @@
+"""Controls of settings, made from what the table of settings says: a slider, switch or menu each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
+
+import viser
+
+from app.html.text import figure
+from app.panels.widgets.logarithmic import STEPS, only_track, place_of, value_at
+from app.panels.widgets.mirror import Bindings, scalar
+from lessons.events import Set
+from lessons.settings.entry import Entry
+from lessons.settings.settings import Settings
+from lessons.settings.values import SWITCH, WHOLE, WORD
+from lessons.teaching.control import Control, chosen
+
+S = TypeVar("S", bound=Settings)
+
+
+class Controls(Generic[S]):
+    """Adds controls, each bound to the path of a setting: they show what is, and post what is set.
+
+    Each stands in a nameless folder: of two inputs of one container changed at once, viser loses one.
+    """
+
+    def __init__(self, gui: viser.GuiApi, bindings: Bindings[S], settings: S) -> None:
+        """settings: in force when the page is built."""
+        self._gui, self._bindings, self._settings = gui, bindings, settings
+
+    def add(self, *paths: str) -> None:
+        """A control for each path."""
+        for path in paths:
+            self.add_as(self._settings.entry(path))
+
+    def add_as(
+        self,
+        entry: Entry,
+        read: Callable[[S], Any] | None = None,
+        make: Callable[[float], Any] | None = None,
+    ) -> None:
+        """A control as an entry describes it, which may differ from the table's.
+
+        Args:
+            entry: its path must be a setting's.
+            read: the value shown, instead of the setting's own.
+            make: the setting's value from a number, where that is not the number.
+        """
+        place = self._settings.place(entry.path)
+        read = place.read if read is None else read
+        with self._gui.add_folder(None):
+            if place.form.kind == SWITCH:
+                self._switch(entry, read)
+            elif place.form.kind == WORD:
+                self._menu(entry, place.form.words, read)
+            else:
+                self._slider(entry, read, whole=place.form.kind == WHOLE, make=make)
+
+    def add_elements(self, path: str, names: Sequence[str], title: str) -> None:
+        """A folder with a number for each element of a list, called by `names`."""
+        entry = self._settings.entry(path)
+        with self._gui.add_folder(title, expand_by_default=False):
+            for at, name in enumerate(names, start=1):
+                self._number(replace(entry, path=f"{path}.{at}", label=name))
+
+    # ---------------------------------------------------------------- kinds of controls
+
+    def _switch(self, entry: Entry, read: Callable[[S], Any]) -> None:
+        box = self._gui.add_checkbox(entry.title, bool(read(self._settings)), hint=entry.help or None)
+        self._bindings.bind(box, lambda s: bool(read(s)), lambda on: Set(entry.path, bool(on)))
+
+    def _menu(self, entry: Entry, words: tuple[str, ...], read: Callable[[S], Any]) -> None:
+        now = str(read(self._settings))
+        menu = self._gui.add_dropdown(entry.title, words, initial_value=now, hint=entry.help or None)
+        self._bindings.bind(menu, lambda s: str(read(s)), lambda word: Set(entry.path, str(word)))
+
+    def _slider(
+        self, entry: Entry, read: Callable[[S], Any], whole: bool, make: Callable[[float], Any] | None
+    ) -> None:
+        if entry.log:
+            self._logarithmic(entry, read)
+            return
+        kind, step = (int, 1) if whole else (float, entry.step or _step(entry.low, entry.high))
+
+        def shown(settings: S) -> Any:
+            return kind(round(scalar(read(settings)) * entry.factor, 9))
+
+        now = shown(self._settings)
+        slider = self._gui.add_slider(
+            entry.title,
+            min=min(kind(entry.low), now),
+            max=max(kind(entry.high), now),
+            step=step,
+            initial_value=now,
+            hint=entry.help or None,
+        )
+
+        def event(value: float) -> Set:
+            number = kind(value) if entry.factor == 1.0 else float(f"{value / entry.factor:.12g}")
+            return Set(entry.path, number if make is None else make(number))
+
+        self._bindings.bind(slider, lambda s: min(max(shown(s), slider.min), slider.max), event)
+
+    def _logarithmic(self, entry: Entry, read: Callable[[S], Any]) -> None:
+        low, high = entry.low, entry.high
+
+        def label(value: float) -> str:
+            return f"{entry.label}: {figure(value)}{' ' * bool(entry.unit)}{entry.unit}"
+
+        now = scalar(read(self._settings))
+        slider = self._gui.add_slider(
+            label(now),
+            min=0,
+            max=STEPS,
+            step=1,
+            initial_value=place_of(now, low, high),
+            marks=((0, figure(low)), (STEPS, figure(high))),
+            hint=entry.help or "Logarithmic",
+        )
+        self._gui.add_html(only_track(slider))
+
+        def follow(settings: S) -> int:
+            value = scalar(read(settings))
+            if slider.label != label(value):
+                slider.label = label(value)
+            return place_of(value, low, high)
+
+        self._bindings.bind(slider, follow, lambda place: Set(entry.path, value_at(place, low, high)))
+
+    def _number(self, entry: Entry) -> None:
+        read = self._settings.place(entry.path).read
+        value = float(read(self._settings))
+        ranged = entry.low < entry.high
+        with self._gui.add_folder(None):
+            number = self._gui.add_number(
+                entry.label,
+                value,
+                min=min(entry.low if ranged else 1e-6, value),
+                max=max(entry.high, value) if ranged else None,
+                step=entry.step or _tenth(value),
+            )
+        self._bindings.bind(number, lambda s: float(read(s)), lambda given: Set(entry.path, float(given)))
+
+
+def add_control(
+    gui: viser.GuiApi, bindings: Bindings[Settings], control: Control, settings: Settings
+) -> None:
+    """A lesson's control: in the lesson's words, and within its range even where the setting is not."""
+    if control.choices and control.choices != (False, True):
+        _add_choices(gui, bindings, control, settings)
+        return
+    entry = Entry(control.path, control.words, low=control.low, high=control.high, log=control.log)
+    read = settings.place(control.path).read
+
+    def inside(settings: Settings) -> float:
+        return min(max(scalar(read(settings)), control.low), control.high)
+
+    Controls(gui, bindings, settings).add_as(entry, read if control.choices or control.log else inside)
+
+
+def _add_choices(
+    gui: viser.GuiApi, bindings: Bindings[Settings], control: Control, settings: Settings
+) -> None:
+    of = {_words(choice): choice for choice in control.choices}
+
+    def shown(settings: Settings, otherwise: str) -> str:
+        found = chosen(settings, control)
+        return otherwise if found is None else _words(found)
+
+    menu = gui.add_dropdown(control.words, tuple(of), initial_value=shown(settings, next(iter(of))))
+    bindings.bind(
+        menu,
+        # What the menu does not offer cannot be shown in it.
+        lambda s: shown(s, str(menu.value)),
+        lambda value: Set(control.path, of[str(value)]),
+    )
+
+
+def _words(value: Any) -> str:
+    """A choice in a menu."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_words, value))
+    return figure(value) if isinstance(value, float) else str(value)
+
+
+def _step(low: float, high: float) -> float:
+    """About a hundredth of the range, a power of ten times 1 or 5."""
+    rough = (high - low) / 200
+    power = 10.0 ** math.floor(math.log10(rough))
+    return float(f"{(5 if rough >= 5 * power else 1) * power:.3g}")
+
+
+def _tenth(value: float) -> float:
+    """A tenth of the value's decade: one click is a visible change whatever the value's size."""
+    return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1

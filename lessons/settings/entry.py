@@ -1,0 +1,70 @@
+"""What people are told of a setting: its label, unit, help and the usual range, one row per setting."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of a table of settings. What a setting may be at all stands beside its field, see
+    `robots.ranges`; here is what one usually tries.
+
+    Attributes:
+        path: as of `--set`; "*" stands for a name: "levels.*.Q".
+        label: a few words or a symbol.
+        help: one sentence or two; empty if the label says it all.
+        unit: of the value.
+        low, high, step: of a slider, in `shown`; a value outside widens it. step 0: about a hundredth.
+        log: the slider is logarithmic; low > 0.
+        shown: the unit that the page shows instead, empty: `unit`.
+        factor: how many of `shown` one `unit` is.
+        tries: values worth comparing, as typed; the first is seldom a scene's own.
+        name: instead of the label where no heading says what it belongs to.
+    """
+
+    path: str
+    label: str
+    help: str = ""
+    unit: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    step: float = 0.0
+    log: bool = False
+    shown: str = ""
+    factor: float = 1.0
+    tries: tuple[str, ...] = ()
+    name: str = ""
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """What the path matches; its groups are the names."""
+        return re.compile("(.+)".join(map(re.escape, self.path.split("*"))))
+
+    @property
+    def title(self) -> str:
+        """The label with the unit that the page shows."""
+        unit = self.shown or self.unit
+        return f"{self.label} [{unit}]" if unit else self.label
+
+    def at(self, path: str) -> Entry | None:
+        """The entry of one setting, with names in place of "*"; None if it is another's."""
+        found = self.pattern.fullmatch(path)
+        if found is None:
+            return None
+        label, name = self.label, self.name or self.label
+        for part in found.groups():
+            label, name = label.replace("*", part, 1), name.replace("*", part, 1)
+        return replace(self, path=path, label=label, name=name)
+
+
+def entry_at(entries: tuple[Entry, ...], path: str) -> Entry:
+    """The entry of a path; one that says its last name only if the table has none."""
+    for entry in entries:
+        found = entry.at(path)
+        if found is not None:
+            return found
+    last = path.rpartition(".")[2]
+    return Entry(path, last, name=path)

@@ -1,0 +1,100 @@
+"""What people are told of settings: one table, which page, lists and messages are made from."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import pytest
+
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.names import ALL_SCENES
+from lessons.settings.assignments import parse_assignment
+from lessons.settings.presets import usual_settings
+from lessons.settings.settings import Settings
+from lessons.settings.torque_entries import TORQUE_ENTRIES
+from lessons.settings.values import NUMBER, WHOLE
+from lessons.settings.velocity_entries import VELOCITY_ENTRIES
+from robots import InputError
+
+
+@cache
+def settings_of(scene: str) -> Settings:
+    return load_scene(scene, "planar3" if scene == "hold" else None).settings
+
+
+SCENES = sorted(ALL_SCENES)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_setting_stands_in_the_table_and_its_ends_are_allowed(scene: str) -> None:
+    settings = settings_of(scene)
+    for path in settings.paths():
+        if re.fullmatch(r"levels\.\d+\..*", path):
+            continue  # by place: the same as by name
+        assert any(entry.at(path) for entry in settings.entries), f"no entry for {path}"
+        entry, form = settings.entry(path), settings.place(path).form
+        assert entry.label and entry.name, path
+        if entry.low < entry.high and form.kind in (NUMBER, WHOLE):
+            for end in (entry.low, entry.high):
+                value = end / entry.factor
+                settings.changed(path, int(value) if form.kind == WHOLE else value)
+
+
+def test_the_tables_hold_nothing_else() -> None:
+    """An entry that no scene has is a typo, or of a setting that went."""
+    known = {path for scene in SCENES for path in settings_of(scene).paths()} | {"gains.1"}
+    for entry in (*TORQUE_ENTRIES, *VELOCITY_ENTRIES):
+        assert any(entry.at(path) for path in known), entry.path
+    for entries in (TORQUE_ENTRIES, VELOCITY_ENTRIES):
+        paths = [entry.path for entry in entries]
+        assert len(set(paths)) == len(paths)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_what_is_worth_trying_is_allowed(scene: str) -> None:
+    settings = settings_of(scene)
+    usual = usual_settings(settings)
+    assert len({entry.name for entry in usual}) == len(usual) > 5
+    for entry in usual:
+        for value in entry.tries:
+            settings.changed(*parse_assignment(f"{entry.path}={value}"))
+
+
+@pytest.mark.parametrize(
+    ("scene", "path", "value", "says"),
+    [
+        ("planar3-hold", "horizon", 80, "a whole number from 1 to 60"),
+        ("planar3-hold", "T_s", 1.0, "a number from 0.0001 to 0.02"),
+        ("planar3-hold", "M_bar_scale", 0, "a number above 0"),
+        ("planar3-hold", "plant.delay_ms", -1.0, "a number from 0 to 1000"),
+        ("planar3-hold", "plant.mass_scale", [1, 0, 1], "a number from 0.001 to 1000 or a list of such"),
+        ("planar3-hold", "nominal.mass_scale", 0, "nominal.mass_scale is 0"),
+        ("planar3-hold", "limits.position", "paper ", "did you mean 'paper'"),
+        ("planar3-hold", "levels.position.Q", 0, "levels.position.Q is 0: give a number above 0"),
+        ("planar3-hold", "tasks.position.K_p", -1, "a number of at least 0"),
+        ("planar3-hold", "M_bar.2", 0, "a number above 0"),
+        ("ridgeback-ur10-square", "horizon", 80, "a whole number from 1 to 40"),
+        ("ridgeback-ur10-square", "delta_m", 2.0, "a number from 0 to 1"),
+        ("ridgeback-ur10-square", "peak", 3, "a list"),
+        ("ridgeback-ur10-square", "gains.3", 1.0, "from 1 to 2"),
+        ("ridgeback-ur10-delivery", "rounds", 0, "a whole number from 1 to 100"),
+    ],
+)
+def test_a_refusal_says_what_is_allowed(scene: str, path: str, value: object, says: str) -> None:
+    with pytest.raises(InputError, match=re.escape(says)):
+        settings_of(scene).changed(path, value)
+
+
+def test_one_gain_of_several() -> None:
+    settings = settings_of("ridgeback-ur10-square").changed("gains.2", 0.7)
+    assert settings.value_at("gains") == (0.5, 0.7) and settings.value_at("gains.2") == 0.7
+
+
+def test_a_level_is_read_by_its_name_wherever_it_stands() -> None:
+    """A control of the page keeps the place of its path while levels change theirs."""
+    settings = settings_of("planar3-hold")
+    read = settings.place("levels.position.Q").read
+    names = settings.value_at("order")
+    turned = settings.changed("levels.position.Q", 7.0).changed("order", list(reversed(names)))
+    assert read(turned) == 7.0 == turned.value_at("levels.position.Q")
