@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from robots.catalog import CATALOG
     from robots.collision import Ball, Box, Floor
     from robots.errors import InputError
-    from robots.inertia import convergence_gauge, suggest_M_bar
+    from robots.inertia import convergence_eigenvalues, convergence_gauge, suggest_M_bar
     from robots.load import check_urdf, load_robot, load_urdf_text
     from robots.nominal import NominalModel, NominalSettings
     from robots.plant import Plant
@@ -35,6 +35,7 @@ __all__ = [
     "VelocityPlant",
     "VelocityPlantSettings",
     "check_urdf",
+    "convergence_eigenvalues",
     "convergence_gauge",
     "load_robot",
     "load_urdf_text",
@@ -60,6 +61,7 @@ __getattr__ = lazily(
         "VelocityPlant": "servo",
         "VelocityPlantSettings": "servo",
         "check_urdf": "load",
+        "convergence_eigenvalues": "inertia",
         "convergence_gauge": "inertia",
         "load_robot": "load",
         "load_urdf_text": "load",

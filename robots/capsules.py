@@ -44,6 +44,8 @@ def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[Piece
         ]
         if model.frames[tip].parentJoint == joint:
             ends.append((model.frames[tip].placement.translation, _TIP))
+        if joint > 0 and not any(np.linalg.norm(end) >= _SHORTEST for end, _ in ends):
+            ends.append((_farthest(model, joint), _BODY))
         for k, (end, colour) in enumerate(ends):
             if joint > 0 or drawn:
                 yield from _limb(joint, np.asarray(end), radius, colour, k)
@@ -51,6 +53,12 @@ def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[Piece
             yield from _pedestal(np.asarray(ends[0][0]), 1.5 * thickness)
         if joint > 0:
             yield _drum(model, joint, 1.25 * radius)
+
+
+def _farthest(model: pin.Model, joint: int) -> np.ndarray:
+    """Of the frames that a last body carries, in its joint's frame, m."""
+    own = [frame.placement.translation for frame in model.frames if frame.parentJoint == joint]
+    return max(own, key=lambda at: float(np.linalg.norm(at)))
 
 
 def _limb(joint: int, end: np.ndarray, radius: float, colour: Colour, k: int) -> Iterator[Piece]:

@@ -72,6 +72,14 @@ def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
     """
     diagonal = np.asarray(M_bar, dtype=float)
     norm = np.linalg.norm(np.eye(len(diagonal)) - np.linalg.solve(M, np.diag(diagonal)), 2)
-    root = np.sqrt(diagonal)
-    eigenvalues = np.linalg.eigvalsh(root[:, None] * np.linalg.inv(M) * root[None, :])
-    return float(norm), float(np.abs(1.0 - eigenvalues).max())
+    return float(norm), float(np.abs(convergence_eigenvalues(M, M_bar)).max())
+
+
+def convergence_eigenvalues(M: np.ndarray, M_bar: np.ndarray) -> np.ndarray:
+    """Eigenvalues of I − M⁻¹M̄, (n,), the largest first: what a step leaves of each mode of the error.
+
+    All are real, for M⁻¹M̄ is similar to a symmetric matrix: near 1 an error dies out slowly, below 0 it
+    changes its sign at every step, below −1 it grows. Arguments and errors as in `convergence_gauge`.
+    """
+    root = np.sqrt(np.asarray(M_bar, dtype=float))
+    return 1.0 - np.linalg.eigvalsh(root[:, None] * np.linalg.inv(M) * root[None, :])

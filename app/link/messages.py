@@ -9,6 +9,7 @@ import numpy as np
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
+from app.link.inside import Inside, Watch
 from app.link.wire import Handle
 
 if TYPE_CHECKING:
@@ -103,7 +104,20 @@ class Quit:
 
 
 Command = (
-    Post | Play | Step | Speed | ResetAll | Load | Lead | Leash | Follow | Tell | Predict | RunStep | Quit
+    Post
+    | Play
+    | Step
+    | Speed
+    | ResetAll
+    | Load
+    | Lead
+    | Leash
+    | Follow
+    | Tell
+    | Predict
+    | RunStep
+    | Watch
+    | Quit
 )
 
 
@@ -200,7 +214,7 @@ class Status:
     resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
     path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
     I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one; lecture:
-    of a lesson, when there is news.
+    of a lesson, when there is news; inside: while the page watches.
     """
 
     t: float
@@ -220,6 +234,7 @@ class Status:
     gauge: tuple[float, float] | None = None
     mission: MissionView | None = None
     lecture: Lecture | None = None
+    inside: Inside | None = None
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,7 @@ class Stage:
         exercise = self._learner.choice_of(self._ready).exercise
         self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
         tabs, plots = gui.add_tab_group(), gui.add_panel()
+        self._face.open_plots(plots)
         self._course.add_first_tabs(tabs, plots)
         self._face.add_tabs(gui, tabs)
         self._course.add_last_tab(tabs)

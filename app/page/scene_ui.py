@@ -51,13 +51,17 @@ class Context:
 
 
 class Face(Protocol):
-    """Built in this order: tabs, plots, scene. `follow` comes with every frame."""
+    """Built in this order: first plot, tabs, plots, scene. `follow` comes with every frame."""
 
     fastest: ClassVar[float]
     """The highest speed of the simulation that makes sense, simulated seconds per second."""
 
     def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
         """The kind's tabs, the first one first."""
+        ...
+
+    def open_plots(self, plots: viser.PanelHandle) -> None:
+        """The tab of the panel on the left that comes before the lesson's, if any does."""
         ...
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:

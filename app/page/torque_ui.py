@@ -11,6 +11,7 @@ from app.client.moment import Moment
 from app.html.palette import LEVELS
 from app.link.messages import Status
 from app.page.scene_ui import Context
+from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
 from app.panels.torque.controller import ControllerPanel
 from app.panels.torque.plant import add_plant
@@ -47,19 +48,37 @@ class TorqueFace:
         with tabs.add_tab("Tasks"):
             self._tasks = TasksPanel(gui, bindings, settings, context.colours, lambda: context.settings)
         with tabs.add_tab("Control"):
-            self._controller = ControllerPanel(gui, bindings, settings, ready.robot)
+            self._controller = ControllerPanel(
+                context.client, context.in_view, bindings, settings, ready.robot
+            )
         with tabs.add_tab("Plant"):
             add_plant(gui, bindings, settings, ready.robot)
         self._start.on_theme = context.theme
         self._start.on_recall = self._recall
 
+    def open_plots(self, plots: viser.PanelHandle) -> None:
+        # A QP of one knot is small enough to be looked at first.
+        first = self._context.settings.horizon == 1
+        self._inside_tab = plots.add_tab("Inside") if first else None
+
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+        context = self._context
         with plots.add_tab("Errors"):
             self._level_plots = LevelPlots(
                 gui, self._context.in_view, self._context.ready, self._context.colours
             )
         with plots.add_tab("Joints"):
             self._joint_plots = JointPlots(gui, self._context.in_view, self._context.ready.robot)
+        with self._inside_tab or plots.add_tab("Inside"):
+            self._inside = InsidePanel(
+                context.client,
+                context.in_view,
+                context.ready,
+                context.colours,
+                context.post,
+                context.learner.send,
+                self._controller.spectrum,
+            )
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         context, ready = self._context, self._context.ready
@@ -124,6 +143,7 @@ class TorqueFace:
         beside = None if moment.ghost is None else moment.ghost.window
         self._level_plots.draw(moment.window, beside, T_s)
         self._joint_plots.draw(moment.window, beside)
+        self._inside.draw(moment)
 
     def write(self, now: Snapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:
@@ -134,6 +154,7 @@ class TorqueFace:
         self._start.update(now)
         self._tasks.update(now)
         self._controller.update(now)
+        self._inside.write(now.status, now.settings)
 
     def close(self) -> None:
         self._hand.close()

@@ -73,6 +73,9 @@ class VelocityFace:
         self._begin.on_obstacle = self._add_obstacle
         self._begin.on_clear = self._clear_ball
 
+    def open_plots(self, plots: viser.PanelHandle) -> None:
+        pass
+
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
         with plots.add_tab("Errors"):
             self._plots = TrackingPlots(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.link.choice import SceneChoice
+from app.link.inside import Watch
 from app.link.messages import (
     Command,
     Lead,
@@ -58,8 +59,7 @@ class Body:
     def __init__(self, choice: SceneChoice) -> None:
         """Raises InputError for a scene or robot that cannot be loaded."""
         self.running, self.speed = True, 1.0
-        self.ticks = self.over_budget = self.late = self._steps = 0
-        self.resets = 0
+        self.ticks = self.over_budget = self.late = self._steps = self.resets = 0
         self._sent: Settings | None = None
         self.leader = Leader()
         self._enter(self._loaded(choice, self._load_scene(choice)))
@@ -86,8 +86,8 @@ class Body:
 
     def _begin_anew(self, loaded: Loaded) -> None:
         """A lesson's robot stands still until its script begins."""
-        self.choice, self.scene, self.run = loaded.choice, loaded.scene, loaded.run
-        self.lecturer = loaded.lecturer
+        self.choice, self.scene = loaded.choice, loaded.scene
+        self.run, self.lecturer = loaded.run, loaded.lecturer
         self.running, self.speed = self.lecturer is None, 1.0
         self._fresh_start()
         self.write_poses()
@@ -97,8 +97,7 @@ class Body:
 
     def _fresh_start(self) -> None:
         self.ticks = self.over_budget = self.late = self._steps = 0
-        self.resets += 1
-        self._sent = None
+        self.resets, self._sent = self.resets + 1, None
         if self.leader.on:
             self.leader.begin(self.choice, self.session)
 
@@ -146,6 +145,8 @@ class Body:
                 self._begin_anew(self._loaded(replace(self.choice, mine=()), self.scene))
             case Load(choice):
                 return self._load(choice)
+            case Watch() as watch:
+                self.run.watch = watch
             case Tell():
                 return Told(self.choice, self.session.settings_now, tuple(self.session.log), self.session.t)
             case Lead(on):
@@ -271,10 +272,8 @@ class Body:
         run, session = self.run, self.session
         notices = tuple(session.notices)
         session.notices.clear()
-        settings = session.settings
-        changed = settings is not self._sent
+        settings, sent, ran = session.settings, self._sent, self.ticks > 0
         self._sent = settings
-        ran = self.ticks > 0
         return Status(
             t=session.t,
             ticks=self.ticks,
@@ -289,10 +288,11 @@ class Body:
             path=run.path() if ran else np.zeros((0, 3)),
             binding=run.binding() if ran else (),
             notices=notices,
-            settings=settings if changed else None,
+            settings=None if settings is sent else settings,
             gauge=None if self.running else run.gauge(),
             mission=run.mission(),
             lecture=None if self.lecturer is None else self.lecturer.report(),
+            inside=run.inside() if ran else None,
         )
 
     def close(self) -> None:

@@ -46,7 +46,7 @@ def solve_explicit(
         the optimum, or None if the solver gave no point within the KKT tolerance.
     """
     N, n = U_above.shape
-    H, f = _quadratic(problem, n)
+    H, f = quadratic(problem, n)
     bounds = _every_joint(rows.L.tobytes(), rows.L.shape, n)
     lower, upper = rows.lower.ravel(), rows.upper.ravel()
     if above:
@@ -69,7 +69,8 @@ def _off_subspace(change: Array, Z: Array) -> float:
     return float(np.abs(column - Z @ (Z.transpose(0, 2, 1) @ column)).max())
 
 
-def _quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
+def quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
+    """H (N·n, N·n) and f (N·n,) of a level: its cost is UᵀHU + 2fᵀU and a constant."""
     N, m, K = len(problem.B), problem.B.shape[1], problem.knots
     G = (problem.C[..., None] * problem.B.transpose(1, 0, 2)).reshape(N, m, N * n)[:K].reshape(K * m, N * n)
     weighted = G * np.tile(problem.root_Q**2, K)[:, None]

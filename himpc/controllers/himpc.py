@@ -74,10 +74,19 @@ class HIMPC:
         """The settings in use."""
         return self._settings
 
+    @property
+    def problems(self) -> list[LevelProblem]:
+        """What the last tick solved, a problem per level, highest priority first; none where no level is on
+        or no tick came through."""
+        if self._idle:
+            return []
+        return self._asked if self.kernel is None else self.kernel.problems()
+
     def reset(self, tau_0: Array) -> None:
         """Forgets plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         self._tau_0 = np.array(tau_0, float)
         self._memory: Memory | None = None
+        self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
         unbounded = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
@@ -210,6 +219,7 @@ class HIMPC:
             found, _ = self._problems(form, configuration, memory, tick.previews, {}, {})
             return (found or problems)[0]
 
+        self._asked = problems
         solutions = self._cascade(problems, tick, last_rung)
         return Found(solutions, x_dot, predict_positions(state, solutions[-1].U, self._M_bar, settings.T_s))
 

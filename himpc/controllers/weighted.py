@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.controllers.forms import LevelForm
 from himpc.controllers.himpc import HIMPC, Tick
+from himpc.limits import Rows
 from himpc.plan import Plan
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL
+from himpc.tick.problems import increments_of
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 
@@ -63,7 +65,7 @@ class Weighted(HIMPC):
     def _cascade(
         self, problems: list[LevelProblem], tick: Tick, damping: Callable[[], LevelProblem]
     ) -> list[LevelSolution]:
-        problems = [_softened(each) if each.name == DAMPING_LEVEL.name else each for each in problems]
+        problems = _calmed(problems)
 
         def solve(count: int) -> LevelSolution:
             return super(Weighted, self)._cascade([sum_of_costs(problems[:count])], tick, damping)[0]
@@ -122,8 +124,17 @@ def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:
     )
 
 
+def compromise(problems: Sequence[LevelProblem], rows: Rows) -> Array | None:
+    """What this controller would ask for in a tick of HIMPC, U (N, n) N·m; None if it finds nothing."""
+    return increments_of(sum_of_costs(_calmed(problems)), rows)
+
+
 def _before(own: int, rows: Array) -> NDArray[np.bool_]:
     return np.arange(len(rows)).reshape(-1, *[1] * (rows.ndim - 1)) < own
+
+
+def _calmed(problems: Sequence[LevelProblem]) -> list[LevelProblem]:
+    return [_softened(each) if each.name == DAMPING_LEVEL.name else each for each in problems]
 
 
 def _softened(problem: LevelProblem) -> LevelProblem:

@@ -8,7 +8,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from himpc.cascade.level import LevelSolution, Rung
+from himpc.cascade.level import LevelProblem, LevelSolution, Rung
 from himpc.controllers.forms import StackForm
 from himpc.controllers.memory import Memory
 from himpc.controllers.settings import Settings
@@ -61,7 +61,7 @@ class CompiledTick:
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
         self._shares = [1.0] * len(form.levels)
-        self._started = False
+        self._started = self._looked = False
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
@@ -83,7 +83,7 @@ class CompiledTick:
 
     def forget(self) -> None:
         """Forgets what it remembers."""
-        self._started = False
+        self._started = self._looked = False
 
     @property
     def memory(self) -> Memory | None:
@@ -110,6 +110,18 @@ class CompiledTick:
             level = self._form.levels[place]
             self._shares[place] = share
             write_effects(self.arena, level.rows, share * level.root_Q, share * level.weighted_C)
+
+    def problems(self) -> list[LevelProblem]:
+        """The data of every level at the last tick, copied; none before the first one."""
+        if not self._looked:
+            return []
+        f, form = self.arena.f, self._form
+        rows = sum(form.sizes)
+        B, free = f["B"][:, :rows].copy(), f["free"][:, :rows].copy()
+        return [
+            level.problem(B, free, form.root_Q * free, share)
+            for level, share in zip(form.levels, self._shares, strict=True)
+        ]
 
     def step(
         self,
@@ -145,6 +157,7 @@ class CompiledTick:
             self._given.write(previews)
             if not look(*arena.arguments):
                 return None
+            self._looked = True
             rungs = solve_levels(arena, self._kinds, damped) if self._levels else []
             iterations += 1
             once = self._most == 1

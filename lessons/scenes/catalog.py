@@ -12,6 +12,7 @@ from lessons.scenes.missions import velocity_scene
 from lessons.scenes.mobile_hold import ridgeback_hold
 from lessons.scenes.names import ALL_SCENES, VELOCITY_SCENES
 from lessons.scenes.planar import planar3_circle, planar3_conflict, planar3_singular
+from lessons.scenes.plane import planar3_plane
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.assignments import with_assignments
@@ -28,6 +29,7 @@ _MAKERS: dict[str, Callable[[], TorqueScene]] = {
     "panda-hold": lambda: hold_of("panda"),
     "planar3-hold": lambda: hold_of("planar3"),
     "ridgeback-ur10-hold": ridgeback_hold,
+    "planar3-plane": planar3_plane,
     "planar3-circle": planar3_circle,
     "planar3-conflict": planar3_conflict,
     "planar3-singular": planar3_singular,

@@ -8,6 +8,7 @@ SCENES: dict[str, str] = {
     "planar3-hold": "planar 3-joint arm: the same, in its plane",
     "ridgeback-ur10-hold": "Ridgeback and UR10 at torque level: drag hand and base; the hand comes first",
     "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
+    "planar3-plane": "the same arm with a QP that can be drawn: the wrist's x before two joints, N = 1",
     "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
     "planar3-conflict": "the same arm on RT2: joint 1 is asked to go where the circle cannot be reached",
     "planar3-singular": "the same arm on RT3: two circles through the straight, singular arm",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,14 @@ LOST_POSITION = 0.5
 """m: a level-1 position error above this counts as divergence."""
 
 
+class Given(NamedTuple):
+    """What a controller was given at a tick: the measured state, (n,) each, and the references' previews."""
+
+    q: Array
+    v: Array
+    previews: Mapping[str, Preview]
+
+
 @final
 class TorqueSession(Session):
     """A run whose controller gives torques: every step is a control tick.
@@ -43,6 +51,7 @@ class TorqueSession(Session):
     Attributes:
         plant: the simulation.
         plan: the last plan, None before the first tick.
+        given: what it was made from.
     """
 
     scene: TorqueScene
@@ -85,6 +94,7 @@ class TorqueSession(Session):
         self.controller.reset(self.plant.tau)
         self.references = self._fresh_references()
         self.plan: Plan | None = None
+        self.given: Given | None = None
         self._push_until = math.inf
         self._ticks = 0
         self._outbox = Outbox()
@@ -164,7 +174,7 @@ class TorqueSession(Session):
         write_plan(row, self.layout, plan)
         self._write_references(row, ahead)
         self._write_truth(row, plan, q)
-        self.plan = plan
+        self.plan, self.given = plan, Given(state.q, state.v, previews)
         late = settings.is_late(1e-3 * plan.step_us)
         row[fields["late"]] = late
         row[fields["tau"]] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)

@@ -6,8 +6,10 @@ import viser
 
 from app.html.palette import BAD, GOOD
 from app.html.text import bar, block, esc, formula
+from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.torque.deadline import DeadlineFolder
 from app.panels.widgets.controls import Controls
+from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from himpc.catalog import CONTROLLERS
@@ -18,11 +20,20 @@ _LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale")
 
 
 class ControllerPanel:
-    """Everything about the controller that can be changed while it runs."""
+    """Everything about the controller that can be changed while it runs.
+
+    spectrum: the picture beside M̄.
+    """
 
     def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings, robot: Robot
+        self,
+        client: viser.ClientHandle,
+        in_view: InView,
+        bindings: Bindings[TorqueSettings],
+        settings: TorqueSettings,
+        robot: Robot,
     ) -> None:
+        gui = client.gui
         controls = Controls(gui, bindings, settings)
         with gui.add_folder("Which controller"):
             controls.add("controller")
@@ -34,6 +45,7 @@ class ControllerPanel:
         with gui.add_folder("Inertia guess M̄"):
             self._gauge = gui.add_html("")
             controls.add("M_bar_scale")
+            self.spectrum = SpectrumPicture(client, in_view)
             controls.add_elements("M_bar", robot.joint_names, "Per joint, kg·m²")
         with gui.add_folder("Limits"):
             controls.add(*(f"limits.{name}" for name in _LIMITS))

@@ -23,7 +23,8 @@ let said = null;
 const tell = () => {
   const titles = new Set([awake]);
   for (const [chart, on] of shown)
-    if (on && chart.isConnected) titles.add(chart.querySelector(".u-title")?.textContent ?? "");
+    if (on && chart.isConnected)
+      titles.add(chart.dataset.chart ?? chart.querySelector(".u-title")?.textContent ?? "");
   const value = document.hidden ? asleep : [...titles].sort().join("\\n");
   if (value === said || !window.__viserMutable) return;
   said = value;
@@ -34,7 +35,7 @@ const observer = new IntersectionObserver((entries) => {
   tell();
 });
 const look = () => {
-  for (const chart of document.querySelectorAll(".uplot"))
+  for (const chart of document.querySelectorAll(".uplot, [data-chart]"))
     if (!shown.has(chart)) { shown.set(chart, false); observer.observe(chart); }
   for (const chart of shown.keys())
     if (!chart.isConnected) { shown.delete(chart); observer.unobserve(chart); }
@@ -74,6 +75,11 @@ class InView:
         told = told[:_LONGEST]
         self.asleep = told == ASLEEP
         self._titles = frozenset(told.split("\n"))
+
+    @property
+    def told(self) -> bool:
+        """Whether the browser has told anything."""
+        return self._titles is not None
 
     def sees(self, title: str) -> bool:
         """Whether a chart of this title is in view."""

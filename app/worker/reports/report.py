@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from app.link.inside import Inside, Watch
 from app.link.messages import BindingRow, MissionView, TaskView
 
 LISTED = 24
@@ -14,11 +15,15 @@ LISTED = 24
 
 
 class Run(ABC):
-    """What there is to see of a session."""
+    """What there is to see of a session.
+
+    watch: what the page wants to see of its inside.
+    """
 
     def __init__(self, session: Any) -> None:
         """session: of the kind that the subclass is for."""
         self.session = session
+        self.watch = Watch()
 
     @abstractmethod
     def tasks(self) -> tuple[TaskView, ...]:
@@ -46,4 +51,9 @@ class Run(ABC):
 
     def mission(self) -> MissionView | None:
         """How far the mission is, where there is one."""
+        return None
+
+    def inside(self) -> Inside | None:
+        """What `watch` asks for of the inside of the last tick; None where it asks for nothing, or there is
+        no such thing."""
         return None

@@ -6,11 +6,13 @@ from typing import final
 
 import numpy as np
 
+from app.link.inside import Inside, Watch
 from app.link.messages import TaskView
 from app.worker.reports.report import Run
 from himpc.tasks import Task
+from lessons.geometry.look import matrix_of, plane_of
 from lessons.session.torque import TorqueSession
-from robots import convergence_gauge
+from robots import InputError, convergence_eigenvalues, convergence_gauge
 
 
 @final
@@ -47,8 +49,28 @@ class TorqueRun(Run):
         return np.array(self.session.predicted_path())
 
     def gauge(self) -> tuple[float, float] | None:
+        found = self._mechanics()
+        return None if found is None else convergence_gauge(*found)
+
+    def inside(self) -> Inside | None:
+        session, watch = self.session, self.watch
+        if watch == Watch():
+            return None
+        mechanics = self._mechanics() if watch.spectrum else None
+        spectrum = None if mechanics is None else convergence_eigenvalues(*mechanics)
+        n = session.robot.n
+        try:
+            plane = None
+            if watch.plane is not None and min(watch.plane) >= 0 and max(watch.plane) < n:
+                plane = plane_of(session, watch.plane, watch.through, watch.shift)
+            matrix = None if watch.matrix is None else matrix_of(session, watch.matrix)
+        except InputError as error:
+            return Inside(spectrum=spectrum, why_not=str(error))
+        return Inside(plane, matrix, spectrum)
+
+    def _mechanics(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """The plant's M and the controller's M̄; None where the state is not finite."""
         session = self.session
         if not np.isfinite(session.plant.q).all():
             return None
-        M_bar = np.array(session.settings.M_bar) * session.settings.M_bar_scale
-        return convergence_gauge(session.plant.mass_matrix(), M_bar)
+        return session.plant.mass_matrix(), np.array(session.settings.M_bar) * session.settings.M_bar_scale

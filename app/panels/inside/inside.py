@@ -1,0 +1,56 @@
+"""The tab about one tick: what is drawn of it, and what the simulation is asked for meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import viser
+
+from app.client.moment import Moment
+from app.client.watching import Watching
+from app.client.wish import Send
+from app.html.palette import RGB
+from app.link.inside import Watch
+from app.link.messages import Command, Ready, Status
+from app.panels.inside.matrix import MatrixPanel
+from app.panels.inside.plane import PlanePanel
+from app.panels.inside.spectrum import SpectrumPicture
+from app.panels.widgets.in_view import InView
+from lessons.settings.torque import TorqueSettings
+
+
+class InsidePanel:
+    """A tab of the panel of plots. Only what the browser shows is asked for."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        in_view: InView,
+        ready: Ready,
+        colours: dict[str, RGB],
+        post: Send,
+        send: Callable[[Command], None],
+        spectrum: SpectrumPicture,
+    ) -> None:
+        """post: an event for the session; send: a command; spectrum: where M̄ is set."""
+        levels = tuple(dict.fromkeys(task.level for task in ready.tasks))
+        self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post)
+        with client.gui.add_folder("The Hessian of one level", expand_by_default=False):
+            self._matrix = MatrixPanel(client, in_view, ready.robot, levels)
+        self._spectrum = spectrum
+        self._watching = Watching(send)
+
+    def draw(self, moment: Moment) -> None:
+        """Paints the instant, and asks for what the next one shall show."""
+        plane = self._plane.wish
+        wish: Watch = replace(plane, matrix=self._matrix.wish, spectrum=self._spectrum.in_view)
+        self._watching.ask(wish, moment.status.inside)
+        self._plane.draw(moment)
+        self._matrix.draw(moment.status.inside)
+        self._spectrum.draw(moment.status.inside)
+
+    def write(self, status: Status, settings: TorqueSettings) -> None:
+        """Puts into words what is drawn."""
+        self._plane.write(status.inside, settings)
+        self._matrix.write(status.inside)

@@ -1,0 +1,141 @@
+"""The Hessian of one level's QP as a heat map, with the bounds that hold its solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import viser
+
+from app.html.palette import BAD, BOUND, LEVELS, css
+from app.html.text import block, esc, figure
+from app.link.inside import Inside
+from app.panels.widgets.in_view import InView
+from app.panels.widgets.picture import Picture
+from robots import Robot
+
+if TYPE_CHECKING:
+    from lessons.geometry.matrix import Matrix
+
+TITLE = "Hessian and active bounds"
+SIZE = (400, 400)
+_LEFT, _TOP, _SIDE = 62.0, 8.0, 330.0
+_SHADES = 6
+"""Steps of colour per sign: as many as the powers of ten that are told apart."""
+
+
+class MatrixPanel:
+    """Asks for the Hessian while the browser shows it."""
+
+    def __init__(
+        self, client: viser.ClientHandle, in_view: InView, robot: Robot, levels: Sequence[str]
+    ) -> None:
+        """levels: names, highest priority first."""
+        self._names = robot.joint_names
+        self._level = client.gui.add_dropdown("Level", tuple(levels), initial_value=levels[0])
+        self._picture = Picture(client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see it.")
+        self._words = client.gui.add_html("")
+
+    @property
+    def wish(self) -> str | None:
+        """The level to ask for."""
+        return str(self._level.value) if self._picture.in_view else None
+
+    def draw(self, inside: Inside | None) -> None:
+        """Paints what was told."""
+        if inside is not None and inside.matrix is not None and self._picture.in_view:
+            self._picture.paint(markup(inside.matrix, self._names))
+
+    def write(self, inside: Inside | None) -> None:
+        """Names the bounds."""
+        if inside is None or not self._picture.in_view:
+            return
+        words = block(esc(inside.why_not)) if inside.matrix is None else _legend(inside.matrix, self._names)
+        if self._words.content != words:
+            self._words.content = words
+
+
+def markup(matrix: Matrix, names: Sequence[str]) -> str:
+    """Cells by sign and size, knots parted by lines, and a mark at every increment that a bound holds."""
+    k = len(matrix.shade)
+    cell = _SIDE / k
+    paths: dict[int, list[str]] = {}
+    for row, values in enumerate(matrix.shade.tolist()):
+        start = 0
+        for column in range(1, k + 1):
+            if column < k and _step(values[column]) == _step(values[start]):
+                continue
+            if step := _step(values[start]):
+                x, y, wide = _LEFT + start * cell, _TOP + row * cell, (column - start) * cell
+                paths.setdefault(step, []).append(f"M{x:.1f} {y:.1f}h{wide:.1f}v{cell:.1f}h{-wide:.1f}Z")
+            start = column
+    parts = [
+        f'<path d="{"".join(pieces)}" fill="{css(LEVELS[int(step > 0)], abs(step) / _SHADES)}"/>'
+        for step, pieces in sorted(paths.items())
+    ]
+    frame = (
+        f'<rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}" fill="none" stroke="{css(BOUND)}"/>'
+    )
+    lines = "".join(
+        f"M{_LEFT + at:.1f} {_TOP}v{_SIDE}M{_LEFT} {_TOP + at:.1f}h{_SIDE}"
+        for at in (knot * matrix.joints * cell for knot in range(1, matrix.shown))
+    )
+    parts += [frame, f'<path d="{lines}" stroke="{css(BOUND, 0.7)}"/>', _labels(matrix, names, cell)]
+    for active in {(each.knot, each.joint) for each in matrix.active if each.knot < matrix.shown}:
+        at = _TOP + (active[0] * matrix.joints + active[1] + 0.5) * cell
+        x = _LEFT + at - _TOP
+        parts.append(
+            f'<g class="active" fill="{css(BAD)}"><path d="M{_LEFT - 1} {at:.1f}l-8 -4v8Z"/>'
+            f'<path d="M{x:.1f} {_TOP + _SIDE + 1}l-4 8h8Z"/></g>'
+            f'<path d="M{_LEFT} {at:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}" stroke="{css(BAD)}" '
+            'stroke-width="0.8"/>'
+        )
+    return "".join(parts)
+
+
+def _step(shade: int) -> int:
+    size = -(-abs(shade) * _SHADES // 100)
+    return size if shade > 0 else -size
+
+
+def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
+    """Joints where there is room, else knots."""
+    parts = []
+    if matrix.shown == 1:
+        for joint, name in enumerate(names):
+            at = (joint + 0.5) * cell
+            short = esc(name if len(name) <= 8 else f"{joint + 1}")
+            parts.append(f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">{short}</text>')
+            parts.append(
+                f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{short}</text>'
+            )
+    else:
+        for knot in range(matrix.shown):
+            at = (knot + 0.5) * matrix.joints * cell
+            parts.append(
+                f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">Δτ, {knot}</text>'
+                f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{knot}</text>'
+            )
+    words = "joint by joint" if matrix.shown == 1 else "knot by knot, joint by joint in each"
+    parts.append(
+        f'<text x="{_LEFT + 0.5 * _SIDE}" y="{_TOP + _SIDE + 37}" text-anchor="middle">Δτ, {words}</text>'
+    )
+    return "".join(parts)
+
+
+def _legend(matrix: Matrix, names: Sequence[str]) -> str:
+    held = "".join(
+        f"<br><b>{esc(names[each.joint])}</b>: {esc(each.kind)}, {'upper' if each.upper else 'lower'} end, "
+        f"from increment {each.knot} on; multiplier {figure(each.multiplier)}"
+        for each in sorted(matrix.active, key=lambda each: -each.multiplier)[:8]
+    )
+    more = len(matrix.active) - 8
+    size = matrix.knots * matrix.joints
+    return block(
+        f"H = GᵀQG + R of level <b>{esc(matrix.level)}</b>, {size} × {size}"
+        + (f" (the first {matrix.shown} of {matrix.knots} knots)" if matrix.shown < matrix.knots else "")
+        + f". Blue positive, orange negative; the shade is the size, six powers of ten below "
+        f"{figure(matrix.largest)}. Largest over smallest eigenvalue: {figure(matrix.condition)}.<br>"
+        + (f'<b style="color:{css(BAD)}">Red: active bounds</b>{held}' if held else "No bound is active.")
+        + (f"<br>… and {more} more." if more > 0 else "")
+    )

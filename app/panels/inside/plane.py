@@ -1,0 +1,135 @@
+"""The plane of two joints' increments: the QPs of the last tick, drawn."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import viser
+
+from app.client.moment import Moment
+from app.client.wish import Send
+from app.html.palette import BAD, BOUND, GHOST, RGB, css
+from app.html.text import block, esc, figure, swatch
+from app.link.inside import Inside, Watch
+from app.panels.inside.plane_svg import CONTOURED, SIZE, half_width, markup
+from app.panels.widgets.in_view import InView
+from app.panels.widgets.picture import Picture
+from lessons.events import Set
+from lessons.settings.torque import TorqueSettings
+from robots import Robot
+
+if TYPE_CHECKING:
+    from lessons.geometry.plane import Plane
+
+TITLE = "The QPs of this tick"
+_APPLIED = "what is applied"
+_EMPTY = "Nothing was solved yet: run (Space), or take one tick (T)."
+_SHIFT = 1.0  # N·m
+
+
+class PlanePanel:
+    """Asks for the plane while the browser shows it."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        in_view: InView,
+        robot: Robot,
+        levels: tuple[str, ...],
+        colours: dict[str, RGB],
+        post: Send,
+    ) -> None:
+        """levels: names, highest priority first; post: an event for the session."""
+        gui = client.gui
+        self._robot, self._colours = robot, colours
+        self._half: float | None = None
+        self._pairs = {
+            f"{robot.joint_names[a]}, {robot.joint_names[b]}": (a, b)
+            for a, b in combinations(range(robot.n), 2)
+        }
+        self._picture = Picture(client, in_view, TITLE, SIZE, _EMPTY)
+        self._words = gui.add_html("")
+        self._fewer = gui.add_button(
+            "Look one knot ahead (N = 1)",
+            visible=False,
+            hint="Then the plane is all of the QP, not a cut of it",
+        )
+        with gui.add_folder("Which cut", expand_by_default=False):
+            self._pair = gui.add_dropdown(
+                "Joints", tuple(self._pairs), hint="The axis to the right, then the one upwards"
+            )
+            self._through = gui.add_dropdown(
+                "Others held at",
+                (_APPLIED, *levels),
+                hint="Where the other joints' Δτ, and later knots, are held: at the solution of one level",
+            )
+            self._shift = gui.add_slider(
+                "Shifted by [N·m]",
+                min=-_SHIFT,
+                max=_SHIFT,
+                step=0.01,
+                initial_value=0.0,
+                hint="The other joints' Δτ, away from there",
+            )
+
+        @self._fewer.on_click
+        async def _(_: object) -> None:
+            post(Set("horizon", 1))
+
+    @property
+    def wish(self) -> Watch:
+        """What to ask the simulation for."""
+        if not self._picture.in_view:
+            return Watch()
+        through = str(self._through.value)
+        return Watch(
+            plane=self._pairs.get(str(self._pair.value)),
+            through="" if through == _APPLIED else through,
+            shift=min(max(float(self._shift.value), -_SHIFT), _SHIFT),
+        )
+
+    def draw(self, moment: Moment) -> None:
+        """Paints the instant."""
+        inside = moment.status.inside
+        plane = None if inside is None else inside.plane
+        if plane is None or not self._picture.in_view:
+            return
+        self._half = half_width(plane, self._half)
+        names = [self._robot.joint_names[joint] for joint in plane.joints]
+        self._picture.paint(markup(plane, self._half, self._colours, names))
+
+    def write(self, inside: Inside | None, settings: TorqueSettings) -> None:
+        """Says what is what, and how well geometry and solver agree."""
+        if inside is None or not self._picture.in_view:
+            return
+        several = settings.horizon > 1 and settings.controller != "hiqp"
+        if self._fewer.visible != several:
+            self._fewer.visible = several
+        words = block(esc(inside.why_not)) if inside.plane is None else self._legend(inside.plane, several)
+        if self._words.content != words:
+            self._words.content = words
+
+    def _legend(self, plane: Plane, several: bool) -> str:
+        parts = []
+        for place, level in enumerate(plane.levels[:CONTOURED]):
+            left = (
+                ("a point", "a line", "all")[level.leaves.span.shape[1]]
+                if level.leaves.at is not None
+                else "–"
+            )
+            parts.append(
+                f"{swatch(self._colours.get(level.name, BOUND))}<b>{place + 1} {esc(level.name)}</b>: "
+                f"contours of its cost; the disc is its optimum; (33) leaves {left}"
+            )
+        parts.append(
+            f'<span style="color:{css(BAD)}">▭</span> the box of bounds; what is red cannot be asked for'
+        )
+        parts.append(f'<span style="color:{css(GHOST)}">◆</span> one weighted cost of all; no priorities')
+        if plane.osf is not None:
+            outside = "outside the box" if not plane.box.inside(plane.osf) else "in the box this time"
+            parts.append(f'<span style="color:{css(BAD)}">▲</span> OSF asks for this: {outside}')
+        parts.append(f"Geometry and solver agree to <b>{figure(max(plane.apart, 1e-16), 'N·m')}</b>.")
+        if several:
+            parts.append("Later knots are held where the solution has them.")
+        return block("<br>".join(parts))

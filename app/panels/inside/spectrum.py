@@ -1,0 +1,80 @@
+"""Eigenvalues of I − M⁻¹M̄ in the unit circle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+
+from app.html.palette import BAD, BOUND, GOOD, css
+from app.link.inside import Inside
+from app.panels.widgets.in_view import InView
+from app.panels.widgets.picture import Picture
+
+TITLE = "Eigenvalues of I − M⁻¹M̄"
+SIZE = (360, 208)
+_MIDDLE, _RADIUS = (180.0, 92.0), 78.0
+_EDGE = 2.2  # how far out the picture goes
+
+
+class SpectrumPicture:
+    """Asks for the eigenvalues while the browser shows it."""
+
+    def __init__(self, client: viser.ClientHandle, in_view: InView) -> None:
+        self._picture = Picture(
+            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see them."
+        )
+
+    @property
+    def in_view(self) -> bool:
+        return self._picture.in_view
+
+    def draw(self, inside: Inside | None) -> None:
+        """Paints what was told."""
+        if inside is not None and inside.spectrum is not None and self.in_view:
+            self._picture.paint(markup(inside.spectrum))
+
+
+def markup(values: np.ndarray | Sequence[float]) -> str:
+    """A mark per eigenvalue; all are real. Far ones stand at the edge, with their number."""
+    x0, y0 = _MIDDLE
+    ring = f'<circle cx="{x0}" cy="{y0}" r="{_RADIUS}" fill="{css(GOOD, 0.08)}" stroke="{css(BOUND)}"/>'
+    far, high = _EDGE * _RADIUS, _RADIUS + 8
+    axes = f"M{x0 - far:.0f} {y0}H{x0 + far:.0f}M{x0} {y0 - high}v{2 * high}"
+    parts = [ring, f'<path d="{axes}" stroke="{css(BOUND, 0.6)}"/>']
+    for value, words in ((-1.0, "−1"), (1.0, "1")):
+        side = 5 if value > 0 else -5
+        anchor = "start" if value > 0 else "end"
+        parts.append(
+            f'<text x="{x0 + value * _RADIUS + side}" y="{y0 + 14}" text-anchor="{anchor}">{words}</text>'
+        )
+    parts.append(f'<text x="{x0 - 4}" y="{y0 + 14}" text-anchor="end">0</text>')
+    for value in values:
+        if not math.isfinite(value):
+            continue
+        inside = abs(value) < 1.0
+        x = x0 + _RADIUS * min(max(float(value), -_EDGE), _EDGE)
+        parts.append(
+            f'<circle class="eigenvalue" data-at="{value:.6g}" cx="{x:.1f}" cy="{y0}" r="4.5" '
+            f'fill="{css(GOOD if inside else BAD, 0.75)}" stroke="currentColor" stroke-width="0.7"/>'
+        )
+    worst = max((float(value) for value in values if math.isfinite(value)), key=abs, default=math.nan)
+    parts.append(
+        f'<text x="{x0}" y="{SIZE[1] - 18}" text-anchor="middle" font-weight="600">{_verdict(worst)}</text>'
+        f'<text x="{x0}" y="{SIZE[1] - 4}" text-anchor="middle">'
+        "A millisecond multiplies each part of the error by its eigenvalue.</text>"
+    )
+    return "".join(parts)
+
+
+def _verdict(worst: float) -> str:
+    figure = f"{worst:.3g}".replace("-", "−")
+    if math.isnan(worst):
+        return "not finite"
+    if worst < -1.0:
+        return f"{figure}: the error grows and changes sign at every step"
+    if worst >= 1.0:
+        return f"{figure}: the error does not die out"
+    return f"largest {figure}: " + ("slow" if worst > 0 else "the sign changes at every step")

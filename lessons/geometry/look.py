@@ -1,0 +1,119 @@
+"""What there is to see inside the last tick of a session."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.cascade import solve_cascade
+from himpc.cascade.level import LevelProblem, LevelSolution
+from himpc.controllers import HIMPC, OSF, Weighted
+from himpc.controllers.weighted import compromise
+from himpc.plan import Plan
+from lessons.geometry.matrix import Matrix, matrix
+from lessons.geometry.plane import Plane, cut
+from lessons.session.bumpless import Handover
+from lessons.session.torque import TorqueSession
+from robots import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """A tick taken apart: the strict hierarchy's problems and solutions, whatever controller ran.
+
+    Attributes:
+        plan: what was applied.
+        problems: the levels' QPs, highest priority first.
+        strict: their solutions one after the other; the plan's own where its controller is strict.
+    """
+
+    plan: Plan
+    problems: Sequence[LevelProblem]
+    strict: Sequence[LevelSolution]
+
+
+def tick_of(session: TorqueSession) -> Tick:
+    """The last tick.
+
+    Raises:
+        InputError: nothing ran yet, or the controller solves no such QP.
+    """
+    controller, plan = session.controller, session.plan
+    if isinstance(controller, Handover):
+        controller = controller.new
+    if not isinstance(controller, HIMPC):
+        raise InputError(
+            f"{session.settings.controller} solves no such QP: choose himpc, hiqp, nhimpc or weighted"
+        )
+    if plan is None:
+        raise InputError("Nothing was solved yet: let the robot run, or take a single tick (key T)")
+    problems = controller.problems
+    if len(problems) != len(plan.levels):
+        raise InputError("This tick held the torque: there was nothing to solve")
+    strict: Sequence[LevelSolution] = plan.levels
+    if isinstance(controller, Weighted):
+        strict = solve_cascade(problems, plan.rows, {}, lambda: problems[-1], "compiled", "daqp")
+    return Tick(plan, problems, strict)
+
+
+def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shift: float = 0.0) -> Plane:
+    """The last tick cut along the first increments of two joints.
+
+    Args:
+        session: whose.
+        joints: which two, counted from 0.
+        through: name of the level whose solution the cut goes through; any other word: what is applied.
+        shift: N·m, by which the other joints' first increments are moved from there.
+
+    Raises:
+        InputError: there is no such tick, see `tick_of`.
+    """
+    tick = tick_of(session)
+    solved = {level.name: level.U for level in tick.strict}
+    held = np.array(solved.get(through, tick.plan.levels[-1].U))
+    others = [joint for joint in range(held.shape[1]) if joint not in joints]
+    held[0, others] += shift
+    plane = cut(tick.problems, tick.plan.rows, [level.U for level in tick.strict], joints, held)
+    pair = list(joints)
+    together = _weighted(session, tick)
+    osf = _osf(session, tick.plan)
+    return replace(
+        plane,
+        weighted=None if together is None else together[0, pair],
+        osf=None if osf is None else osf[pair],
+    )
+
+
+def matrix_of(session: TorqueSession, level: str) -> Matrix:
+    """The QP of a level at the last tick; of the first level if there is none of this name.
+
+    Raises:
+        InputError: there is no such tick, see `tick_of`.
+    """
+    tick = tick_of(session)
+    names = [problem.name for problem in tick.problems]
+    place = names.index(level) if level in names else 0
+    return matrix(tick.problems[place], tick.plan.rows, tick.strict[place])
+
+
+def _weighted(session: TorqueSession, tick: Tick) -> Array | None:
+    """One cost of all tasks, under the same bounds, (N, n) N·m."""
+    if isinstance(session.controller, Weighted):
+        return tick.plan.levels[-1].U
+    return compromise(tick.problems, tick.plan.rows)
+
+
+def _osf(session: TorqueSession, plan: Plan) -> Array | None:
+    """The change of torque that OSF would demand at the same state, (n,) N·m."""
+    given = session.given
+    if given is None:
+        return None
+    osf = OSF(session.robot, session.settings.for_controller())
+    osf.reset(plan.tau_0)
+    demand = osf.step(given.q, given.v, given.previews, plan.tau_0)
+    return None if demand.unsolved else demand.tau - plan.tau_0

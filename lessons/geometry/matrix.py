@@ -1,0 +1,91 @@
+"""The Hessian of one level's QP as a picture, with the rows that hold its solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.explicit import quadratic
+from himpc.cascade.level import LevelProblem, LevelSolution
+from himpc.limits.rows import Kind, Rows
+
+Array = NDArray[np.float64]
+
+LARGEST = 64
+"""Rows and columns that are shown; of a larger Hessian as many whole knots as fit, the first ones."""
+DECADES = 6
+"""Entries smaller than the largest by more than so many powers of ten look like zero."""
+
+
+@dataclass(frozen=True)
+class ActiveRow:
+    """A bound that holds the solution: the joint, counted from 0, the knot of the increment it acts on first,
+    the limit, its side, and the multiplier's size."""
+
+    joint: int
+    knot: int
+    kind: Kind
+    upper: bool
+    multiplier: float
+
+
+@dataclass(frozen=True, eq=False)
+class Matrix:
+    """A level's Hessian H = GᵀQG + R over the increments, knot by knot, joint by joint.
+
+    Attributes:
+        level: its name.
+        joints, knots, shown: n, N, and how many knots are shown.
+        shade: (k, k) int8; sign of the entry times 1 … 100, by its size on a logarithmic scale; 0 is nothing.
+        largest: the largest entry's size, 1/(N·m)².
+        condition: largest over smallest eigenvalue of the whole.
+        active: bounds that hold the level's solution, of all knots.
+    """
+
+    level: str
+    joints: int
+    knots: int
+    shown: int
+    shade: NDArray[np.int8]
+    largest: float
+    condition: float
+    active: tuple[ActiveRow, ...]
+
+
+def matrix(problem: LevelProblem, rows: Rows, solution: LevelSolution) -> Matrix:
+    """The picture of one level."""
+    N, n = solution.U.shape
+    H = quadratic(problem, n)[0]
+    shown = max(1, min(N, LARGEST // n))
+    part = H[: shown * n, : shown * n]
+    largest = float(np.abs(H).max())
+    size = np.log10(np.maximum(np.abs(part) / largest, 10.0 ** -(DECADES + 1)))
+    share = np.clip(1.0 + size / DECADES, 0.0, 1.0)
+    values = np.linalg.eigvalsh(H)
+    return Matrix(
+        level=problem.name,
+        joints=n,
+        knots=N,
+        shown=shown,
+        shade=(np.sign(part) * np.ceil(100.0 * share)).astype(np.int8),
+        largest=largest,
+        condition=float(values[-1] / values[0]),
+        active=tuple(_active(rows, solution, N)),
+    )
+
+
+def _active(rows: Rows, solution: LevelSolution, N: int) -> Sequence[ActiveRow]:
+    found = solution.active
+    return [
+        ActiveRow(
+            joint=int(joint),
+            knot=int(row) % N,
+            kind=rows.kind(int(row), int(joint), bool(multiplier > 0)),
+            upper=bool(multiplier > 0),
+            multiplier=abs(float(multiplier)),
+        )
+        for row, joint, multiplier in zip(found.row, found.joint, found.multiplier, strict=True)
+    ]

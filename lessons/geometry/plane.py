@@ -1,0 +1,277 @@
+"""One tick's QPs cut along the increments of two joints: a box, ellipses, lines and points.
+
+Everything else that a QP decides about (the other joints, later knots) is held where one level's solution has
+it. In that cut the cost of a level is (w − c)ᵀ P (w − c) + least, w = (Δτ_a, Δτ_b) of knot 0 in N·m; the
+bounds are a box, since no row couples two joints; and what (33) leaves is the plane, a line, a point or
+nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import LevelProblem
+from himpc.limits.rows import Kind, Rows
+from himpc.tick.kernel.constants import RANK_TOLERANCE
+
+Array = NDArray[np.float64]
+
+_HELD = 1e-9
+"""N·m: a solution nearer to a cut than this lies in it."""
+_MET = 1e-7
+"""N·m: what rounding may leave of an equality."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """lower ≤ w ≤ upper, (2,) N·m, ±inf where nothing bounds; kinds: of the limit at (lower, upper) of each
+    joint, None where there is none."""
+
+    lower: Array
+    upper: Array
+    kinds: tuple[tuple[Kind | None, Kind | None], tuple[Kind | None, Kind | None]]
+
+    def inside(self, w: Array, room: float = 0.0) -> bool:
+        """Whether w is in the box, or no farther outside than `room`, N·m."""
+        return bool((self.lower - room <= w).all() and (w <= self.upper + room).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Allowed:
+    """What (33) leaves of the plane: at + span·s. Nothing if `at` is None: the cut misses it.
+
+    Attributes:
+        at: (2,) a point of it, N·m.
+        span: (2, d) orthonormal, d = 2 the whole plane, 1 a line, 0 a point.
+    """
+
+    at: Array | None
+    span: Array
+
+    def segment(self, box: Box) -> Array | None:
+        """The ends (2, 2) of a line's part in the box, ±inf where it has none; None if there is no part, or
+        no line."""
+        if self.at is None or self.span.shape[1] != 1:
+            return None
+        low, high = _stretch(self.at, self.span[:, 0], box)
+        if low > high:
+            return None
+        return np.array([self.at + s * self.span[:, 0] for s in (low, high)])
+
+
+@dataclass(frozen=True, eq=False)
+class LevelCut:
+    """A level in the cut.
+
+    Attributes:
+        name: of the level.
+        P: (2, 2), the cost's curvature, 1/(N·m)².
+        centre: (2,) N·m, where the cost is least with no bound and no level above.
+        least: the cost there.
+        allowed: what the levels above leave.
+        optimum: (2,) N·m, the best allowed point of the box, from this geometry alone; None: there is none.
+        solved: (2,) N·m, the controller's own solution.
+        apart: N·m, how far that solution is from the cut, in directions that the level or one above feels;
+            the optimum is the solution if this is 0.
+        leaves: what (33) leaves to the levels below this one.
+    """
+
+    name: str
+    P: Array
+    centre: Array
+    least: float
+    allowed: Allowed
+    optimum: Array | None
+    solved: Array
+    apart: float
+    leaves: Allowed
+
+    def cost(self, w: Array) -> float:
+        """At a point of the plane."""
+        away = w - self.centre
+        return float(away @ self.P @ away) + self.least
+
+    def ellipse(self, through: Array) -> tuple[float, float, float]:
+        """The contour of the cost through a point: its semi-axes (N·m), the longer one first, and the angle
+        of that, rad from the first joint's axis."""
+        away = through - self.centre
+        values, axes = np.linalg.eigh(self.P)
+        radii = np.sqrt(float(away @ self.P @ away) / np.maximum(values, 1e-300))
+        return float(radii[0]), float(radii[1]), float(np.arctan2(axes[1, 0], axes[0, 0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A cut through one tick.
+
+    Attributes:
+        joints: the two joints, counted from 0.
+        box: the bounds.
+        levels: highest priority first.
+        weighted: (2,) N·m, what one cost of all tasks would ask for; None if it found nothing.
+        osf: (2,) N·m, what OSF would ask for.
+    """
+
+    joints: tuple[int, int]
+    box: Box
+    levels: tuple[LevelCut, ...]
+    weighted: Array | None = None
+    osf: Array | None = None
+
+    @property
+    def apart(self) -> float:
+        """N·m, how far geometry and solver are apart, over the levels whose solution lies in the cut."""
+        return max(
+            (
+                float(np.abs(level.optimum - level.solved).max())
+                for level in self.levels
+                if level.optimum is not None and level.apart <= _HELD
+            ),
+            default=float("nan"),
+        )
+
+
+def cut(
+    problems: Sequence[LevelProblem],
+    rows: Rows,
+    increments: Sequence[Array],
+    joints: tuple[int, int],
+    held: Array,
+) -> Plane:
+    """The plane of two joints' first increments.
+
+    Args:
+        problems: of all levels, highest priority first.
+        rows: the bounds they were solved under.
+        increments: U_i of every level, (N, n) N·m.
+        joints: which two.
+        held: (N, n) N·m, where everything else is held.
+    """
+    pair = list(joints)
+    box = _box(rows, pair, held)
+    levels: list[LevelCut] = []
+    allowed = Allowed(held[0, pair], np.eye(2))
+    B = np.empty((0, held.shape[1]))
+    wanted = np.empty(0)
+    for problem, U in zip(problems, increments, strict=True):
+        P, centre, least = _cost(problem, pair, held)
+        B = np.vstack([B, problem.B[0]])
+        wanted = np.append(wanted, problem.B[0] @ U[0])
+        leaves = _left(B, wanted, pair, held[0])
+        away = U - held
+        away[0, pair] = 0.0
+        felt = np.abs(B @ away[0]).max() / max(float(np.linalg.norm(B)), 1e-300)
+        levels.append(
+            LevelCut(
+                name=problem.name,
+                P=P,
+                centre=centre,
+                least=least,
+                allowed=allowed,
+                optimum=best(P, centre, allowed, box),
+                solved=U[0, pair],
+                apart=float(max(felt, np.abs(away[1:]).max(initial=0.0))),
+                leaves=leaves,
+            )
+        )
+        allowed = leaves
+    return Plane(joints, box, tuple(levels))
+
+
+def _cost(problem: LevelProblem, pair: list[int], held: Array) -> tuple[Array, Array, float]:
+    """P, c and the least value of (32a) or (34a) over the two increments."""
+    moved = held.copy()
+    moved[0, pair] = 0.0
+    K = problem.knots
+    # e as it moves with the two increments: (K·m, 2).
+    G = (problem.C[:K, :, 0, None] * problem.B[0][None]).reshape(-1, held.shape[1])[:, pair]
+    Q = np.tile(problem.root_Q**2, K)
+    e = problem.residual(moved)[:K].ravel()
+    P = G.T @ (Q[:, None] * G) + np.diag(problem.R[pair])
+    centre = -np.linalg.solve(P, G.T @ (Q * e))
+    moved[0, pair] = centre
+    return P, centre, problem.cost(moved)
+
+
+def _box(rows: Rows, pair: list[int], held: Array) -> Box:
+    rest = held.copy()
+    rest[0, pair] = 0.0
+    touching = np.flatnonzero(rows.L[:, 0])
+    slope = rows.L[touching, 0][:, None]
+    taken = (rows.L @ rest)[touching][:, pair]
+    lower, upper = ((side[touching][:, pair] - taken) / slope for side in (rows.lower, rows.upper))
+
+    def kind(values: Array, k: int, up: bool) -> Kind | None:
+        row = int(values[:, k].argmin() if up else values[:, k].argmax())
+        return rows.kind(int(touching[row]), pair[k], up) if np.isfinite(values[row, k]) else None
+
+    return Box(
+        lower.max(axis=0),
+        upper.min(axis=0),
+        (
+            (kind(lower, 0, False), kind(upper, 0, True)),
+            (kind(lower, 1, False), kind(upper, 1, True)),
+        ),
+    )
+
+
+def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
+    """{w: B u = wanted} with the other joints held, (33) at knot 0."""
+    others = held.copy()
+    others[pair] = 0.0
+    A, b = B[:, pair], wanted - B @ others
+    size = float(np.linalg.norm(B))
+    left, sigma, right = np.linalg.svd(A)
+    rank = int((sigma > RANK_TOLERANCE * size).sum())
+    at = right[:rank].T @ ((left[:, :rank].T @ b) / sigma[:rank])
+    # A distance in N·m that no choice of w can mend.
+    missed = float(np.abs(A @ at - b).max(initial=0.0)) / max(size, 1e-300)
+    return Allowed(at if missed <= _MET else None, right[rank:].T)
+
+
+def best(P: Array, centre: Array, allowed: Allowed, box: Box) -> Array | None:
+    """The point of `allowed` in the box where (w − c)ᵀ P (w − c) is least; None if there is none."""
+    at, span = allowed.at, allowed.span
+    if at is None or (box.lower > box.upper + _MET).any():
+        return None
+    if span.shape[1] == 0:
+        return at if box.inside(at, _MET) else None
+    if span.shape[1] == 1:
+        return _best_on(P, centre, at, span[:, 0], box)
+    if box.inside(centre):
+        return centre
+    edges = []
+    for axis in (0, 1):
+        for end in (box.lower[axis], box.upper[axis]):
+            if np.isfinite(end):
+                corner = np.zeros(2)
+                corner[axis] = end
+                edges.append(_best_on(P, centre, corner, np.eye(2)[1 - axis], box))
+    found = [w for w in edges if w is not None]
+    return min(found, key=lambda w: float((w - centre) @ P @ (w - centre)), default=None)
+
+
+def _best_on(P: Array, centre: Array, at: Array, along: Array, box: Box) -> Array | None:
+    """The best point of a line in the box."""
+    low, high = _stretch(at, along, box)
+    if low > high + _MET:
+        return None
+    s = float(along @ P @ (centre - at)) / float(along @ P @ along)
+    return at + min(max(s, low), max(low, high)) * along
+
+
+def _stretch(at: Array, along: Array, box: Box) -> tuple[float, float]:
+    """Between which s at + s·along is in the box; the first is greater than the second if nowhere."""
+    low, high = -np.inf, np.inf
+    for axis in (0, 1):
+        if abs(along[axis]) < 1e-14:
+            if not box.lower[axis] - _MET <= at[axis] <= box.upper[axis] + _MET:
+                return np.inf, -np.inf
+            continue
+        ends = sorted((side[axis] - at[axis]) / along[axis] for side in (box.lower, box.upper))
+        low, high = max(low, ends[0]), min(high, ends[1])
+    return float(low), float(high)
