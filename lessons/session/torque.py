@@ -174,7 +174,7 @@ class TorqueSession(Session):
         write_plan(row, self.layout, plan)
         self._write_references(row, ahead)
         self._write_truth(row, plan, q)
-        self.plan, self.given = plan, Given(state.q, state.v, previews)
+        self.plan, self.given = plan, Given(state.q, state.v, ahead)
         late = settings.is_late(1e-3 * plan.step_us)
         row[fields["late"]] = late
         row[fields["tau"]] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
