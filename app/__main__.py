@@ -16,6 +16,7 @@ COMMANDS: dict[str, str] = {
     "controllers": "list the controllers",
     "robots": "list the robots, or check a URDF",
     "lessons": "list the lessons, or run every claim of them headless",
+    "new": "write a controller, scene, lesson or task of your own to begin with",
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",
     "sweep": "a grid of runs over settings, as a map; stopped, it carries on",

@@ -53,6 +53,7 @@ class Plan:
         unsolved: how many QPs had no verified point at the first attempt.
         find_evidence: puts together what else was found, when somebody looks at it for the first time.
         iterations: how many times the cascade was solved; 1 but for NHIMPC.
+        notice: a sentence for the learner, said once: code of their own failed at this tick.
     """
 
     tau: Array
@@ -62,6 +63,7 @@ class Plan:
     unsolved: int
     find_evidence: Callable[[], Evidence]
     iterations: int = 1
+    notice: str | None = None
 
     @cached_property
     def evidence(self) -> Evidence:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,15 +20,47 @@ MEMORY = 1_000_000_000  # bytes of address space
 
 _T = TypeVar("_T")
 _PARENT_DIES = 1  # PR_SET_PDEATHSIG of Linux
-_TOO_MUCH = f"reading it needs more than {MEMORY / 1e9:.0f} GB of memory; give a smaller one"
-_TOO_LONG = f"reading it takes longer than {DEADLINE:.0f} s; give a simpler one"
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """What isolated work may cost.
+
+    Attributes:
+        seconds: until it is ended, the start of the process included.
+        memory: bytes of address space.
+        doing: begins the sentence about what went wrong.
+        ended: what became of the process, before "(why)".
+        hint: what to do about that.
+    """
+
+    seconds: float
+    memory: int = MEMORY
+    doing: str = "reading it"
+    ended: str = "ended the importer"
+    hint: str = "check it with another tool"
+
+    @property
+    def too_long(self) -> str:
+        return f"{self.doing} takes longer than {self.seconds:.0f} s; give a simpler one"
+
+    @property
+    def too_much(self) -> str:
+        return f"{self.doing} needs more than {self.memory / 1e9:.0f} GB of memory; give a smaller one"
+
+    def end(self, code: int) -> str:
+        """What an exit code tells."""
+        if code == -getattr(signal, "SIGALRM", 0):
+            return self.too_long
+        name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return f"{self.doing} {self.ended} ({name}); {self.hint}"
 
 
 class Fault(Exception):
     """Isolated work did not come to an end; says why, for the end of a sentence."""
 
 
-def isolated(function: Callable[..., _T], *args: object) -> _T:
+def isolated(function: Callable[..., _T], *args: object, within: Allowance | None = None) -> _T:
     """function(*args), run in a process that starts empty and ends with this one.
 
     A process of its own, not a fork: it works from any thread, and from daemonic processes, which may
@@ -36,11 +69,13 @@ def isolated(function: Callable[..., _T], *args: object) -> _T:
     Args:
         function: of a module; it, its arguments and its result must be picklable.
         args: of the function.
+        within: what it may cost; DEADLINE and MEMORY by default.
 
     Raises:
         InputError: the function raised it.
-        Fault: it crashed, took longer than DEADLINE or needed more than MEMORY.
+        Fault: it crashed, took too long or needed too much memory.
     """
+    within = within or Allowance(DEADLINE)
     folder = str(Path(__file__).parents[1])
     environment = {
         **os.environ,
@@ -49,21 +84,22 @@ def isolated(function: Callable[..., _T], *args: object) -> _T:
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
     }
+    limits = (str(os.getpid()), str(within.seconds), str(within.memory))
     with subprocess.Popen(
-        (sys.executable, "-P", "-c", "from robots.isolation import serve; serve()", str(os.getpid())),
+        (sys.executable, "-P", "-c", "from robots.isolation import serve; serve()", *limits),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         env=environment,
     ) as child:
         try:
-            answer, _ = child.communicate(pickle.dumps((function, args)), timeout=DEADLINE)
+            answer, _ = child.communicate(pickle.dumps((function, args)), timeout=within.seconds)
         except subprocess.TimeoutExpired:
-            raise Fault(_TOO_LONG) from None
+            raise Fault(within.too_long) from None
         finally:
             child.kill()
     if child.returncode != 0 or not answer:
-        raise Fault(_end(child.returncode))
+        raise Fault(within.end(child.returncode))
     result, fault, refusal = pickle.loads(answer)
     if refusal is not None:
         raise refusal
@@ -74,15 +110,16 @@ def isolated(function: Callable[..., _T], *args: object) -> _T:
 
 def serve() -> None:
     """The child: one request from standard input, one answer to standard output."""
-    _restrict(int(sys.argv[1]))
+    within = Allowance(float(sys.argv[2]), int(sys.argv[3]))
+    _restrict(within, int(sys.argv[1]))
     # Compiled libraries print what they like; nothing of it may get into the answer.
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        answer = _answer(sys.stdin.buffer.read())
+        answer = _answer(sys.stdin.buffer.read(), within)
         out.write(answer)
 
 
-def _answer(request: bytes) -> bytes:
+def _answer(request: bytes, within: Allowance) -> bytes:
     """Pickled (result, fault, refusal), one of which is not None unless the result is."""
     try:
         function, args = pickle.loads(request)
@@ -90,7 +127,7 @@ def _answer(request: bytes) -> bytes:
     except InputError as error:
         return pickle.dumps((None, None, error))
     except MemoryError:
-        fault = _TOO_MUCH
+        fault = within.too_much
     except RecursionError:
         fault = "it is nested too deeply; give a flatter one"
     except Exception as error:
@@ -98,12 +135,12 @@ def _answer(request: bytes) -> bytes:
     return pickle.dumps((None, fault, None))
 
 
-def _restrict(parent: int) -> None:
+def _restrict(within: Allowance, parent: int) -> None:
     """Ends with the parent, at the deadline and at the limit of memory, as far as the system can do it."""
     if hasattr(signal, "alarm"):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears of it and ends this process
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(int(DEADLINE) + 1)
+        signal.alarm(int(within.seconds) + 1)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DIES, signal.SIGKILL)
         if os.getppid() != parent:
@@ -113,12 +150,5 @@ def _restrict(parent: int) -> None:
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        most = MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard)
+        most = within.memory if hard == resource.RLIM_INFINITY else min(within.memory, hard)
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
-
-
-def _end(code: int) -> str:
-    if code == -getattr(signal, "SIGALRM", 0):
-        return _TOO_LONG
-    name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    return f"reading it ended the importer ({name}); check it with another tool"

@@ -27,13 +27,14 @@ def lessons(
     one sentence per fault, if something is not as stated.
 
     Args:
-        check: names of the lessons to check; none after --check: all of them.
+        check: names of the lessons to check, or Python files of your own; none after --check: all of them.
         json: write JSON to this file, or to standard output for "-".
     """
-    from lessons.course import COURSE, load_lesson
+    from lessons.course import COURSE
+    from lessons.own.resolve import lesson_named
     from lessons.teaching.check import check as check_lessons
 
-    chosen = [load_lesson(name) for name in dict.fromkeys(check or COURSE)]
+    chosen = [lesson_named(name) for name in dict.fromkeys(check or COURSE)]
     if check is None:
         return _list(chosen, json)
     with progress_bar(f"{len(chosen)} lessons …", shown=json is None) as advance:

@@ -30,10 +30,12 @@ def run(
     """Run a scene headless, as fast as it goes.
 
     Args:
-        scene: name of a scene; see himpc-lab scenes. Not with --state.
+        scene: name of a scene (see himpc-lab scenes), or a Python file with a scene or task of your own. Not
+            with --state.
         urdf: URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
-        controller: which controller instead of the scene's own; see himpc-lab controllers.
+        controller: which controller instead of the scene's own: a name (see himpc-lab controllers) or a
+            Python file of your own.
         duration: simulated seconds; the scene's own by default.
         seed: seed of the run; 0, or the state's, by default.
         state: a state code, as the page shows it: its scene, robot, settings and seed.

@@ -31,11 +31,11 @@ def sweep(
     Ctrl-C stops it; the same command carries on. A run that fails or loses control is a cell of the map.
 
     Args:
-        scene: name of a scene; see himpc-lab scenes.
+        scene: name of a scene (see himpc-lab scenes), or a Python file of your own.
         out: folder for cells.jsonl, results.json and map.png.
         over: a setting and its range, e.g. --over M_bar_scale=0.2:4:20 --over horizon=1:20:20. Ranges of a
             decade and more go in equal ratios; PATH=lo:hi:n:lin and :log decide it.
-        controller: which controller; see himpc-lab controllers.
+        controller: which controller: a name (see himpc-lab controllers) or a Python file of your own.
         set: change a setting in all runs, e.g. --set plant.payload_kg=2.
         duration: simulated seconds per run; the scene's own by default.
         seed: seed of the runs.

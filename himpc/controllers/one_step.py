@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from time import perf_counter_ns
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -238,7 +238,16 @@ class OneStepController(ABC):
         return Rows(np.ones((1, 1)), lower[None], upper[None], ("torque",))
 
 
-def leak(demands: list[Demand], accelerations: list[Array], level: int) -> float:
+class WithJacobian(Protocol):
+    """A level at one tick."""
+
+    @property
+    def J(self) -> Array:
+        """(m, n)."""
+        ...
+
+
+def leak(demands: Sequence[WithJacobian], accelerations: list[Array], level: int) -> float:
     """‖J_p (q̈_i − q̈_p)‖∞ over the levels p above level i.
 
     accelerations: q̈_p (n,) that the levels down to each p cause in the model.

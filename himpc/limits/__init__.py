@@ -3,5 +3,6 @@
 from himpc.limits.limits import Limits, LimitsInForce, in_force
 from himpc.limits.ramp import ramp
 from himpc.limits.rows import Rows, build_rows
+from himpc.limits.viability import viability_bounds
 
-__all__ = ["Limits", "LimitsInForce", "Rows", "build_rows", "in_force", "ramp"]
+__all__ = ["Limits", "LimitsInForce", "Rows", "build_rows", "in_force", "ramp", "viability_bounds"]

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lessons.own.resolve import scene_named
 from lessons.parallel import Failed, on_cores, one_by_one
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.recording.summary import summary
-from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.catalog import prepared
 from lessons.scenes.scene import Scene
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class Job:
 
     def prepared(self) -> Scene:
         """The scene with controller and assignments. Raises InputError for what cannot be."""
-        return prepared(load_scene(self.scene), self.controller, self.set)
+        return prepared(scene_named(self.scene), self.controller, self.set)
 
     def do(self) -> Run:
         """The run. Raises InputError for what cannot be."""

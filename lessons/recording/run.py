@@ -30,6 +30,9 @@ def run(
 
     Returns:
         the rows.
+
+    Raises:
+        InputError: settings or duration cannot be, or a controller of one's own failed.
     """
     seconds = checked_duration(scene.duration if duration is None else duration)
     session = begin(scene, seed)
@@ -38,6 +41,8 @@ def run(
     while not rows or elapsed < seconds - 0.5 * session.settings.T_s:
         rows.append(session.tick().copy())
         elapsed += session.settings.T_s
+        if session.failure is not None:
+            raise InputError(session.failure)
         if (session.diverged_at is not None or session.over) and not to_the_end:
             break
         if progress is not None and len(rows) % 200 == 1:

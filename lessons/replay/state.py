@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lessons.course import COURSE
-from lessons.scenes.catalog import load_scene, prepared
+from lessons.own.resolve import scene_named
+from lessons.scenes.catalog import prepared
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
 from lessons.scenes.scene import Scene
 from lessons.settings.assignments import differences, parse_assignment
@@ -58,7 +59,7 @@ class State:
 
     def loaded(self) -> Scene:
         """The scene as it is without the assignments. Raises InputError for one that cannot be loaded."""
-        return load_scene(self.scene, self.urdf, self.tip)
+        return scene_named(self.scene, self.urdf, self.tip)
 
     def prepared(self) -> Scene:
         """The scene with every assignment. Raises InputError, one sentence, for what cannot be."""
@@ -80,7 +81,7 @@ def state_of(
     Raises:
         InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
     """
-    own = load_scene(scene, urdf, tip)
+    own = scene_named(scene, urdf, tip)
     return State(scene, urdf, tip, differences(own.settings, settings), seed, lesson, step)
 
 

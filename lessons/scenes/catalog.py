@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TypeVar
 
+from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
+from lessons.own.files import is_file
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
 from lessons.scenes.hold import hold, hold_of
 from lessons.scenes.missions import velocity_scene
@@ -16,8 +18,8 @@ from lessons.scenes.plane import planar3_plane
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.assignments import with_assignments
+from lessons.settings.settings import Settings
 from lessons.settings.torque import TorqueSettings
-from lessons.settings.velocity import VelocitySettings
 from robots import InputError
 from robots.errors import unknown_name
 
@@ -76,6 +78,8 @@ def torque_scene(name: str, urdf: str | None = None, tip: str | None = None) -> 
 def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:
     """The scene with another controller (None: its own) and every "PATH=VALUE", in order.
 
+    The controller may be the path of a Python file; an assignment may name only files that are admitted.
+
     Raises:
         InputError: unknown controller or one of the other kind, unknown path, or a value that does not fit.
     """
@@ -86,10 +90,25 @@ def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]
                 f"controller '{controller}' commands {_COMMANDS[controller]} and scene '{scene.name}' takes "
                 f"{_COMMANDS[settings.controller]}: choose one of {', '.join(settings.controllers)}"
             )
-        settings = settings.changed("controller", controller)
+        settings = admitted(settings, (controller,)).changed("controller", controller)
     return replace(scene, settings=with_assignments(settings, assignments))
 
 
-_COMMANDS = dict.fromkeys(TorqueSettings.controllers, "torques") | dict.fromkeys(
-    VelocitySettings.controllers, "velocities"
-)
+def admitted(settings: Settings, files: Iterable[str]) -> Settings:
+    """The settings with Python files, given by whoever started the program, that may be their controller.
+
+    Raises:
+        InputError: the scene takes velocities, and a controller of one's own gives torques.
+    """
+    files = tuple(each for each in files if is_file(each))
+    if not files:
+        return settings
+    if not isinstance(settings, TorqueSettings):
+        raise InputError(
+            f"a controller of your own ({files[0]}) gives torques, and this scene takes velocities: "
+            "choose a scene at torque level, e.g. iiwa14-hold"
+        )
+    return replace(settings, files=tuple(dict.fromkeys((*settings.files, *files))))
+
+
+_COMMANDS = dict.fromkeys(CONTROLLERS, "torques") | dict.fromkeys(VELOCITY_CONTROLLERS, "velocities")

@@ -35,6 +35,7 @@ class Session(ABC):
         plant: the simulation.
         plan: the last plan, None before the first tick.
         diverged_at: simulated time at which control was lost, s; None if it was not.
+        failure: why the code of one's own does not control any more, one sentence; None as long as it does.
         notices: sentences for the learner (refused events, divergence); drain them.
         log: (time, event) of every event that took effect.
     """
@@ -49,6 +50,7 @@ class Session(ABC):
         self.seed = seed
         self.robot: Robot = scene.robot
         self.diverged_at: float | None = None
+        self.failure: str | None = None
         self.notices: list[str] = []
         self.log: list[tuple[float, Event]] = []
         self._mailbox: deque[Event] = deque()
@@ -89,7 +91,7 @@ class Session(ABC):
 
     def reset(self) -> None:
         """Back to the scene's start with the settings as they are."""
-        self.diverged_at = None
+        self.diverged_at = self.failure = None
         self._script = deque(self.scene.events)
 
     def _lost(self, t: float, notice: bool = True) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
-from himpc.controllers import make_controller
+from himpc.controllers import Controller
 from himpc.plan import Binding, Plan
 from himpc.references import Preview, Reference, Target, previews
 from himpc.rotation import quaternion
@@ -18,6 +18,7 @@ from himpc.stack import Stack
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of, write_plan
 from lessons.events import Event, MoveTarget, Push
+from lessons.own.controllers import controller_of
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
 from lessons.session.deadline import Outbox
@@ -63,9 +64,7 @@ class TorqueSession(Session):
         super().__init__(scene, seed)
         self.settings = scene.settings
         self.plant = Plant(scene.robot, scene.settings.plant)
-        self.controller = make_controller(
-            scene.settings.controller, scene.robot, scene.settings.for_controller()
-        )
+        self.controller = controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
         self._data = scene.robot.model.createData()
         self._row = np.full(self.layout.size, np.nan)
@@ -145,11 +144,19 @@ class TorqueSession(Session):
         if settings.controller == self.settings.controller:
             self.controller.configure(settings.for_controller())
         else:
-            taking = make_controller(settings.controller, self.robot, settings.for_controller())
-            taking.reset(self.plant.tau)
-            self.controller = Handover(self.controller, taking)
+            self._hand_over(controller_of(settings, self.robot))
         self.settings = settings
         self._hands = _hands(settings.levels)
+
+    def _hand_over(self, taking: Controller) -> None:
+        taking.reset(self.plant.tau)
+        self.controller = Handover(self.controller, taking)
+
+    def renew(self) -> None:
+        """The code of one's own was changed: it takes over without a bump. Raises InputError if it is wrong;
+        the one before goes on."""
+        self._hand_over(controller_of(self.settings, self.robot))
+        self.failure = None
 
     def advance(self) -> Array:
         """One control tick and its row (a buffer: copy it to keep it).
@@ -175,6 +182,9 @@ class TorqueSession(Session):
         self._write_references(row, ahead)
         self._write_truth(row, plan, q)
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
+        if plan.notice is not None:
+            self.notices.append(plan.notice)
+            self.failure = plan.notice
         late = settings.is_late(1e-3 * plan.step_us)
         row[fields["late"]] = late
         row[fields["tau"]] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
@@ -201,7 +211,7 @@ class TorqueSession(Session):
             M = self.plant.mass_matrix()
             M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
             leak = math.nan
-            if len(plan.levels) > 1:
+            if plan.leak is not None and not math.isnan(plan.leak):
                 at = Configuration(self.robot, self._data, q, q)
                 leak = dynamic_leak(M, plan, self.settings.levels, at)
             self._truth = (leak, *convergence_gauge(M, M_bar))

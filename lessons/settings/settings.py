@@ -65,8 +65,6 @@ class Place:
 class Settings(ABC):
     """Everything a learner can change of a scene; subclasses are frozen trees of frozen data."""
 
-    controllers: ClassVar[Mapping[str, str]]
-    """One line per controller that fits."""
     entries: ClassVar[tuple[Entry, ...]]
     """What people are told of every path."""
     controller: str
@@ -80,6 +78,11 @@ class Settings(ABC):
     """The scene's own choices, None if it has none."""
     plant: Any
     """What the plant really is."""
+
+    @property
+    @abstractmethod
+    def controllers(self) -> Mapping[str, str]:
+        """One line per controller that fits."""
 
     @property
     @abstractmethod

@@ -16,6 +16,7 @@ from himpc.references import Reference
 from himpc.stack import Level, Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
+from lessons.own.files import is_file
 from lessons.settings.entry import Entry
 from lessons.settings.levels import moved, ordered
 from lessons.settings.settings import (
@@ -64,9 +65,10 @@ class TorqueSettings(Settings):
             the same everywhere. 0: the time it really takes, and then no two runs are the same.
         plant: what the plant really is.
         options: the scene's own choices, if it has any.
+        files: Python files of one's own that may be its controller. No path reaches them: what comes from
+            elsewhere (a code, a page) must not choose which files are run.
     """
 
-    controllers: ClassVar[Mapping[str, str]] = CONTROLLERS
     entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
 
     levels: Stack
@@ -85,11 +87,17 @@ class TorqueSettings(Settings):
     nominal: NominalSettings = field(default_factory=NominalSettings)
     plant: PlantSettings = field(default_factory=PlantSettings)
     options: SceneOptions | None = None
+    files: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def controllers(self) -> Mapping[str, str]:
+        return CONTROLLERS | dict.fromkeys(self.files, "a controller of your own, in a file of this machine")
 
     def for_controller(self) -> ControllerSettings:
         """The controller's part. Raises InputError for values that cannot be."""
-        if self.controller not in CONTROLLERS:
-            raise unknown_name("controller", self.controller, CONTROLLERS)
+        if self.controller not in self.controllers:
+            hint = "a file of your own is given as --controller FILE.py" if is_file(self.controller) else ""
+            raise unknown_name("controller", self.controller, self.controllers, hint)
         check_fields(self)
         return ControllerSettings(
             stack=self.levels,
@@ -128,7 +136,7 @@ class TorqueSettings(Settings):
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". Where a
         value holds one number per joint, a place 1 … n behind it is that joint's alone: "M_bar.3"."""
-        without = ("levels", "options", *_PARTS)
+        without = ("levels", "options", "files", *_PARTS)
         own = field_places(self, lambda settings: settings, lambda _, new: _checked(new), without=without)
         options = {}
         if self.options is not None:

@@ -41,7 +41,6 @@ class VelocitySettings(Settings):
         options: the scene's own choices.
     """
 
-    controllers: ClassVar[Mapping[str, str]] = VELOCITY_CONTROLLERS
     entries: ClassVar[tuple[Entry, ...]] = VELOCITY_ENTRIES
 
     htmpc: HTMPCSettings
@@ -50,6 +49,10 @@ class VelocitySettings(Settings):
     delay_measured: bool = False
     plant: VelocityPlantSettings = field(default_factory=VelocityPlantSettings)
     options: MissionOptions = field(default_factory=Stay)
+
+    @property
+    def controllers(self) -> Mapping[str, str]:
+        return VELOCITY_CONTROLLERS
 
     def __post_init__(self) -> None:
         """Raises InputError for a controller that does not exist."""

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass, replace
 from inspect import cleandoc
 
-from lessons.scenes.catalog import load_scene, prepared
+from lessons.own.resolve import scene_named
+from lessons.scenes.catalog import prepared
 from lessons.scenes.scene import Scene
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
@@ -72,7 +73,7 @@ class Run:
 
     def prepared(self) -> Scene:
         """The scene with everything in place. Raises InputError for what cannot be."""
-        scene = prepared(load_scene(self.scene, self.urdf), None, self.set)
+        scene = prepared(scene_named(self.scene, self.urdf), None, self.set)
         return replace(scene, events=self.events, duration=self.duration)
 
     def but(self, *assignments: str) -> Run:

@@ -1,0 +1,275 @@
+"""A controller of one's own: code from outside that is shown a `View` and returns a torque."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.controllers.answers import OwnFault, checked, next_cost, no_rows, solution
+from himpc.controllers.forms import StackForm, measure, prepare, usable
+from himpc.controllers.one_step import leak as leak_of
+from himpc.controllers.settings import Settings
+from himpc.controllers.view import Bounds, LevelView, View, read_only
+from himpc.limits import Limits, LimitsInForce, in_force, ramp, viability_bounds
+from himpc.limits.rows import REACTION
+from himpc.plan import Evidence, Plan
+from himpc.references import Preview
+from himpc.references.hold import still
+from himpc.tasks import Damping
+from robots import NominalModel, Robot
+
+Array = NDArray[np.float64]
+
+Law = Callable[[View], Any]
+"""What the code from outside is: one call per tick."""
+Calling = Callable[[Law, View], Any]
+"""Calls the law. Raises OwnFault, one sentence, if that does not work."""
+
+REST = 5.0
+"""1/s: rate at which a robot whose code failed comes to rest, τ = τ₀ − M̄ (q̈ + REST · q̇): the torque is held
+but for what still moves."""
+OPENING_SECONDS = 0.3
+"""How long after a change of settings the law has its full say again."""
+_FIRST_SHARE = 0.02
+_NUDGE = 1e-4
+"""rad or m: how far the joints are moved to both sides to see the Jacobians change."""
+
+
+class OwnController:
+    """Runs code from outside and does everything else: what it sees, bounds in force, evidence.
+
+    The answer of the law is a torque (n,) N·m, or one row per level (r, n), the torque that the levels down
+    to each would apply: the last row acts, and the leak between levels (33) is then measured with M̄ too.
+
+    Once the law failed (it raised, gave a wrong shape or a number that is not finite) the torque is held and
+    damped until `reset`; `Plan.notice` of that tick says what happened.
+    """
+
+    def __init__(
+        self, robot: Robot, settings: Settings, make: Callable[[], Law], call: Calling, where: str
+    ) -> None:
+        """make: a fresh law, without memory; where: its file and line. Raises InputError if the settings do
+        not fit the robot."""
+        self.robot = robot
+        self._data, self._elsewhere = robot.model.createData(), robot.model.createData()
+        self._make, self._call, self._where = make, call, where
+        self._settings = settings
+        self._apply(settings)
+        self.reset(np.zeros(robot.n))
+
+    @property
+    def settings(self) -> Settings:
+        """The settings in use."""
+        return self._settings
+
+    def reset(self, tau_0: Array) -> None:
+        """Forgets everything, a fault too; τ₀ (n,) N·m is the torque acting now."""
+        self._tau_0 = np.array(tau_0, float)
+        self._before: tuple[Array, Array, float] | None = None
+        self._x_dot: Array | None = None
+        self._limits = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
+        self._law: Law | None = None
+        self._failed = False
+        self._share = 1.0
+
+    def configure(self, settings: Settings) -> None:
+        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        self._apply(settings)
+        self._x_dot = None
+        self._share = _FIRST_SHARE
+
+    def _apply(self, settings: Settings) -> None:
+        prepared = prepare(self.robot, settings)
+        self._nominal = NominalModel(self.robot, settings.nominal)
+        self._form, self._idle, self._off = prepared
+        self._goal = in_force(self.robot, settings.limits)
+        self._M_bar = read_only(np.array(settings.M_bar))
+        self._settings = settings
+
+    def step(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
+    ) -> Plan:
+        """One control period, as `HIMPC.step`; never raises for what the law does."""
+        started = perf_counter_ns()
+        if tau_applied is not None and usable(tau_applied):
+            self._tau_0 = np.array(tau_applied, float)
+        if not (usable(q) and usable(v)):
+            self._before = None
+            return self._resting(q, np.zeros_like(q), {}, {}, started, None)
+        self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, self._settings.T_s)
+        values: dict[str, Array] = {}
+        errors: dict[str, Array] = {}
+        with np.errstate(all="ignore"):
+            now = self._view(q, v, previews, values, errors)
+        self._before = (np.array(q), np.array(v), self._settings.T_s)
+        moving = now.q_ddot + REST * now.q_dot
+        if self._failed:
+            return self._resting(q, moving, errors, values, started, None)
+        try:
+            if self._law is None:
+                self._law = self._make()
+            answers = checked(self._call(self._law, now), len(now.levels), now.n, self._where)
+        except OwnFault as fault:
+            self._failed = True
+            return self._resting(q, moving, errors, values, started, str(fault))
+        plan = self._plan(q, v, now, self._opened(answers), errors, values, started)
+        self._tau_0 = plan.tau
+        return plan
+
+    # ---------------------------------------------------------------- what the law sees
+
+    def _view(
+        self,
+        q: Array,
+        v: Array,
+        previews: Mapping[str, Preview],
+        values: dict[str, Array],
+        errors: dict[str, Array],
+    ) -> View:
+        settings, form = self._settings, self._form
+        T_s, N = settings.T_s, settings.horizon
+        h = _NUDGE / max(1.0, float(np.abs(v).max()))
+        here = Configuration(self.robot, self._data, q, v, np.array((q + h * v, q - h * v)))
+        J, ahead, behind = form.jacobian(here)
+        error = measure(form.tasks, here, previews, values, errors)
+        if self._off:
+            measure(self._off, here, previews, values, errors)
+        q_before, v_before, period = self._before or (q, v, T_s)
+        x_dot = J @ v
+        if self._x_dot is None:
+            past = Configuration(self.robot, self._elsewhere, q_before, v_before)
+            self._x_dot = form.jacobian(past)[0] @ v_before
+        x_ddot, self._x_dot = (x_dot - self._x_dot) / period, x_dot
+        drift = (ahead - behind) @ v / (2 * h)
+        displacement, velocity, acceleration = wanted(form, previews, N)
+        levels = []
+        for level in () if self._idle else form.levels:
+            rows = level.rows
+            levels.append(
+                LevelView(
+                    name=level.name,
+                    tasks=tuple(task.name for task in level.level.tasks),
+                    x={task.name: read_only(values[task.name]) for task in level.level.tasks},
+                    error=read_only(error[rows]),
+                    x_dot=read_only(x_dot[rows]),
+                    x_ddot=read_only(x_ddot[rows]),
+                    J=read_only(J[rows]),
+                    J_dot_q_dot=read_only(drift[rows]),
+                    displacement_d=read_only(displacement[:, rows]),
+                    x_dot_d=read_only(velocity[:, rows]),
+                    x_ddot_d=read_only(acceleration[:, rows]),
+                    K_p=read_only(form.model.K_p[rows]),
+                    K_v=read_only(form.model.K_v[rows]),
+                    Q=read_only(level.root_Q**2),
+                    R=read_only(level.R),
+                    jacobian=lambda at, rows=rows: self._jacobian_at(form, at)[rows],
+                )
+            )
+        return View(
+            q=read_only(q),
+            q_dot=read_only(v),
+            q_ddot=read_only((v - v_before) / period),
+            tau_0=read_only(self._tau_0),
+            T_s=T_s,
+            N=N,
+            M_bar=self._M_bar,
+            levels=tuple(levels),
+            bounds=self._bounds(q),
+            nominal=self._nominal,
+        )
+
+    def _jacobian_at(self, form: StackForm, q: Array) -> Array:
+        q = np.asarray(q, float).reshape(self.robot.n)
+        return form.jacobian(Configuration(self.robot, self._elsewhere, q, np.zeros_like(q)))[0]
+
+    def _bounds(self, q: Array) -> Bounds:
+        force, limits = self._limits, self._settings.limits
+        rate = limits.velocity_approach
+        lower, upper = -force.v_limit, force.v_limit
+        if limits.position == "viability":
+            reaction = self._settings.T_s + (REACTION / rate if rate else 0.0)
+            lower, upper = viability_bounds(q, *force.stops, force.v_limit, force.a_max, reaction)
+        return Bounds(
+            tau_lower=read_only(force.tau_lower),
+            tau_upper=read_only(force.tau_upper),
+            v_lower=read_only(lower),
+            v_upper=read_only(upper),
+            q_lower=read_only(force.q_lower),
+            q_upper=read_only(force.q_upper),
+            approach=rate,
+        )
+
+    # ---------------------------------------------------------------- what comes of its answer
+
+    def _opened(self, answers: Array) -> Array:
+        """After a change of settings the torque goes over to what the law now wants."""
+        share, T_s = self._share, self._settings.T_s
+        if share >= 1.0:
+            return answers
+        self._share = min(1.0, share * _FIRST_SHARE ** (-T_s / OPENING_SECONDS))
+        return self._tau_0 + share * (answers - self._tau_0)
+
+    def _plan(
+        self,
+        q: Array,
+        v: Array,
+        now: View,
+        answers: Array,
+        errors: dict[str, Array],
+        values: dict[str, Array],
+        started: int,
+    ) -> Plan:
+        tau_0, limits, M_bar = self._tau_0, self._limits, self._M_bar
+        tau = answers[-1]
+        step_us = (perf_counter_ns() - started) / 1e3
+
+        def evidence() -> Evidence:
+            increments = answers - tau_0
+            known = len(answers) == len(now.levels)  # else nobody can tell what each level alone wants
+            levels = []
+            for i, level in enumerate(now.levels):
+                U = increments[i] if known else increments[-1]
+                cost = next_cost(level, U / M_bar, now.T_s) + float(level.R * U @ U)
+                leak = leak_of(now.levels, list(increments / M_bar), i) if known else math.nan
+                levels.append(solution(level.name, U, cost, leak))
+            after = np.array((q, q + now.T_s * v))
+            return Evidence(tuple(levels), after, errors, values, no_rows(len(q)))
+
+        return Plan(tau, tau_0, limits, step_us, 0, evidence)
+
+    def _resting(
+        self,
+        q: Array,
+        moving: Array,
+        errors: dict[str, Array],
+        values: dict[str, Array],
+        started: int,
+        notice: str | None,
+    ) -> Plan:
+        """The plan of a tick without an answer. moving: the acceleration to be taken away, (n,)."""
+        limits: LimitsInForce = self._limits
+        tau = np.clip(self._tau_0 - self._M_bar * moving, limits.tau_lower, limits.tau_upper)
+        status = "the code failed" if self._failed else "state not finite"
+        level = solution(self._form.levels[0].name, tau - self._tau_0, math.nan, 0.0, status, "hold")
+        evidence = Evidence((level,), np.tile(q, (2, 1)), errors, values, no_rows(len(q)))
+        step_us = (perf_counter_ns() - started) / 1e3
+        plan = Plan(tau, self._tau_0, limits, step_us, 1, lambda: evidence, notice=notice)
+        self._tau_0 = tau
+        return plan
+
+
+def wanted(form: StackForm, previews: Mapping[str, Preview], N: int) -> tuple[Array, Array, Array]:
+    """x_d(k+j) − x_d(k), ẋ_d and ẍ_d of all rows at k … k+N, (N+1, m) each."""
+    found: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
+    for task, rows in zip(form.tasks, form.sizes, strict=True):
+        preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
+        for column, each in zip(found, preview[1:], strict=True):
+            column.append(each)
+    displacement, velocity, acceleration = (np.concatenate(column, axis=1) for column in found)
+    return displacement, velocity, acceleration

@@ -1,0 +1,136 @@
+"""What a controller of one's own is shown every tick, in the symbols of the HIMPC paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import NominalModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LevelView:
+    """One level of the hierarchy at this tick; m coordinates of all its tasks, one after the other.
+
+    Attributes:
+        name: the level's name; "damping" for the one that calms what no other level uses.
+        tasks: names of its tasks.
+        x: values of its tasks by name: coordinates (m,), or a rotation matrix (3, 3).
+        error: x̃ = x − x_d, (m,) m or rad; log₃(R R_dᵀ) for rotations.
+        x_dot: ẋ = J q̇, (m,).
+        x_ddot: ẍ, the backward difference of ẋ, (m,).
+        J: J_i of (3) at the measured q, (m, n).
+        J_dot_q_dot: J̇ q̇, (m,).
+        displacement_d: x_d(k+j) − x_d(k), j = 0 … N, (N+1, m).
+        x_dot_d, x_ddot_d: ẋ_d and ẍ_d at k … k+N, (N+1, m).
+        K_p, K_v: gains of (4), (m,).
+        Q: weight of the residual (28), (m,).
+        R: weight of the increments Δτ in (31), (n,).
+        jacobian: J at another configuration: (n,) → (m, n).
+    """
+
+    name: str
+    tasks: tuple[str, ...]
+    x: dict[str, Array]
+    error: Array
+    x_dot: Array
+    x_ddot: Array
+    J: Array
+    J_dot_q_dot: Array
+    displacement_d: Array
+    x_dot_d: Array
+    x_ddot_d: Array
+    K_p: Array
+    K_v: Array
+    Q: Array
+    R: Array
+    jacobian: Callable[[Array], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """The bounds of this tick; infinite where nothing is imposed.
+
+    Attributes:
+        tau_lower, tau_upper: (n,) N·m.
+        v_lower, v_upper: on the next velocity, (n,) rad/s; where position limits are imposed by viability,
+            also the velocity from which a joint can still stop before its end.
+        q_lower, q_upper: (n,) rad.
+        approach: 1/s, how fast a velocity bound may be approached, as a share of what is left; 0: at once.
+    """
+
+    tau_lower: Array
+    tau_upper: Array
+    v_lower: Array
+    v_upper: Array
+    q_lower: Array
+    q_upper: Array
+    approach: float
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Everything a controller sees at tick k. Arrays are read-only.
+
+    Attributes:
+        q, q_dot: measured, (n,) rad and rad/s.
+        q_ddot: the backward difference of q̇, (n,).
+        tau_0: the torque that acted during the last period, (n,) N·m.
+        T_s: control period, s.
+        N: horizon, knots.
+        M_bar: diagonal of M̄, (n,) kg·m².
+        levels: highest priority first.
+        bounds: what must not be exceeded.
+        nominal: the dynamic model a model-based controller believes in.
+    """
+
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+    tau_0: Array
+    T_s: float
+    N: int
+    M_bar: Array
+    levels: tuple[LevelView, ...]
+    bounds: Bounds
+    nominal: NominalModel
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.q.size
+
+    @cached_property
+    def M(self) -> Array:
+        """Nominal inertia matrix at q, (n, n) kg·m²."""
+        return read_only(self.nominal.mass_matrix(self.q))
+
+    @cached_property
+    def bias(self) -> Array:
+        """Nominal C q̇ + g + friction, the torque that keeps q̈ = 0, (n,) N·m."""
+        return read_only(self.nominal.bias(self.q, self.q_dot))
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Nominal g(q), (n,) N·m."""
+        return read_only(self.nominal.bias(self.q, np.zeros(self.n)))
+
+    def level(self, name: str) -> LevelView:
+        """A level by its name. Raises KeyError, naming the levels there are."""
+        for level in self.levels:
+            if level.name == name:
+                return level
+        raise KeyError(f"no level '{name}' is on: there are {', '.join(each.name for each in self.levels)}")
+
+
+def read_only(values: Array) -> Array:
+    """The same numbers in an array of their own that nobody can write to."""
+    found = np.array(values, float)
+    found.flags.writeable = False
+    return found

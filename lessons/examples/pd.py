@@ -1,0 +1,18 @@
+"""PD with gravity compensation: every level pulls at its own coordinates, and nothing keeps them apart.
+
+    himpc-lab run planar3-hold --controller FILE.py
+
+`torque(now)` is called once per control period with everything that is measured and asked for, and returns a
+torque per joint, (n,) N·m. What `now` holds is listed in `himpc.controllers.view.View`.
+"""
+
+
+def torque(now):
+    tau = now.gravity.copy()
+    for level in now.levels:
+        # The acceleration that the target motion (4) of the HIMPC paper asks for.
+        acceleration = (
+            level.x_ddot_d[0] - level.K_v * (level.x_dot - level.x_dot_d[0]) - level.K_p * level.error
+        )
+        tau += now.M_bar * (level.J.T @ acceleration)
+    return tau

@@ -1,0 +1,1 @@
+"""What `himpc-lab new` writes: short files that already run."""

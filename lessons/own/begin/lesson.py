@@ -1,0 +1,54 @@
+"""A lesson of my own
+
+Does a heavier hand sag?
+
+Minutes: 5
+You need: nothing
+"""
+
+# The text above is the lesson's card: title, question, how long it takes, what one must know before.
+#
+#     himpc-lab --lesson FILE.py             opens it
+#     himpc-lab lessons --check FILE.py      runs every claim, and shows that it fails where it says so
+
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
+
+HAND = Signal("error/position", "mm")  # a field of a run's rows: himpc-lab run --npz FILE lists them
+
+LOAD = Step(
+    title="A load nobody told of",
+    # Markdown, with equations in $…$.
+    text=r"""
+    The hand carries 2 kg from the start, and the controller does not know. It estimates all forces from
+    what happened a millisecond ago: $\hat H = \tau_0 - \bar M \ddot q_0$.
+    """,
+    do="Change the load while the robot holds, and watch the hand.",
+    why="What no model says, the last millisecond does: the hand stays within a tenth of a millimetre.",
+    prediction=Choice(
+        "How far does the hand move, at most?",
+        (Option("less than 1 mm", high=1.0), Option("a few centimetres", low=1.0)),
+        Measure(HAND),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "The hand stays within 0.1 mm.",
+            Measure(HAND),
+            "at most",
+            0.1,
+            # A claim says where it is false: the check runs that, too.
+            fails_with=("controller=osf",),
+            because="OSF believes in its model, and the load is not in it",
+        ),
+    ),
+    set=("plant.payload_kg=2",),
+    duration=1.0,
+    controls=(Control("plant.payload_kg", "Load, kg", 0.0, 5.0),),
+    plots=(HAND,),
+)
+
+LESSON = Lesson(name="a-lesson-of-my-own", card=card_of(__doc__), scene="planar3-hold", steps=(LOAD,))

@@ -1,0 +1,43 @@
+"""A task: coordinates of the robot with their Jacobian. This one: how far the tip is from the robot's axis.
+
+    himpc-lab run FILE.py
+
+runs it on the iiwa, on a level of its own below the hand's position. Whether the Jacobian is that of the
+value is checked with finite differences before anything moves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from himpc.tasks import Task
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reach(Task):
+    """x = √(p_x² + p_y²), m, of a frame at p; the empty name is the robot's tip."""
+
+    frame: str = ""
+
+    def coordinates(self, robot):
+        """Names of the m coordinates."""
+        return ("reach",)
+
+    def value(self, configuration):
+        """x at the measured state, (m,)."""
+        p = configuration.placement(self.frame).translation
+        return np.array([np.hypot(p[0], p[1])])
+
+    def error(self, value, desired):
+        """x̃ = x − x_d, (m,)."""
+        return value - desired
+
+    def jacobian(self, configuration):
+        """∂x/∂q at every knot of the horizon, (N, m, n)."""
+        J = configuration.frame_jacobians(self.frame)[:, :3]  # ∂p/∂q, (N, 3, n)
+        p = configuration.placement(self.frame).translation
+        direction = np.array([p[0], p[1], 0.0]) / max(np.hypot(p[0], p[1]), 1e-6)
+        return (direction @ J)[:, None, :]
+
+
+TASK = Reach(name="reach", K_p=100.0, K_v=20.0)

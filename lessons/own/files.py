@@ -1,0 +1,106 @@
+"""A Python file of somebody's own: read, executed, and what is wrong with it in one sentence."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from robots import InputError
+from robots.errors import shortened
+
+SUFFIX = ".py"
+LARGEST = 1_000_000  # bytes
+
+
+def is_file(name: str) -> bool:
+    """Whether what stands where a name is expected is the path of a Python file."""
+    return name.endswith(SUFFIX)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file as it was read.
+
+    Attributes:
+        path: as it was given.
+        text: its content.
+    """
+
+    path: str
+    text: str
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the content: two files with the same one do the same."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @property
+    def module(self) -> str:
+        """The name under which Python knows it."""
+        place = hashlib.sha256(str(Path(self.path).absolute()).encode()).hexdigest()[:12]
+        return f"himpc_lab_own_{place}"
+
+
+def read(path: str) -> Source:
+    """The file. Raises InputError if there is none, or it is no text."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read(LARGEST + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "no such path"
+        raise InputError(
+            f"{shortened(path, 200)}: cannot be read ({reason}); give the path of a Python file, "
+            "or begin with himpc-lab new"
+        ) from None
+    if len(data) > LARGEST:
+        raise InputError(f"{path}: has more than {LARGEST // 1_000_000} MB; give the source of a program")
+    try:
+        return Source(path, data.decode())
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise InputError(f"{path}, line {line}: is no text in UTF-8; save it as UTF-8") from None
+
+
+def execute(source: Source) -> ModuleType:
+    """The module that the file defines. Raises InputError, with the line, if it cannot be executed."""
+    module = ModuleType(source.module)
+    module.__file__ = source.path
+    sys.modules[source.module] = module
+    try:
+        with _beside(source.path):
+            exec(compile(source.text, source.path, "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[source.module]
+        raise InputError(sentence(source.path, error)) from None
+    return module
+
+
+@contextmanager
+def _beside(path: str) -> Iterator[None]:
+    """A file may import what lies beside it, unless that is called as something installed."""
+    folder = str(Path(path).absolute().parent)
+    sys.path.append(folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+
+
+def sentence(path: str, error: BaseException) -> str:
+    """Where in the file an exception came from, and what it says."""
+    if isinstance(error, SyntaxError) and error.filename == path:
+        return f"{path}, line {error.lineno}: {error.msg}"
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
+    place = f"{path}, line {lines[-1]}" if lines else path
+    if isinstance(error, SystemExit):
+        return f"{place}: it ends the program (SystemExit): leave that out"
+    if isinstance(error, MemoryError):
+        return f"{place}: it needs more memory than there is"
+    said = shortened(" ".join(str(error).split()), 200)
+    return f"{place}: {said if isinstance(error, InputError) else f'{type(error).__name__}: {said}'}"

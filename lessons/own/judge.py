@@ -1,0 +1,43 @@
+"""A file is first loaded where it can do no harm: in a process of its own, with a deadline."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from types import ModuleType
+
+from lessons.own.files import Source, execute
+from lessons.own.kinds import Kind, kind_of
+from robots import InputError
+from robots.isolation import Allowance, Fault, isolated
+
+
+def judged(source: Source) -> Kind:
+    """What the file is. Raises InputError, one sentence, for one that cannot be loaded within the limits."""
+    return _judged(source)
+
+
+LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
+"""What a file may cost before it is known to be harmless."""
+
+
+@lru_cache(maxsize=64)
+def _judged(source: Source) -> Kind:
+    try:
+        return isolated(_kind, source, within=LOADING)
+    except Fault as fault:
+        raise InputError(f"{source.path}: {fault}") from None
+
+
+def _kind(source: Source) -> Kind:
+    return kind_of(execute(source))
+
+
+def loaded(source: Source) -> ModuleType:
+    """The module of a file that was judged. Raises InputError like `judged`."""
+    judged(source)
+    return _loaded(source)
+
+
+@lru_cache(maxsize=64)
+def _loaded(source: Source) -> ModuleType:
+    return execute(source)

@@ -1,0 +1,69 @@
+"""What a file of one's own defines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any, Literal, get_args
+
+from robots import InputError
+
+Kind = Literal["controller", "scene", "task", "lesson"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+_DEFINES: dict[Kind, str] = {
+    "controller": "a function torque(now) or a class Controller with a method torque(self, now)",
+    "scene": "SCENE, or a function scene() that returns one",
+    "task": "TASK",
+    "lesson": "LESSON",
+}
+
+
+def kind_of(module: ModuleType) -> Kind:
+    """Which of the four a file is. Raises InputError if it defines none of them, or several."""
+    path, names = module.__file__, vars(module)
+    defined: dict[Kind, bool] = {
+        "controller": "torque" in names or "Controller" in names,
+        "scene": "SCENE" in names or callable(names.get("scene")),
+        "task": "TASK" in names,
+        "lesson": "LESSON" in names,
+    }
+    found: list[Kind] = [kind for kind in KINDS if defined[kind]]
+    if not found:
+        raise InputError(
+            f"{path}: defines neither a controller nor a scene, task or lesson: "
+            + "; ".join(f"a {kind} is {what}" for kind, what in _DEFINES.items())
+        )
+    if len(found) > 1:
+        raise InputError(f"{path}: defines a {' and a '.join(found)}: put each into a file of its own")
+    return found[0]
+
+
+def expected(module: ModuleType, kind: Kind) -> None:
+    """Raises InputError if a file is something else."""
+    found = kind_of(module)
+    if found != kind:
+        raise InputError(f"{module.__file__}: is a {found}, and a {kind} is needed: {_DEFINES[kind]}")
+
+
+def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
+    """What makes a fresh law of a controller's file. Raises InputError if there is none."""
+    expected(module, "controller")
+    names = vars(module)
+    if "Controller" in names:
+        made = names["Controller"]
+        if not isinstance(made, type) or not callable(getattr(made, "torque", None)):
+            raise InputError(f"{module.__file__}: Controller must be a class with a method torque(self, now)")
+        return lambda: made().torque
+    law = names["torque"]
+    if not callable(law):
+        raise InputError(f"{module.__file__}: torque must be a function torque(now) that returns the torque")
+    return lambda: law
+
+
+def line_of(module: ModuleType) -> int:
+    """Where a controller's file begins to compute the torque."""
+    made = vars(module).get("Controller")
+    law = vars(module).get("torque") if made is None else getattr(made, "torque", None)
+    code = getattr(law, "__code__", None)
+    return 1 if code is None else code.co_firstlineno

@@ -1,0 +1,73 @@
+"""A file to begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from lessons.course import COURSE
+from lessons.own.files import is_file
+from lessons.own.kinds import Kind
+from lessons.scenes.names import ALL_SCENES
+from robots import InputError
+from robots.errors import unknown_name
+
+EXAMPLES: tuple[str, ...] = ("pd", "osf", "one_level_qp", "himpc_one_page")
+"""Controllers there are to begin with."""
+
+
+def choices(kind: Kind) -> Sequence[str]:
+    """What a new file of a kind may begin with; nothing: there is one beginning."""
+    return {"controller": EXAMPLES, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": ()}[kind]
+
+
+def text_of(kind: Kind, start: str | None, file: str) -> str:
+    """The text of a new file. Raises InputError for a beginning there is not."""
+    known = choices(kind)
+    if start is not None and start not in known:
+        raise unknown_name(f"{kind} to begin with called", start, known)
+    if kind == "controller":
+        text = _read("lessons.examples", start or EXAMPLES[0])
+    elif kind == "lesson" and start is not None:
+        text = _read("lessons.course", start.replace("-", "_"))
+    elif kind == "scene" and start is not None:
+        text = _SCENE.format(scene=start)
+    else:
+        text = _read("lessons.own.begin", kind)
+    return text.replace("FILE.py", file)
+
+
+def write_new(kind: Kind, path: str, start: str | None = None) -> None:
+    """Writes a new file. Raises InputError if there is one already, or it cannot be written."""
+    if not is_file(path):
+        raise InputError(f"{path}: give a name that ends with .py, e.g. my_{kind}.py")
+    text = text_of(kind, start, path)
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(f"{path} is there already: give another name, or remove it first") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}): give another place") from None
+
+
+def _read(package: str, name: str) -> str:
+    return Path(str(files(package) / f"{name}.py")).read_text(encoding="utf-8")
+
+
+_SCENE = '''"""The scene {scene}, to be changed.
+
+    himpc-lab run FILE.py
+    himpc-lab --scene FILE.py
+"""
+
+from dataclasses import replace
+
+from lessons.headless import load_scene
+
+START = load_scene("{scene}")
+
+# Everything a scene has may be replaced: settings (any path of himpc-lab run --set), q_0, events, duration, …
+SCENE = replace(START, title="{scene}, changed", settings=START.settings.changed("horizon", 10))
+'''

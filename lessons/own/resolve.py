@@ -1,0 +1,148 @@
+"""Scenes, lessons and tasks by name or, where whoever started the program said so, by the path of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from himpc.configuration import Configuration
+from himpc.stack import Level
+from himpc.tasks import Task
+from lessons.own.files import Source, execute, is_file, read, sentence
+from lessons.own.judge import judged
+from lessons.own.kinds import expected, kind_of
+from lessons.scenes.catalog import load_scene
+from lessons.scenes.scene import Scene
+from lessons.scenes.torque_scene import TorqueScene
+from robots import InputError, Robot
+
+if TYPE_CHECKING:
+    from lessons.teaching.lesson import Lesson
+
+TASK_SCENE = "iiwa14-hold"
+"""Where a task of one's own is tried if no scene is named."""
+
+
+def scene_named(
+    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
+) -> Scene:
+    """A scene by its name, or the scene or task of a file; arguments as of `load_scene`.
+
+    Raises:
+        InputError: as `load_scene`; or the file cannot be used, with its line.
+    """
+    if not is_file(name):
+        return load_scene(name, urdf, tip, urdf_text)
+    if (urdf, tip, urdf_text) != (None, None, None):
+        raise InputError(f"{name} brings its own robot: leave out --urdf and --tip")
+    source = read(name)
+    module = module_of(source)
+    if kind_of(module) == "task":
+        return with_task(load_scene(TASK_SCENE), name)
+    expected(module, "scene")
+    given = vars(module).get("SCENE")
+    found = _called(source, vars(module)["scene"]) if given is None else given
+    if not isinstance(found, Scene):
+        raise InputError(
+            f"{name}: its scene is a {type(found).__name__}: make it with TorqueScene or VelocityScene, "
+            "or change one of lessons.headless.load_scene"
+        )
+    return replace(found, name=name)
+
+
+def lesson_named(name: str) -> Lesson:
+    """A lesson by its name or file. Raises InputError if there is none, or the file cannot be used."""
+    from lessons.course import load_lesson
+    from lessons.teaching.lesson import Lesson
+
+    if not is_file(name):
+        return load_lesson(name)
+    module = module_of(read(name))
+    expected(module, "lesson")
+    found = vars(module)["LESSON"]
+    if not isinstance(found, Lesson):
+        raise InputError(f"{name}: LESSON is a {type(found).__name__}: make it with Lesson(…)")
+    return replace(found, name=name)
+
+
+def task_in(name: str) -> Task:
+    """The task of a file. Raises InputError if the file cannot be used."""
+    module = module_of(read(name))
+    expected(module, "task")
+    found = vars(module)["TASK"]
+    if not isinstance(found, Task):
+        raise InputError(f"{name}: TASK is a {type(found).__name__}: make it with a subclass of Task")
+    return found
+
+
+def with_task(scene: Scene, name: str) -> Scene:
+    """A scene with the task of a file as a level of its own, below the first one.
+
+    Raises:
+        InputError: the file cannot be used, the scene takes velocities, or the Jacobian is not the task's.
+    """
+    if not isinstance(scene, TorqueScene):
+        raise InputError(f"scene '{scene.name}' takes velocities: a task of your own needs torques")
+    source, task = read(name), task_in(name)
+    _called(source, lambda: check_task(task, scene.robot, name))
+    first, *others = scene.settings.levels
+    levels = (first, Level((task,)), *others)
+    return replace(scene, settings=replace(scene.settings, levels=levels))
+
+
+def check_task(task: Task, robot: Robot, name: str) -> None:
+    """Raises InputError if value, error, Jacobian and coordinates of a task do not fit together."""
+    rng = np.random.default_rng(0)
+    data, h, m = robot.model.createData(), 1e-6, len(task.coordinates(robot))
+    low, high = np.maximum(robot.q_lower, -1.5), np.minimum(robot.q_upper, 1.5)
+
+    def value(q: Any) -> Any:
+        return np.array(task.value(Configuration(robot, data, q, np.zeros(robot.n))))
+
+    for _ in range(3):
+        q = rng.uniform(low, high)
+        J = task.jacobian(Configuration(robot, data, q, np.zeros(robot.n)))
+        if np.shape(J) != (1, m, robot.n):
+            raise InputError(
+                f"{name}: the Jacobian of task '{task.name}' has shape {np.shape(J)} and must have "
+                f"(N, {m}, {robot.n}): one matrix per knot, a row per coordinate, a column per joint"
+            )
+        here = value(q)
+        for joint in range(robot.n):
+            step = h * np.eye(robot.n)[joint]
+            moved = np.asarray(task.error(value(q + step), here)) - task.error(value(q - step), here)
+            if moved.shape != (m,):
+                raise InputError(
+                    f"{name}: the error of task '{task.name}' has shape {moved.shape}: it needs ({m},)"
+                )
+            miss = float(np.abs(moved / (2 * h) - J[0][:, joint]).max())
+            if not miss < 1e-4:
+                raise InputError(
+                    f"{name}: the Jacobian of task '{task.name}' is not that of its value: for joint "
+                    f"{robot.joint_names[joint]} it is off by {miss:.2g}"
+                )
+
+
+def module_of(source: Source) -> ModuleType:
+    """The module of a file, loaded once per content. Raises InputError, with the line."""
+    judged(source)
+    return _module_of(source)
+
+
+@lru_cache(maxsize=64)
+def _module_of(source: Source) -> ModuleType:
+    return execute(source)
+
+
+def _called(source: Source, function: Callable[[], Any]) -> Any:
+    try:
+        return function()
+    except (Exception, SystemExit) as error:
+        if isinstance(error, InputError) and str(error).startswith(source.path):
+            raise
+        raise InputError(sentence(source.path, error)) from None

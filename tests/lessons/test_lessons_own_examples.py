@@ -1,0 +1,68 @@
+"""The controllers that are shipped as examples: they are the lab's own, to a millionth of a N·m."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lessons.examples
+from lessons.events import MoveTarget, Push
+from lessons.own.controllers import controller_of
+from lessons.recording.run import run
+from lessons.scenes.catalog import load_scene, prepared, torque_scene
+from lessons.session.torque import TorqueSession
+
+FOLDER = Path(next(iter(lessons.examples.__path__)))
+
+
+def beside(session: TorqueSession, name: str, ticks: int) -> float:
+    """The largest difference in torque, N·m, between a session's controller and an example that is shown the
+    same states."""
+    settings = prepared(session.scene, str(FOLDER / f"{name}.py"), ()).settings
+    example = controller_of(settings, session.robot)
+    example.reset(session.plant.tau)
+    worst = 0.0
+    for _ in range(ticks):
+        session.drain()
+        state, T_s, N = session.plant.measure(session.settings.T_s), settings.T_s, settings.horizon
+        previews = {
+            task: reference.preview(session.t, T_s, N) for task, reference in session.references.items()
+        }
+        answer = example.step(state.q, state.v, previews, session.plant.tau)
+        assert answer.notice is None
+        session.tick()
+        assert session.plan is not None
+        worst = max(worst, float(np.abs(answer.tau - session.plan.tau).max()))
+    return worst
+
+
+@pytest.mark.parametrize(
+    ("scene", "ticks"), [("planar3-conflict", 2500), ("iiwa14-circle", 1000), ("iiwa14-hold", 1000)]
+)
+def test_own_himpc_on_one_page_agrees_with_the_lab(scene: str, ticks: int) -> None:
+    """With bounds that bind, a target that jumps and a push."""
+    session = TorqueSession(torque_scene(scene))
+    if scene == "iiwa14-hold":
+        position = session.references["position"].preview(0.0, 1e-3, 1).value
+        session.post(MoveTarget("position", tuple(position + np.array([0.2, -0.2, -0.1]))))
+        session.post(Push("iiwa_link_5", (20.0, 5.0, 0.0)))
+    assert beside(session, "himpc_one_page", ticks) < 1e-6
+
+
+def test_own_himpc_is_one_page() -> None:
+    assert len((FOLDER / "himpc_one_page.py").read_text().splitlines()) < 150
+
+
+@pytest.mark.parametrize(
+    ("name", "set"), [("osf", ("controller=osf",)), ("one_level_qp", ("controller=weighted", "horizon=1"))]
+)
+def test_own_example_is_what_the_lab_has(name: str, set: tuple[str, ...]) -> None:
+    session = TorqueSession(prepared(torque_scene("planar3-circle"), None, set))
+    assert beside(session, name, 1000) < 1e-6
+
+
+def test_own_pd_holds_an_arm() -> None:
+    recording = run(prepared(load_scene("planar3-hold"), str(FOLDER / "pd.py"), ()), 2.0)
+    assert np.abs(recording["error/position"][-1]).max() < 0.02
