@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
 from himpc.catalog import CONTROLLERS, Route
@@ -30,8 +31,8 @@ from lessons.settings.settings import (
 )
 from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.settings.values import WORD, Form, form_of
-from robots import NominalSettings, PlantSettings, Robot
-from robots.errors import unknown_name
+from robots import InputError, NominalSettings, PlantSettings, Robot
+from robots.errors import shortened, unknown_name
 from robots.ranges import Range, check_fields, field_types
 
 
@@ -96,8 +97,7 @@ class TorqueSettings(Settings):
     def for_controller(self) -> ControllerSettings:
         """The controller's part. Raises InputError for values that cannot be."""
         if self.controller not in self.controllers:
-            hint = "a file of your own is given as --controller FILE.py" if is_file(self.controller) else ""
-            raise unknown_name("controller", self.controller, self.controllers, hint)
+            raise unknown_name("controller", self.controller, self.controllers)
         check_fields(self)
         return ControllerSettings(
             stack=self.levels,
@@ -142,7 +142,8 @@ class TorqueSettings(Settings):
         if self.options is not None:
             options = field_places(self.options, _part("options"), _with("options"))
         parts = [field_places(getattr(self, part), _part(part), _with(part), f"{part}.") for part in _PARTS]
-        own["controller"] = replace(own["controller"], form=Form(WORD, words=tuple(CONTROLLERS)))
+        form = Form(WORD, words=tuple(self.controllers))
+        own["controller"] = replace(own["controller"], form=form, own_fit=partial(_known, form))
         fit = own["route"].fit
         own["route"] = replace(own["route"], own_fit=lambda path, value: fit(path, _now(value)))
         return {
@@ -178,6 +179,15 @@ _PARTS = ("limits", "nominal", "plant")
 def _now(route: Any) -> Any:
     """Codes and scripts of earlier versions may name a route that another one took the place of."""
     return "compiled" if route == "structured" else route
+
+
+def _known(form: Form, path: str, name: Any) -> Any:
+    if isinstance(name, str) and is_file(name) and name not in form.words:
+        raise InputError(
+            f"{path} is {shortened(name, 100)}: a file of your own is named when himpc-lab is started, by "
+            "--controller FILE.py"
+        )
+    return form.fit(path, name)
 
 
 def _checked(settings: TorqueSettings) -> TorqueSettings:

@@ -108,7 +108,7 @@ class VelocitySettings(Settings):
             "controller": replace(
                 own["controller"],
                 write=_with_controller,
-                form=Form(WORD, words=tuple(VELOCITY_CONTROLLERS)),
+                form=Form(WORD, words=tuple(self.controllers)),
             ),
             **field_places(options, lambda s: s.options, lambda s, new: replace(s, options=new)),
             **field_places(htmpc, _htmpc, _with_htmpc, without=("stack", "limits", "obstacles", "delay_s")),
