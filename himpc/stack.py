@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
 from himpc.tasks import Damping, Task
+from himpc.tasks.axes import AXES, OnAxes
 from robots import InputError, Robot
 from robots.ranges import Range, check_fields
 
@@ -60,6 +61,17 @@ def check_names(stack: Stack) -> None:
         raise InputError(f"task name {json.dumps(min(twice))} stands twice in the stack: rename one of them")
 
 
+def essence(task: Task) -> Task:
+    """The task without its gains: what it is about."""
+    return replace(task, K_p=0.0, K_v=0.0)
+
+
+def about(task: Task) -> Task:
+    """The essence without name and axes: tasks that are equal in this want the same of the same thing."""
+    task = replace(task, name="", K_p=0.0, K_v=0.0)
+    return replace(task, axes=AXES) if isinstance(task, OnAxes) else task
+
+
 def active_levels(stack: Stack, damping: bool, freedom: int) -> Stack:
     """The levels a controller solves, highest priority first.
 
@@ -73,6 +85,29 @@ def active_levels(stack: Stack, damping: bool, freedom: int) -> Stack:
 
 
 DAMPING_LEVEL = Level((Damping(name="damping"),), Q=200.0, R=10.0)
+
+
+def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, int]]:
+    """Per enabled level how many directions it gets at this configuration, and how many rows it has.
+
+    A level gets what its Jacobian adds to the rank of those above; if that is less than its rows, it asks for
+    more than they, or the arm itself, leave it.
+    """
+    found: dict[str, tuple[int, int]] = {}
+    J, before = np.zeros((0, configuration.q.size)), 0
+    for level in stack:
+        if not level.enabled:
+            continue
+        rows = [task.jacobian(configuration)[0] for task in level.tasks]
+        J = np.vstack([J, *rows])
+        rank = int(np.linalg.matrix_rank(J, tol=_RANK)) if np.isfinite(J).all() else before
+        found[level.name] = (rank - before, sum(map(len, rows)))
+        before = rank
+    return found
+
+
+_RANK = 1e-6
+"""Singular values of a stacked Jacobian below this count as zero."""
 
 
 def freedom_left(robot: Robot, stack: Stack) -> int:
@@ -91,5 +126,5 @@ def freedom_left(robot: Robot, stack: Stack) -> int:
     for _ in range(5):
         configuration = Configuration(robot, data, rng.uniform(low, high), np.zeros(robot.n))
         rows = np.vstack([task.jacobian(configuration)[0] for task in tasks])
-        rank = max(rank, int(np.linalg.matrix_rank(rows, tol=1e-6)))
+        rank = max(rank, int(np.linalg.matrix_rank(rows, tol=_RANK)))
     return robot.n - rank

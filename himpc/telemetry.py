@@ -28,6 +28,7 @@ __all__ = [
     "TaskInfo",
     "arranged",
     "layout_of",
+    "relaid",
     "write_plan",
 ]
 
@@ -143,6 +144,16 @@ def arranged(
         for name in per_level:
             add(f"{name}/{level}", 1)
     return Layout(size, fields, tuple(tasks), levels, robot.joint_names)
+
+
+def relaid(rows: Array, old: Layout, new: Layout) -> Array:
+    """Rows, (k, size), as another layout has them; NaN where they have nothing of that name and width."""
+    found = np.full((len(rows), new.size), math.nan)
+    for name, where in new.fields.items():
+        before = old.fields.get(name)
+        if before is not None and before.stop - before.start == where.stop - where.start:
+            found[:, where] = rows[:, before]
+    return found
 
 
 def write_plan(row: Array, layout: Layout, plan: Plan) -> None:

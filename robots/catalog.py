@@ -64,6 +64,30 @@ CATALOG: dict[str, CatalogEntry] = {
             M_bar=(0.0275, 0.3, 0.0138, 0.0764, 0.0089, 0.0173, 0.0036),  # suggest_M_bar, two or three digits
         ),
         CatalogEntry(
+            name="baxter",
+            title="Rethink Robotics Baxter, two arms of seven joints on a fixed pedestal",
+            tip="right_gripper",
+            # Both grippers point down, 0.37 m apart, in front of the chest.
+            home_deg=(
+                -5.0,
+                -57.0,
+                -68.0,
+                111.0,
+                38.0,
+                59.0,
+                -29.0,
+                5.0,
+                -57.0,
+                68.0,
+                111.0,
+                -38.0,
+                59.0,
+                29.0,
+            ),
+            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # ours: what its torques are good for
+            M_bar=(0.046, 0.46, 0.0144, 0.0736, 0.0046, 0.0127, 0.0004) * 2,  # suggest_M_bar
+        ),
+        CatalogEntry(
             name="ridgeback-ur10",
             title="Clearpath Ridgeback with a UR10, nine joints (HTMPC paper, section V)",
             tip="tool",

@@ -116,6 +116,7 @@ def _show(result: dict[str, Any]) -> None:
         ),
         "QPs": f"{solver['solves']} ({solver['backend']}, {solver['route']}), unsolved {solver['unsolved']}, "
         f"fallbacks {fallbacks}, largest KKT residual {_figure(solver['max_kkt_residual'])}",
+        **_ranks(result),
         "leak into higher levels": _leak(result),
         **_mission(result),
         "control step": f"median {step['median']:.2f} ms, p99 {step['p99']:.2f} ms",
@@ -124,6 +125,15 @@ def _show(result: dict[str, Any]) -> None:
     width = max(map(len, pairs))
     for name, value in pairs.items():
         print(f"{name:{width}}  {value}")
+
+
+def _ranks(result: dict[str, Any]) -> dict[str, str]:
+    """Which level gets what, where the stack asks for more than the robot has."""
+    levels = result.get("levels", ())
+    if all(level["rank"] == level["rows"] for level in levels):
+        return {}
+    found = ", ".join(f"{level['name']} {level['rank']} of {level['rows']}" for level in levels)
+    return {"directions that a level gets": found}
 
 
 def _leak(result: dict[str, Any]) -> str:

@@ -36,6 +36,7 @@ class LevelForm:
         R: (n,), in the weight's unit.
         common_R: R if it is the same for all joints, else None.
         knots: the level's own horizon K ≤ N.
+        sizes: number of rows of each of its tasks.
     """
 
     level: Level
@@ -47,17 +48,19 @@ class LevelForm:
     R: Array
     common_R: float | None
     knots: int
+    sizes: tuple[int, ...]
 
-    def problem(self, B: Array, free: Array, weighted_free: Array, share: float) -> LevelProblem:
-        """The level's QP data; `share` of its √Q counts while it fades in."""
+    def problem(self, B: Array, free: Array, weighted_free: Array, share: float | Array) -> LevelProblem:
+        """The level's QP data; `share` of its √Q, one number or one per row, counts while it fades in."""
         rows, root_Q, weighted_C, weighted = (
             self.rows,
             self.root_Q,
             self.weighted_C,
             weighted_free[:, self.rows],
         )
-        if share < 1.0:
-            root_Q, weighted_C, weighted = share * root_Q, share * weighted_C, share * weighted
+        if np.any(np.less(share, 1.0)):
+            by_row = np.broadcast_to(share, root_Q.shape)
+            root_Q, weighted_C, weighted = by_row * root_Q, by_row[:, None] * weighted_C, by_row * weighted
         return LevelProblem(
             self.name,
             B[:, rows],
@@ -179,6 +182,7 @@ def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> Sta
                 R=R,
                 common_R=float(R[0]) if (R[0] == R).all() else None,
                 knots=K,
+                sizes=tuple(len(gain) for gain in K_p[first:]),
             )
         )
         start += m

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
-from himpc.controllers.forms import StackForm, measure, prepare, stack_form, usable
+from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, stack_form, usable
 from himpc.controllers.memory import Memory
 from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, Rows, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
-from himpc.stack import DAMPING_LEVEL
+from himpc.stack import DAMPING_LEVEL, about
 from himpc.tick.problems import increments_of
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 ENABLE_SECONDS = 0.5
 _FAINTEST = 1e-8
-"""A level switched on starts with this share of its Q and gains decades at a constant rate."""
+"""A task switched on starts with this share of its Q and gains decades at a constant rate."""
 
 
 class Tick(NamedTuple):
@@ -95,15 +95,17 @@ class HIMPC:
 
     def configure(self, settings: Settings) -> None:
         """Takes new settings at once. If they do not fit the robot: InputError, and nothing changes."""
-        before = {form.name for form in self._form.levels}
+        before = [about(task) for task in self._form.tasks]
         if self.kernel is not None:
             self._memory = self.kernel.memory
         self._apply(settings)
         if self.kernel is not None and self._memory is not None:
             self.kernel.recall(self._memory, self._memory.q, self._memory.v)
+        self._weight = {name: weight for name, weight in self._weight.items() if weight < 1.0}
         for form in self._form.levels:
-            if form.name not in before and form.level is not DAMPING_LEVEL:
-                self._weight[form.name] = 0.0
+            for task in form.level.tasks:
+                if form.level is not DAMPING_LEVEL and about(task) not in before:
+                    self._weight[task.name] = 0.0
 
     def _apply(self, settings: Settings) -> None:
         self._form, self._idle, self._off = prepare(self.robot, settings)
@@ -182,7 +184,7 @@ class HIMPC:
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, self._settings.T_s)
         if self._weight:
             for place, level in enumerate(self._form.levels):
-                tick.fade(place, self._faded(level.name))
+                tick.fade(place, self._faded(level))
 
         def damped(torque: Rows) -> Array | None:
             form = stack_form(self.robot, (DAMPING_LEVEL,), self._settings)
@@ -253,11 +255,18 @@ class HIMPC:
             return None, x_dot
         B = J / self._M_bar
         weighted = form.root_Q * free
-        problems = [level.problem(B, free, weighted, self._faded(level.name)) for level in form.levels]
+        problems = [level.problem(B, free, weighted, self._faded(level)) for level in form.levels]
         return problems, x_dot
 
-    def _faded(self, name: str) -> float:
-        """√ of the share of Q that a level has; a level switched on fades in over ENABLE_SECONDS."""
+    def _faded(self, level: LevelForm) -> float | Array:
+        """√ of the share of Q that a level has, one per row where its tasks differ; a task that was not there
+        or not on fades in over ENABLE_SECONDS."""
+        tasks = level.level.tasks
+        if all(self._weight.get(task.name, 1.0) >= 1.0 for task in tasks):
+            return 1.0
+        return np.repeat([self._share(task.name) for task in tasks], level.sizes)
+
+    def _share(self, name: str) -> float:
         weight = self._weight.get(name, 1.0)
         if weight >= 1.0:
             return 1.0

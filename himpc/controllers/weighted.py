@@ -57,9 +57,9 @@ class Weighted(HIMPC):
                 tick.fade(place, math.sqrt(DAMPING_SHARE))
         return tick
 
-    def _faded(self, name: str) -> float:
-        share = super()._faded(name)
-        compiled = self.kernel is not None and name == DAMPING_LEVEL.name
+    def _faded(self, level: LevelForm) -> float | Array:
+        share = super()._faded(level)
+        compiled = self.kernel is not None and level.name == DAMPING_LEVEL.name
         return math.sqrt(DAMPING_SHARE) * share if compiled else share
 
     def _cascade(

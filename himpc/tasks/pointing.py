@@ -9,7 +9,7 @@ import numpy as np
 
 from himpc.references.preview import Preview
 from himpc.tasks.axes import AXES
-from himpc.tasks.task import Array, Task
+from himpc.tasks.task import Array, Gain, Task
 from robots.errors import unknown_name
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ class Pointing(Task):
 
     frame: str = ""
     axis: str = "z"
-    K_p: float | tuple[float, ...] = 50.0
-    K_v: float | tuple[float, ...] = 5.0
+    K_p: Gain = 50.0
+    K_v: Gain = 5.0
 
     unit: ClassVar[Literal["m", "rad"]] = "rad"
 

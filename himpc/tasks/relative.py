@@ -9,7 +9,7 @@ import numpy as np
 
 from himpc.rotation import log3
 from himpc.tasks.axes import OnAxes
-from himpc.tasks.task import Array
+from himpc.tasks.task import Array, Gain
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
@@ -73,8 +73,8 @@ class RelativeOrientation(RelativeTask):
     The value is the rotation matrix R (3, 3); the error is in radians along the chosen axes.
     """
 
-    K_p: float | tuple[float, ...] = 50.0
-    K_v: float | tuple[float, ...] = 5.0
+    K_p: Gain = 50.0
+    K_v: Gain = 5.0
 
     unit: ClassVar[Literal["m", "rad"]] = "rad"
 

@@ -60,7 +60,7 @@ class CompiledTick:
             self._kinds = ("torque", "velocity", "position")
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
-        self._shares = [1.0] * len(form.levels)
+        self._shares: list[float | Array] = [1.0] * len(form.levels)
         self._started = self._looked = False
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
@@ -104,12 +104,13 @@ class CompiledTick:
             {level.name: level for level in levels},
         )
 
-    def fade(self, place: int, share: float) -> None:
-        """Lets `share` of a level's √Q count."""
-        if share != self._shares[place]:
+    def fade(self, place: int, share: float | Array) -> None:
+        """Lets `share` of a level's √Q count, one number or one per row."""
+        if not np.array_equal(share, self._shares[place]):
             level = self._form.levels[place]
             self._shares[place] = share
-            write_effects(self.arena, level.rows, share * level.root_Q, share * level.weighted_C)
+            by_row = np.broadcast_to(share, level.root_Q.shape)
+            write_effects(self.arena, level.rows, by_row * level.root_Q, by_row[:, None] * level.weighted_C)
 
     def problems(self) -> list[LevelProblem]:
         """The data of every level at the last tick, copied; none before the first one."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import perf_counter
 
+import numpy as np
+
+from himpc.telemetry import relaid
 from lessons.recording.recording import Recording
 from lessons.scenes.scene import Scene
 from lessons.session.start import begin
@@ -37,9 +40,14 @@ def run(
     seconds = checked_duration(scene.duration if duration is None else duration)
     session = begin(scene, seed)
     rows, elapsed, started = [], 0.0, perf_counter()
+    layout = session.layout
     # Half a period's tolerance: a sum of periods carries rounding.
     while not rows or elapsed < seconds - 0.5 * session.settings.T_s:
-        rows.append(session.tick().copy())
+        row = session.tick().copy()
+        if session.layout is not layout:  # an event changed the stack
+            before = np.array(rows).reshape(len(rows), layout.size)
+            rows, layout = list(relaid(before, layout, session.layout)), session.layout
+        rows.append(row)
         elapsed += session.settings.T_s
         if session.failure is not None:
             raise InputError(session.failure)

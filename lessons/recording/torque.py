@@ -23,6 +23,7 @@ def block(recording: Recording) -> dict[str, Any]:
     iterations = recording["iterations"]
     return {
         "tasks": [task_figures(recording, task, place[task.level]) for task in tasks],
+        "levels": _levels(recording),
         "average_cost": [_average_cost(recording, level.name) for level in settings.levels if level.enabled],
         "limits": _limits(recording),
         "solver": {
@@ -35,6 +36,12 @@ def block(recording: Recording) -> dict[str, Any]:
         "bound_active_share": float((recording["at_bound"] > 0).any(axis=1).mean()),
         "late_ticks": int(recording["late"].sum()),
     }
+
+
+def _levels(recording: Recording) -> list[dict[str, Any]]:
+    """Per enabled level its rows, and how many directions it gets where the robot ended."""
+    found = recording.session.ranks()
+    return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
 
 
 def _average_cost(recording: Recording, level: str) -> float:

@@ -17,6 +17,7 @@ from lessons.scenes.planar import planar3_circle, planar3_conflict, planar3_sing
 from lessons.scenes.plane import planar3_plane
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.two_arms import baxter_conflict, baxter_hold, baxter_tray
 from lessons.settings.assignments import with_assignments
 from lessons.settings.settings import Settings
 from lessons.settings.torque import TorqueSettings
@@ -32,6 +33,9 @@ _MAKERS: dict[str, Callable[[], TorqueScene]] = {
     "planar3-hold": lambda: hold_of("planar3"),
     "ridgeback-ur10-hold": ridgeback_hold,
     "planar3-plane": planar3_plane,
+    "baxter-hold": baxter_hold,
+    "baxter-tray": baxter_tray,
+    "baxter-conflict": baxter_conflict,
     "planar3-circle": planar3_circle,
     "planar3-conflict": planar3_conflict,
     "planar3-singular": planar3_singular,

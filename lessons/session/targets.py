@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Reference, Target
 from himpc.rotation import from_quaternion
+from himpc.stack import about, essence
 from himpc.tasks import Pointing, Task
 from himpc.tasks.axes import OnAxes
 from robots import InputError
@@ -23,6 +25,45 @@ def target_at(task: Task, value: Array) -> Target:
         return Target(value, ROTATION_CAPS, task.components if isinstance(task, OnAxes) else None)
     in_space = task.unit == "m" or isinstance(task, Pointing)
     return Target(value, POSITION_CAPS if in_space else JOINT_CAPS)
+
+
+def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
+    """The reference of a task that goes on under a stack of its own making: what the scene gives it, if that
+    has the task's coordinates, else a draggable target at `value`.
+
+    Args:
+        task: the task.
+        reference: the scene's, if it has one for a task of that name.
+        value: one of its `Task.target`s.
+    """
+    if reference is not None:
+        preview = reference.preview(0.0, 1e-3, 1)
+        if preview.value.shape == value.shape:
+            return reference
+    return target_at(task, value)
+
+
+def carried(old: Task, reference: Reference, task: Task, value: Array) -> Reference:
+    """The reference of a task that took the place of an old one of its name, without a jump.
+
+    A task about the same thing keeps it. One that controls other axes of the same has its target where the
+    hand put it along the axes that stay, and where the robot is along those that are new.
+    """
+    if essence(old) == essence(task):
+        return reference
+    target = target_at(task, value)
+    if about(old) == about(replace(task, name=old.name)) and isinstance(reference, Target):
+        if value.ndim == 2:
+            target = target_at(task, reference.value)
+            target.move(reference.raw)
+        elif isinstance(old, OnAxes) and isinstance(task, OnAxes):
+            both = [axis for axis in task.axes if axis in old.axes]
+            new, then = [task.axes.index(axis) for axis in both], [old.axes.index(axis) for axis in both]
+            start, raw = value.copy(), value.copy()
+            start[new], raw[new] = reference.value[then], reference.raw[then]
+            target = target_at(task, start)
+            target.move(raw)
+    return target
 
 
 def move_target(

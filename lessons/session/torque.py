@@ -14,7 +14,7 @@ from himpc.controllers import Controller
 from himpc.plan import Binding, Plan
 from himpc.references import Preview, Reference, Target, previews
 from himpc.rotation import quaternion
-from himpc.stack import Stack
+from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of, write_plan
 from lessons.events import Event, MoveTarget, Push
@@ -24,7 +24,8 @@ from lessons.session.bumpless import Handover, settled
 from lessons.session.deadline import Outbox
 from lessons.session.leak import dynamic_leak
 from lessons.session.session import LOST_SPEED, Session
-from lessons.session.targets import move_target, target_at
+from lessons.session.targets import carried, kept, move_target, target_at
+from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Plant, convergence_gauge
 
@@ -102,12 +103,30 @@ class TorqueSession(Session):
 
     def _fresh_references(self) -> dict[str, Reference]:
         motion = self.settings.options or self.scene
-        given = dict(motion.references(self.robot, self.settings.levels))
+        given = motion.references(self.robot, self.settings.levels)
         start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
-        for task in _tasks(self.settings.levels):
-            if task.name not in given:
-                given[task.name] = target_at(task, task.target(start))
-        return given
+        return {
+            task.name: kept(task, given.get(task.name), task.target(start))
+            for task in _tasks(self.settings.levels)
+        }
+
+    def _references_for(self, stack: Stack) -> dict[str, Reference]:
+        """The references that go on under another stack: what is new, or about something else, is held where
+        it is now. A task that was renamed takes its target along."""
+        here = Configuration(self.robot, self._data, self.plant.q, self.plant.v)
+        old = {task.name: task for task in _tasks(self.settings.levels)}
+        new = {task.name for task in _tasks(stack)}
+        gone = {about(task): task for task in old.values() if task.name not in new}
+        found = {}
+        for task in _tasks(stack):
+            before = old.get(task.name) or gone.get(about(task))
+            value = task.target(here)
+            found[task.name] = (
+                target_at(task, value)
+                if before is None
+                else carried(before, self.references[before.name], task, value)
+            )
+        return found
 
     def target(self, task: str) -> Target | None:
         """The draggable target of a task, None if its reference is a fixed motion."""
@@ -139,12 +158,19 @@ class TorqueSession(Session):
                 raise InputError("This scene has no mission: choose one of the HTMPC scenes.")
 
     def adopt(self, settings: TorqueSettings) -> None:
+        layout, references = self.layout, self.references
+        recomposed = not same_tasks(settings.levels, self.settings.levels)
+        if recomposed:
+            layout, references = layout_of(self.robot, settings.levels), self._references_for(settings.levels)
         if settings.plant != self.settings.plant:
             self.plant.configure(settings.plant)
         if settings.controller == self.settings.controller:
             self.controller.configure(settings.for_controller())
         else:
             self._hand_over(controller_of(settings, self.robot))
+        if recomposed:
+            self.layout, self.references, self.plan, self.given = layout, references, None, None
+            self._row = np.full(layout.size, np.nan)
         self.settings = settings
         self._hands = _hands(settings.levels)
 
@@ -180,7 +206,7 @@ class TorqueSession(Session):
         row[fields["v"]] = v
         write_plan(row, self.layout, plan)
         self._write_references(row, ahead)
-        self._write_truth(row, plan, q)
+        self._write_truth(row, plan, q, ahead)
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
         if plan.notice is not None:
             self.notices.append(plan.notice)
@@ -205,14 +231,14 @@ class TorqueSession(Session):
             row[fields[f"v_d/{task.name}"]] = preview.velocity[0]
             row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
 
-    def _write_truth(self, row: Array, plan: Plan, q: Array) -> None:
+    def _write_truth(self, row: Array, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> None:
         """What only the plant's M can tell: the gauge of M̄ and the honest leak, held between refreshes."""
         if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
             M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
             leak = math.nan
             if plan.leak is not None and not math.isnan(plan.leak):
-                at = Configuration(self.robot, self._data, q, q)
+                at = Configuration(self.robot, self._data, q, q, previews=ahead)
                 leak = dynamic_leak(M, plan, self.settings.levels, at)
             self._truth = (leak, *convergence_gauge(M, M_bar))
         # The layout puts these three side by side.
@@ -251,6 +277,11 @@ class TorqueSession(Session):
         path = np.tile(start.placement(found.frame).translation, (points, 1))
         path[:, found.components] = preview.value + preview.displacement
         return path
+
+    def ranks(self) -> dict[str, tuple[int, int]]:
+        """Per enabled level the directions it gets where the robot is now, and its rows."""
+        q = np.asarray(self.plant.q)
+        return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 
     def binding(self) -> list[Binding]:
         return [] if self.plan is None else self.plan.binding(self.robot.joint_names)

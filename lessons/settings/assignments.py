@@ -85,15 +85,22 @@ def differences(own: Settings, settings: Settings) -> tuple[str, ...]:
         InputError: no assignment can express them.
     """
     now, found = own, list[str]()
-    places = {path: place for path, place in own.places().items() if not place.shorthand}
-    for path in sorted(places, key=lambda path: path != "controller"):
-        value = settings.value_at(path)
-        if value != now.value_at(path):
-            found.append(assignment(path, value))
-            now = now.changed(*parse_assignment(found[-1]))
-    for path, value in now.special_differences(settings):
+
+    def tell(path: str, value: Any) -> None:
+        nonlocal now
         found.append(assignment(path, value))
         now = now.changed(*parse_assignment(found[-1]))
+
+    if settings.controller != own.controller:
+        tell("controller", settings.controller)
+    for path, value in own.recomposed(settings):
+        tell(path, value)
+    for path in sorted(path for path, place in now.places().items() if not place.shorthand):
+        value = settings.value_at(path)
+        if value != now.value_at(path):
+            tell(path, value)
+    for path, value in now.special_differences(settings):
+        tell(path, value)
     if now != settings:
         raise InputError("these settings cannot be told as assignments: reset them and try again")
     return tuple(found)

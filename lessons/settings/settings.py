@@ -119,6 +119,10 @@ class Settings(ABC):
         """Paths, none of `places`, and values that other settings of the same scene differ in."""
         return []
 
+    def recomposed(self, wanted: Any) -> list[tuple[str, Any]]:
+        """Paths and values after which other settings of the same scene have the same paths as these."""
+        return []
+
     def takes(self, event: Event) -> bool:
         """Whether an event changes settings, not only what the robot is to do."""
         return isinstance(event, Set)

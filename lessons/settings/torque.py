@@ -29,6 +29,7 @@ from lessons.settings.settings import (
     level_key,
     level_places,
 )
+from lessons.settings.stack import CHANGES, read_stack, same_tasks, told
 from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.settings.values import WORD, Form, form_of
 from robots import InputError, NominalSettings, PlantSettings, Robot
@@ -131,7 +132,8 @@ class TorqueSettings(Settings):
         return super().after(event)
 
     def places(self) -> dict[str, Place]:
-        """Fields ("horizon", "M_bar", …) and those of the scene's options; "order", the names of all levels,
+        """Fields ("horizon", "M_bar", …) and those of the scene's options; "stack", a list of levels as
+        `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". Where a
@@ -155,6 +157,13 @@ class TorqueSettings(Settings):
                 Form(None, WORD),
                 lambda _, value: ordered(self.levels, value),
             ),
+            "stack": Place(
+                lambda s: told(s.levels),
+                _with("levels"),
+                Form(None, WORD),
+                lambda _, value: read_stack(value, self.levels),
+                shorthand=True,
+            ),
             **{key: every_level(self.levels, key, _levels, _with("levels")) for key in ("Q", "R")},
             **level_places(self.levels, _LEVEL_KEYS, _levels, _with("levels")),
             **{
@@ -170,6 +179,22 @@ class TorqueSettings(Settings):
         form = self.places()[path].form
         per_joint = path.startswith(("M_bar", "nominal.", "plant.")) and form.elements is not None
         return len(self.M_bar) if per_joint else 0
+
+    def place(self, path: str) -> Place:
+        """As in `Settings`; besides "stack.add" and the other `CHANGES`, which change the stack in part."""
+        if path not in CHANGES:
+            return super().place(path)
+        change = CHANGES[path]
+        return Place(
+            _levels,
+            _with("levels"),
+            Form(None, WORD),
+            lambda _, value: change(self.levels, value),
+            shorthand=True,
+        )
+
+    def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:
+        return [] if same_tasks(self.levels, wanted.levels) else [("stack", told(wanted.levels))]
 
 
 _GAINS = ("K_p", "K_v")

@@ -44,6 +44,8 @@ TORQUE_ENTRIES = (
               "when pushed. This last level brings it to rest. Switch it off and push.",
           tries=("false", "true"), name="damping level"),
     Entry("order", "Order", "The levels, highest priority first: a,b,c or a list"),
+    Entry("stack", "Stack",
+          "The levels with their tasks, highest priority first, as a list; see himpc.tasks.KINDS"),
     Entry("Q", "Q", "Weight of the residual, of all levels at once", "", 1.0, 1000.0, 1.0),
     Entry("R", "R", "Weight of the changes of torque, of all levels at once", "", 0.1, 100.0, 0.1),
     Entry("levels.*.enabled", "Enabled", tries=("false", "true"), name="level * on"),

@@ -6,7 +6,7 @@ import base64
 import json
 import shlex
 import zlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from himpc.tasks import FramePosition
 from lessons.events import Appear, Event, MoveLevel, Set
 from lessons.recording.run import run
 from lessons.replay.state import MAX_CODE, State, command_line, decode, encode, state_of
@@ -224,6 +225,11 @@ def test_a_mission_of_a_stranger_cannot_fill_the_memory(assignment: str) -> None
         decode(packed({"s": "ridgeback-ur10-delivery", "a": [assignment]})).prepared()
 
 
+@dataclass(frozen=True, kw_only=True)
+class OwnKind(FramePosition):
+    """A kind of task that no word names."""
+
+
 def test_what_a_code_cannot_carry_is_said() -> None:
     with pytest.raises(InputError, match="from a file"):
         encode(State("hold", urdf="/home/me/arm.urdf"))
@@ -232,8 +238,8 @@ def test_what_a_code_cannot_carry_is_said() -> None:
     hold = find("planar3-hold")
     assert isinstance(hold, TorqueScene)
     first, *others = hold.settings.levels
-    narrow = replace(first, tasks=(replace(first.tasks[0], axes="x"),))  # pyright: ignore[reportCallIssue]
-    other = replace(hold.settings, levels=(narrow, *others))
+    own = replace(first, tasks=(OwnKind(name="position"),))
+    other = replace(hold.settings, levels=(own, *others))
     with pytest.raises(InputError, match="cannot be told"):
         state_of("planar3-hold", other)
 

@@ -1,0 +1,133 @@
+"""The robot with two arms: both hands dragged, a tray carried between them, and hands that want apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from himpc.configuration import Configuration
+from himpc.references import Waypoints
+from himpc.stack import Level
+from himpc.tasks import FrameOrientation, FramePosition, Posture, RelativeOrientation, RelativePosition
+from lessons.events import Event, MoveTarget
+from lessons.scenes.hold import gains
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.settings.torque import TorqueSettings
+from robots import PlantSettings, Robot, load_robot
+
+RIGHT, LEFT = "right_gripper", "left_gripper"
+SIDE = 0.12
+"""m, of the square along which the tray is carried."""
+START_S, EDGE_S = 0.3, 1.2
+"""s until it starts, and for each edge."""
+_SCRIPT_S = 0.05
+"""s between two places that the script puts the tray's target to."""
+PLANT = PlantSettings(armature=0.1)
+"""Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without, a gripper that holds
+nothing turns so easily that no constant M̄ suits both the wrist and the shoulder."""
+_M_BAR = (0.21, 0.87, 0.143, 0.242, 0.118, 0.134, 0.11) * 2
+"""0.9 of the least 1/(M⁻¹)ᵢᵢ over the work space with that: the loop is stable everywhere."""
+_APART = 0.15
+"""m by which the left hand is asked away from the right one."""
+
+
+def baxter_hold() -> TorqueScene:
+    """`baxter-hold`: where both hands are, then how they are turned, then the posture."""
+    robot, K_p, K_v = _robot()
+    levels = (
+        Level(
+            (
+                FramePosition(name="right", frame=RIGHT, K_p=K_p, K_v=K_v),
+                FramePosition(name="left", frame=LEFT, K_p=K_p, K_v=K_v),
+            )
+        ),
+        Level(
+            (
+                FrameOrientation(name="right_turn", frame=RIGHT, K_p=K_p, K_v=K_v),
+                FrameOrientation(name="left_turn", frame=LEFT, K_p=K_p, K_v=K_v),
+            )
+        ),
+        Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
+    )
+    return _scene(
+        robot, "baxter-hold", "Baxter: drag both hands; where they are comes before how they turn", levels
+    )
+
+
+def baxter_tray() -> TorqueScene:
+    """`baxter-tray`: level 1 is the pose of the left hand as the right one sees it; level 2 where the tray
+    is, which the right hand says, and that it is level; level 3 the posture. A script carries the tray along
+    a square once."""
+    robot, K_p, K_v = _robot()
+    levels = (
+        Level(_grip(K_p, K_v)),
+        Level(
+            (
+                FramePosition(name="tray", frame=RIGHT, K_p=K_p, K_v=K_v),
+                FrameOrientation(name="level", frame=RIGHT, axes="xy", K_p=K_p, K_v=K_v),
+            )
+        ),
+        Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
+    )
+    corners = _place(robot, RIGHT) + SIDE * np.array([[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0], [0, 0, 0]])
+    way = Waypoints(corners, START_S + EDGE_S * np.arange(5.0))
+    times = [START_S + _SCRIPT_S * k for k in range(1, round(4 * EDGE_S / _SCRIPT_S) + 1)]
+    events = tuple((t, MoveTarget("tray", tuple(way.preview(t, 1e-3, 1).value.tolist()))) for t in times)
+    title = "Baxter carries a tray: the hands keep their grip, whatever the tray and the posture ask"
+    return _scene(robot, "baxter-tray", title, levels, events, START_S + 4 * EDGE_S + 0.5)
+
+
+def baxter_conflict() -> TorqueScene:
+    """`baxter-conflict`: the hands hold on to each other (level 1), the right one stays (level 2), and the
+    left one is asked away (level 3), which it cannot have."""
+    robot, K_p, K_v = _robot()
+    levels = (
+        Level(_grip(K_p, K_v)),
+        Level((FramePosition(name="right", frame=RIGHT, K_p=K_p, K_v=K_v),)),
+        Level((FramePosition(name="left", frame=LEFT, K_p=K_p, K_v=K_v),)),
+        Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
+    )
+    away = _place(robot, LEFT) + np.array([0.0, _APART, 0.0])
+    events = ((0.5, MoveTarget("left", tuple(away.tolist()))),)
+    title = "Baxter: hands that hold on to each other are wanted in two places"
+    return _scene(robot, "baxter-conflict", title, levels, events)
+
+
+def _robot() -> tuple[Robot, float, float]:
+    """The robot with the M̄ that suits its geared motors, and K_p and K_v that suit both."""
+    robot = replace(load_robot("baxter"), M_bar=np.array(_M_BAR))
+    return robot, *gains(robot, PLANT)
+
+
+def _grip(K_p: float, K_v: float) -> tuple[RelativePosition, RelativeOrientation]:
+    return (
+        RelativePosition(name="grip", frame=LEFT, root=RIGHT, K_p=4 * K_p, K_v=2 * K_v),
+        RelativeOrientation(name="grip_turn", frame=LEFT, root=RIGHT, K_p=4 * K_p, K_v=2 * K_v),
+    )
+
+
+def _place(robot: Robot, frame: str) -> np.ndarray:
+    home = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
+    return home.placement(frame).translation
+
+
+def _scene(
+    robot: Robot,
+    name: str,
+    title: str,
+    levels: tuple[Level, ...],
+    events: tuple[tuple[float, Event], ...] = (),
+    duration: float = 4.0,
+) -> TorqueScene:
+    return TorqueScene(
+        name=name,
+        title=title,
+        robot=robot,
+        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar), plant=PLANT),
+        references=lambda robot, stack: {},
+        q_0=robot.home,
+        v_0=np.zeros(robot.n),
+        duration=duration,
+        events=events,
+    )

@@ -1,0 +1,60 @@
+"""The robot with two arms: what its hands hold on to, they keep, whatever else is asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lessons.events import MoveTarget, Set
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.two_arms import EDGE_S, SIDE, START_S
+from lessons.session.torque import TorqueSession
+
+
+def test_the_tray_is_carried_along_a_square() -> None:
+    """The hands keep their relative pose within 0.5 mm and 0.2°; the tray comes to every corner, level."""
+    recording = run(torque_scene("baxter-tray"))
+    assert np.abs(recording["error/grip"]).max() < 0.5e-3
+    assert np.degrees(np.linalg.norm(recording["error/grip_turn"], axis=1).max()) < 0.2
+    assert np.degrees(np.abs(recording["error/level"]).max()) < 0.2
+    start, tray = recording["x/tray"][0], recording["x/tray"]
+    for place, corner in enumerate([(0, 0, 1), (0, 1, 1), (0, 1, 0), (0, 0, 0)], start=1):
+        after = recording["t"][:, 0].searchsorted(START_S + place * EDGE_S)
+        there = np.linalg.norm(tray[after : after + 300] - start - SIDE * np.array(corner), axis=1).min()
+        assert there < 4e-3
+    found = summary(recording)
+    assert found["solver"]["unsolved"] == 0
+    assert [(each["rank"], each["rows"]) for each in found["levels"]] == [(6, 6), (5, 5), (3, 14)]
+
+
+def test_both_hands_are_dragged_apart_from_each_other() -> None:
+    session = TorqueSession(torque_scene("baxter-hold"))
+    goals = {}
+    for name, step in (("right", (0.05, -0.08, 0.05)), ("left", (0.0, 0.08, -0.06))):
+        target = session.target(name)
+        assert target is not None
+        goals[name] = target.raw + np.array(step)
+        session.post(MoveTarget(name, tuple(goals[name])))
+    row = [session.tick() for _ in range(1800)][-1]
+    for name, goal in goals.items():
+        assert np.linalg.norm(row[session.layout.fields[f"x/{name}"]] - goal) < 1e-3
+        assert np.degrees(np.abs(row[session.layout.fields[f"error/{name}_turn"]]).max()) < 0.2
+    assert session.diverged_at is None
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_who_ranks_higher_gets_its_hand(swapped: bool) -> None:
+    """The grip comes first: of two hands wanted 15 cm further apart, the one on the higher level has its way
+    and the other one follows; swapped, it is the other way round."""
+    session = TorqueSession(torque_scene("baxter-conflict"))
+    if swapped:
+        session.post(Set("order", "grip+grip_turn,left,right,posture"))
+    row = [session.tick() for _ in range(2500)][-1]
+    fields = session.layout.fields
+    far = {name: np.linalg.norm(row[fields[f"error/{name}"]]) for name in ("right", "left", "grip")}
+    winner, loser = ("left", "right") if swapped else ("right", "left")
+    assert far["grip"] < 0.5e-3
+    assert far[winner] < 1e-3
+    assert far[loser] == pytest.approx(0.15, abs=2e-3)
