@@ -71,7 +71,7 @@ def baxter_tray() -> TorqueScene:
         Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
     )
     corners = _place(robot, RIGHT) + SIDE * np.array([[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0], [0, 0, 0]])
-    way = Waypoints(corners, START_S + EDGE_S * np.arange(5.0))
+    way = Waypoints(corners, np.array([START_S + EDGE_S * k for k in range(5)]))
     times = [START_S + _SCRIPT_S * k for k in range(1, round(4 * EDGE_S / _SCRIPT_S) + 1)]
     events = tuple((t, MoveTarget("tray", tuple(way.preview(t, 1e-3, 1).value.tolist()))) for t in times)
     title = "Baxter carries a tray: the hands keep their grip, whatever the tray and the posture ask"
