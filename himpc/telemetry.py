@@ -58,6 +58,9 @@ _PER_JOINT = (
     "q_upper",
     "at_bound",
     "delta_tau",
+    "tau_0",
+    "q_measured",
+    "v_measured",
 )
 _PER_LEVEL = ("cost", "kkt", "rung", "time_us", "leak", "active")
 
@@ -76,10 +79,11 @@ class TaskInfo:
 class Layout:
     """Where each field of a row lies.
 
-    Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`,
-    `v_d/<task>`, `a_d/<task>` (m each; three where the target is a point to look at); per level the fields
-    cost, kkt, rung (index into RUNGS), time_us, leak and active (number of binding constraints), NaN where
-    the level was not solved.
+    `q` and `v` are the plant's, `q_measured` and `v_measured` what the controller was given; `tau_0` is what
+    acted until then. Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w),
+    `error/<task>`, `v_d/<task>`, `a_d/<task>` (m each; three where the target is a point to look at); per
+    level the fields cost, kkt, rung (index into RUNGS), time_us, leak and active (number of binding
+    constraints), NaN where the level was not solved.
     """
 
     size: int
@@ -165,6 +169,7 @@ def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
     row[fields["unsolved"]] = plan.unsolved
     row[fields["iterations"]] = plan.iterations
     row[fields["delta_tau"]] = plan.tau - plan.tau_0
+    row[fields["tau_0"]] = plan.tau_0
     # Six fields of n numbers each that stand side by side in the order of _PER_JOINT.
     limits = plan.limits
     block = row[fields["tau_demand"].start : fields["q_upper"].stop].reshape(6, -1)

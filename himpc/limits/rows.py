@@ -61,6 +61,11 @@ REACTION = 5.0
 """Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
 
 
+def reaction(limits: Limits, T_s: float) -> float:
+    """Seconds that the viability bound allows before a joint brakes; T_s: control period, s."""
+    return T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
+
+
 @lru_cache(maxsize=64)
 def toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
     """L of `Rows`."""
@@ -106,8 +111,7 @@ def build_rows(
 
     stopping = None
     if limits.position == "viability":
-        reaction = T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
-        v = viability_bounds(state.q, *force.stops, force.v_limit, force.a_max, reaction)
+        v = viability_bounds(state.q, *force.stops, force.v_limit, force.a_max, reaction(limits, T_s))
         stopping = np.array((-v[0] < force.v_limit, v[1] < force.v_limit))
     else:
         v = np.array((-force.v_limit, force.v_limit))

@@ -9,7 +9,7 @@ from himpc.controllers.forms import StackForm
 from himpc.controllers.settings import Settings
 from himpc.geometry import geometry
 from himpc.limits import LimitsInForce
-from himpc.limits.rows import REACTION, approached, toeplitz
+from himpc.limits.rows import approached, reaction, toeplitz
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
 from himpc.tasks.frame import AXES, FrameTask
 from himpc.tick.kernel import kinematics
@@ -80,8 +80,7 @@ def arena_for(
     limits = settings.limits
     f["L"][:] = toeplitz(N, ("torque", "velocity", "position") if paper else ("torque", "velocity"))
     f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
-    reaction = settings.T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
-    f["scalars"][:3] = settings.T_s, settings.T_s, reaction
+    f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
     arena.i["sizes"][9] = {"viability": VIABILITY, "paper": PAPER, "off": OFF}[limits.position]
     return arena, spans
 

@@ -204,6 +204,7 @@ class TorqueSession(Session):
         row[fields["t"]] = t
         row[fields["q"]] = q
         row[fields["v"]] = v
+        row[fields["q_measured"]], row[fields["v_measured"]] = state.q, state.v
         write_plan(row, self.layout, plan)
         self._write_references(row, ahead)
         self._write_truth(row, plan, q, ahead)

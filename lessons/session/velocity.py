@@ -199,6 +199,8 @@ class VelocitySession(Session):
         row.fill(np.nan)
         fields = self.layout.fields
         row[fields["t"]], row[fields["q"]], row[fields["v"]] = t, q, v
+        row[fields["q_measured"]], row[fields["v_measured"]] = state.q, state.v
+        row[fields["tau_0"]] = self._commanded
         place = row[fields["place"]] = self.progress.place
         row[fields["left"]] = len(self.progress.mission) - place
         write_plan(row, self.layout, plan, settings.lexicographic_delta)

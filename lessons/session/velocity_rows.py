@@ -36,6 +36,9 @@ _PER_JOINT = (
     "at_bound",
     "acceleration",
     "jerk",
+    "tau_0",
+    "q_measured",
+    "v_measured",
 )
 _PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
 
@@ -44,7 +47,8 @@ def layout_of(robot: Robot, roles: Stack) -> Layout:
     """Where each field of a row lies.
 
     `place` is how many tasks of the mission are completed, `left` how many are not. Per joint besides the
-    usual ones: `tau` is the velocity commanded from that tick on, `tau_demand` the same, `acceleration` and
+    usual ones: `tau` is the velocity commanded from that tick on, `tau_demand` the same, `tau_0` the one
+    commanded until then, `acceleration` and
     `jerk` the command's, `at_bound` the bits AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the
     fields of a task and `level/<role>`, its place in the window (NaN: it is not in it). Per level of the
     stack cost, kkt, rung, time_us, the accepted line-search step, the number of active constraints and
