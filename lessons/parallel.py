@@ -10,10 +10,11 @@ import multiprocessing as mp
 import os
 import signal
 import socket
+from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 from urllib.parse import urlsplit
@@ -57,20 +58,38 @@ def on_cores(function: Callable[[T], U], items: Sequence[T]) -> Generator[tuple[
         items: its arguments.
 
     Yields:
-        (place of the item, what the function returned, or `Failed` if it raised or its process died).
+        (place of the item, what the function returned, or `Failed` if it raised or its process died twice).
     """
+    waiting = deque(range(len(items)))
+    while waiting:
+        orphans = yield from _until_one_dies(function, items, waiting)
+        # A dying process takes its pool's other work with it: one at a time, the culprit shows.
+        for place in sorted(orphans):
+            yield place, _alone(function, items[place])
+
+
+def _until_one_dies(
+    function: Callable[[T], U], items: Sequence[T], waiting: deque[int]
+) -> Generator[tuple[int, U | Failed], None, list[int]]:
+    """Works off `waiting`, places of items, until nothing is left or a process dies; returns the places whose
+    work it took along."""
+    under_way: dict[Future[U | Failed], int] = {}
     orphans: list[int] = []
-    with _pool(min(cores(), max(1, len(items)))) as pool:
-        with _born_deaf():
-            places = {pool.submit(_guarded, function, item): place for place, item in enumerate(items)}
-        for future in as_completed(places):
-            try:
-                yield places[future], future.result()
-            except BrokenProcessPool:
-                orphans.append(places[future])
-    # A dying process takes its pool's other work with it: one at a time, the culprit shows.
-    for place in sorted(orphans):
-        yield place, _alone(function, items[place])
+    workers = min(cores(), len(waiting))
+    with _pool(workers) as pool, suppress(BrokenProcessPool):
+        while not orphans and (waiting or under_way):
+            with _born_deaf():
+                # No more than there are processes: who dies takes no more along.
+                while waiting and len(under_way) < workers:
+                    future = pool.submit(_guarded, function, items[waiting[0]])
+                    under_way[future] = waiting.popleft()
+            for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                place = under_way.pop(future)
+                if isinstance(future.exception(), BrokenProcessPool):
+                    orphans.append(place)
+                else:
+                    yield place, future.result()
+    return [*orphans, *under_way.values()]
 
 
 def one_by_one(
@@ -110,8 +129,9 @@ def on_cluster(address: str) -> Iterator[Spread]:
     def spread(
         function: Callable[[T], U], items: Sequence[T]
     ) -> Generator[tuple[int, U | Failed], None, None]:
-        # pure=False: two equal items are two pieces of work; retries: a lost worker is no failure.
-        futures = [client.submit(_guarded, function, item, pure=False, retries=2) for item in items]
+        # pure=False: two equal items are two pieces of work. A lost worker is no failure: the scheduler gives
+        # its work to another one, up to its `allowed-failures` (3) times.
+        futures = [client.submit(_guarded, function, item, pure=False) for item in items]
         places = {future.key: place for place, future in enumerate(futures)}
         try:
             for future in as_they_end(futures):

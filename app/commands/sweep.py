@@ -19,7 +19,7 @@ def sweep(
     scene: tyro.conf.Positional[str],
     out: Path,
     over: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=lo:hi:n")] = (),
-    controller: str = "himpc",
+    controller: str | None = None,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
     duration: float | None = None,
     seed: int = 0,
@@ -35,7 +35,8 @@ def sweep(
         out: folder for cells.jsonl, results.json and map.png.
         over: a setting and its range, e.g. --over M_bar_scale=0.2:4:20 --over horizon=1:20:20. Ranges of a
             decade and more go in equal ratios; PATH=lo:hi:n:lin and :log decide it.
-        controller: which controller: a name (see himpc-lab controllers) or a Python file of your own.
+        controller: which controller, the scene's own by default: a name (see himpc-lab controllers) or a
+            Python file of your own.
         set: change a setting in all runs, e.g. --set plant.payload_kg=2.
         duration: simulated seconds per run; the scene's own by default.
         seed: seed of the runs.
@@ -45,8 +46,10 @@ def sweep(
     from lessons.experiments.jobs import Job
     from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
     from lessons.parallel import on_cluster, on_cores
+    from lessons.own.resolve import scene_named
 
-    definition = make_sweep(Job(scene, controller, tuple(set), duration, seed), over)
+    chosen = controller or scene_named(scene).settings.controller
+    definition = make_sweep(Job(scene, chosen, tuple(set), duration, seed), over)
     choices = metrics(definition)
     shown = check_metric(metric or choices[0], choices)
     held = len(finished_cells(definition, out))

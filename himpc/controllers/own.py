@@ -17,7 +17,7 @@ from himpc.controllers.one_step import leak as leak_of
 from himpc.controllers.settings import Settings
 from himpc.controllers.view import Bounds, LevelView, View, read_only
 from himpc.limits import Limits, LimitsInForce, in_force, ramp, viability_bounds
-from himpc.limits.rows import REACTION
+from himpc.limits.rows import reaction
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
 from himpc.references.hold import still
@@ -193,8 +193,8 @@ class OwnController:
         rate = limits.velocity_approach
         lower, upper = -force.v_limit, force.v_limit
         if limits.position == "viability":
-            reaction = self._settings.T_s + (REACTION / rate if rate else 0.0)
-            lower, upper = viability_bounds(q, *force.stops, force.v_limit, force.a_max, reaction)
+            waits = reaction(limits, self._settings.T_s)
+            lower, upper = viability_bounds(q, *force.stops, force.v_limit, force.a_max, waits)
         return Bounds(
             tau_lower=read_only(force.tau_lower),
             tau_upper=read_only(force.tau_upper),

@@ -35,8 +35,8 @@ def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:
     What an independent replay needs besides: `q_measured` and `v_measured` (what the controller was given),
     `tau_0` (the torque, at velocity level the command, that acted until the tick), the `tip`'s frame, `a_max`
     (n,), and the constants of the position bound: `position_margin` (rad), `position_reaction` (s) and
-    `position_return_rate` (1/s) of `himpc.limits.viability`, NaN where it is not in force. x_d, v_d and a_d at the
-    next knot are those of the next row.
+    `position_return_rate` (1/s) of `himpc.limits.viability`, NaN where it is not in force. x_d, v_d and
+    a_d at the next knot are those of the next row.
 
     Args:
         recording: the run.

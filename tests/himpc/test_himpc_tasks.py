@@ -19,6 +19,7 @@ from himpc.stack import Level
 from himpc.tasks import (
     KINDS,
     CentreOfMass,
+    Damping,
     FrameOrientation,
     FramePosition,
     Joints,
@@ -53,12 +54,19 @@ def tasks_of(robot: Robot, rng: np.random.Generator) -> list[Task]:
         FrameOrientation(name="orientation", frame=frame, axes=axes),
         Joints(name="joints", joints=robot.joint_names[:2]),
         Posture(name="posture"),
+        Damping(name="damping"),
         CentreOfMass(name="com", axes=axes),
         RelativePosition(name="relative_position", frame=frame, root=root, axes=axes),
         RelativeOrientation(name="relative_orientation", frame=frame, root=root, axes=axes),
         Pointing(name="pointing", frame=frame, axis=str(rng.choice(["x", "y", "z", "-x", "-y", "-z"]))),
         PlaneDistance(name="plane", frame=frame, normal=normal, offset=float(rng.normal())),
     ]
+
+
+def test_every_class_is_among_them() -> None:
+    """A kind of task that comes along is to be listed above."""
+    made = {type(task) for task in tasks_of(robot_of("iiwa14"), np.random.default_rng(0))}
+    assert made == {kind for each in KINDS.values() for kind in each.makes}
 
 
 def change(after: Array, before: Array) -> Array:

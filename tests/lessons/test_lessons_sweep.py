@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
@@ -23,7 +24,7 @@ from lessons.experiments.sweep import (
     make_sweep,
     metrics,
 )
-from lessons.parallel import Failed, on_cluster, on_cores, one_by_one
+from lessons.parallel import Failed, cores, on_cluster, on_cores, one_by_one
 from lessons.plots.heat import draw_map
 from robots import InputError
 
@@ -172,6 +173,23 @@ def test_a_process_that_dies_costs_its_own_item_only() -> None:
     assert "died" in outcomes[1].reason
 
 
+def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
+    """A piece of work whose first attempt at 1 takes its process with it."""
+    marker, value = item
+    if value == 1 and not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return value, os.getpid()
+
+
+def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
+    """Every item has its result, and only what was under way at that moment runs in a process of its own."""
+    outcomes = dict(on_cores(dies_once, [(tmp_path / "died", value) for value in range(12)]))
+    assert sorted(outcomes) == list(range(12))
+    assert [outcomes[value][0] for value in range(12)] == list(range(12))
+    assert len({pid for _, pid in outcomes.values()}) <= 3 * cores()
+
+
 def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
     """M̄ far too large loses control, a failing run says why; both are in the file, neither has a value."""
     unbounded = ("plant.saturate=false", "limits.torque=false", "limits.velocity=false")
@@ -237,17 +255,3 @@ def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_scheduler_that_is_not_there_is_one_sentence() -> None:
     with pytest.raises(InputError, match=r"--scheduler"), on_cluster("tcp://127.0.0.1:1"):
         pass
-
-
-def test_a_cluster_gives_the_same_result(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    sweep = make_sweep(SHORT, ("M_bar_scale=1:2:2",))
-    carry_on(sweep, tmp_path / "one", one_by_one)
-    with (
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp"
-        ) as cluster,
-        on_cluster(cluster.scheduler_address) as spread,
-    ):
-        carry_on(sweep, tmp_path / "all", spread)
-    assert (tmp_path / "one/results.json").read_bytes() == (tmp_path / "all/results.json").read_bytes()

@@ -1,0 +1,116 @@
+"""Sweeps on a Dask cluster of two workers: stopped, carried on, and with a worker that dies on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lessons.parallel import Failed, on_cluster
+
+distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+
+ROOT = Path(__file__).parents[2]
+CELLS = 8
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """A scheduler with two worker processes; work that kills one is given up after the second."""
+    import dask
+
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, protocol="tcp"
+        ) as found,
+    ):
+        yield found
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    """Waits for a condition; fails after two minutes."""
+    deadline = time.monotonic() + 120
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.01)
+
+
+def lines(folder: Path) -> int:
+    file = folder / "cells.jsonl"
+    return file.read_bytes().count(b"\n") if file.exists() else 0
+
+
+def begin(out: Path, *more: str) -> subprocess.Popen[bytes]:
+    """`himpc-lab sweep` of δ on the mobile manipulator's square, as a program of its own."""
+    what = [
+        "ridgeback-ur10-square",
+        "--over",
+        f"delta_m=0.002:0.05:{CELLS}",
+        "--duration",
+        "8",
+        "--out",
+        str(out),
+    ]
+    command = [sys.executable, "-m", "app", "sweep", *what, *more]
+    return subprocess.Popen(
+        command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL
+    )
+
+
+def test_a_sweep_of_htmpc_survives_a_kill_and_a_dead_worker(cluster: Any, tmp_path: Path) -> None:
+    """Killed after its first cell, carried on, one worker killed meanwhile: the results of local cores,
+    none lost, none computed twice."""
+    local, out = tmp_path / "local", tmp_path / "cluster"
+    scheduler = ("--scheduler", cluster.scheduler_address)
+    assert begin(local).wait(300) == 0
+
+    first = begin(out, *scheduler)
+    until(lambda: lines(out) > 0, "no cell was finished")
+    first.kill()
+    first.wait(60)
+    held = lines(out)
+    assert 0 < held < CELLS
+
+    second = begin(out, *scheduler)
+    until(lambda: lines(out) > held or second.poll() is not None, "the sweep does not go on")
+    os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+    assert second.wait(300) == 0
+    assert lines(out) == CELLS
+    assert (out / "results.json").read_bytes() == (local / "results.json").read_bytes()
+    cells = json.loads((out / "results.json").read_text())["cells"]
+    assert [cell["error"] for cell in cells] == [None] * CELLS
+    assert len({cell["at"]["delta_m"] for cell in cells}) == CELLS
+    assert (out / "map.png").exists()
+
+
+def test_a_worker_that_dies_costs_its_item_a_retry(cluster: Any, tmp_path: Path) -> None:
+    """Dead once: another worker does the item. Dead again and again: it fails, and the others do not."""
+    with on_cluster(cluster.scheduler_address) as spread:
+        items = [(tmp_path / "once", value) for value in range(6)]
+        assert dict(spread(_dies_once, items)) == {value: value for value in range(6)}
+        outcomes = dict(spread(_dies_at_one, list(range(4))))
+    assert [outcomes[value] for value in (0, 2, 3)] == [0, 2, 3]
+    assert isinstance(outcomes[1], Failed)
+
+
+def _dies_once(item: tuple[Path, int]) -> int:
+    marker, value = item
+    if value == 1 and not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return value
+
+
+def _dies_at_one(value: int) -> int:
+    if value == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return value
