@@ -45,8 +45,8 @@ def sweep(
     """
     from lessons.experiments.jobs import Job
     from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
-    from lessons.parallel import on_cluster, on_cores
     from lessons.own.resolve import scene_named
+    from lessons.parallel import on_cluster, on_cores
 
     chosen = controller or scene_named(scene).settings.controller
     definition = make_sweep(Job(scene, chosen, tuple(set), duration, seed), over)
