@@ -25,10 +25,10 @@ CELLS = 8
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """A scheduler with two worker processes; work that kills one is given up after the second."""
-    import dask
+    from dask.config import set as configured
 
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        configured({"distributed.scheduler.allowed-failures": 1}),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, protocol="tcp"
         ) as found,

@@ -185,9 +185,9 @@ def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
 def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
     """Every item has its result, and only what was under way at that moment runs in a process of its own."""
     outcomes = dict(on_cores(dies_once, [(tmp_path / "died", value) for value in range(12)]))
-    assert sorted(outcomes) == list(range(12))
-    assert [outcomes[value][0] for value in range(12)] == list(range(12))
-    assert len({pid for _, pid in outcomes.values()}) <= 3 * cores()
+    done = {place: outcome for place, outcome in outcomes.items() if not isinstance(outcome, Failed)}
+    assert {place: value for place, (value, _) in done.items()} == {value: value for value in range(12)}
+    assert len({pid for _, pid in done.values()}) <= 3 * cores()
 
 
 def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
