@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+if __name__ == "__main__":
+    import app.commands.early  # noqa: F401  (first of all)
+
 import os
 import sys
 from collections.abc import Callable, Sequence

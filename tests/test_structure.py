@@ -72,7 +72,7 @@ def test_imports_go_one_way(package: str) -> None:
 
 
 APP = {
-    "commands": ("server", "html", "link"),
+    "commands": ("server", "html", "link", "__main__"),
     "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
     "page": ("panels", "view", "client", "html", "link", "adapter"),
     "panels": ("view", "client", "html", "link", "adapter"),

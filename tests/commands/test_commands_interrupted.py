@@ -135,3 +135,33 @@ with interruptible():
     _, errors = process.communicate(timeout=LONG)
     assert process.returncode == 130
     assert errors == ""
+
+
+BEFORE_ANYTHING = """
+import importlib.abc, os, runpy, signal, sys
+
+class Interrupted(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name == "app.commands.interrupts":
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupted())
+{start}
+"""
+
+
+@pytest.mark.parametrize(
+    "start",
+    ["runpy.run_module('app', run_name='__main__')", "from app.commands.early import main; sys.exit(main())"],
+    ids=["module", "script"],
+)
+def test_ctrl_c_while_the_first_modules_load(start: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", BEFORE_ANYTHING.replace("{start}", start), "scenes"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
