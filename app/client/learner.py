@@ -13,7 +13,21 @@ from app.client.simulation import Simulation, aside
 from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture
-from app.link.messages import Failed, Lead, Leash, Load, Ready, Report, ResetAll, Script, Status, Tell, Told
+from app.link.messages import (
+    Failed,
+    Lead,
+    Leash,
+    Load,
+    Loading,
+    Ready,
+    Refused,
+    Report,
+    ResetAll,
+    Script,
+    Status,
+    Tell,
+    Told,
+)
 from app.link.process import Process
 from app.link.spares import Spares
 
@@ -32,6 +46,9 @@ class Learner(Simulation):
         self.ghost: Ghost | None = None
         self.lecture: Lecture | None = None
         self._asking: deque[Queue[Told | None]] = deque()
+        self._unheard: tuple[SceneChoice | None, int] | None = None
+        """A scene (None: the one that is there) that was asked for and not heard of yet, and how often the
+        scene had been reset by then."""
         super().__init__(spares)
         self.send(Load(choice))
 
@@ -42,17 +59,20 @@ class Learner(Simulation):
 
     def load(self, choice: SceneChoice) -> None:
         """Another scene, in a new process if this one is in trouble."""
-        if self.trouble() is None:
-            self.send(Load(choice))
-        else:
-            self.restart(choice)
+        self._begin_anew(Load(choice), choice)
 
     def reset_all(self) -> None:
         """The scene from its beginning; in a new process if this one is in trouble."""
-        if self.trouble() is None:
-            self.send(ResetAll())
-        else:
-            self.restart()
+        self._begin_anew(ResetAll(), None)
+
+    def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None) -> None:
+        """Also if the process has just died and nobody knows it yet."""
+        with self._lock:
+            if self.trouble() is not None:
+                self.restart(choice)
+                return
+            self._unheard = choice, -1 if self.status is None else self.status.resets
+            self.send(command)
 
     def restart(self, choice: SceneChoice | None = None) -> None:
         """A new process, for another scene or for the one that was last there. The one before ends, by force
@@ -62,7 +82,7 @@ class Learner(Simulation):
                 return
             before, ghost = self._process, self.ghost
             mute = super().trouble() is not None
-            self.failure = None
+            self.failure = self._unheard = None
             self._forget_questions()
             self._start()
             self.send(Load(choice or self.choice))
@@ -91,6 +111,7 @@ class Learner(Simulation):
         super()._hear(process, report)
         if process is not self._process:
             return
+        self._acknowledge(report)
         match report:
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
@@ -99,15 +120,27 @@ class Learner(Simulation):
                 with self._lock:
                     if self._asking:
                         self._asking.popleft().put(report)
-            case Failed():
+            case Failed(_, died):
                 with self._lock:
                     self._forget_questions()
+                    if died and self._unheard is not None and process is self._process:
+                        self.restart(self._unheard[0])
             case Script():
                 ghost = self.ghost
                 if ghost is not None:
                     ghost.hear(report)
             case _:
                 pass
+
+    def _acknowledge(self, report: Report) -> None:
+        with self._lock:
+            match report, self._unheard:
+                case Status(resets=resets), (_, before) if resets != before:
+                    self._unheard = None
+                case Loading() | Ready() | Refused(), _:
+                    self._unheard = None
+                case _:
+                    pass
 
     # ---------------------------------------------------------------- questions
 

@@ -30,7 +30,7 @@ from robots.orphans import end_with
 PATIENCE = 10.0
 """s after which a server that is ready but does not fork counts as stuck."""
 FIRST_PATIENCE = 120.0
-"""s it may take to get ready, compiling included, before it counts as stuck."""
+"""s it may say nothing while it gets ready, compiling included, before it counts as stuck."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,7 @@ class ForkServer:
             os.close(life)
         self.ready = False
         self.doing = ""
+        self._heard_at = time.monotonic()
         self._ended = False
         self._asked: list[tuple[float, Forked]] = []
         self._wire = Wire(ours)
@@ -102,7 +103,9 @@ class ForkServer:
     def _hear(self) -> None:
         with contextlib.suppress(EOFError, OSError):
             while True:
-                match self._wire.recv():
+                word = self._wire.recv()
+                self._heard_at = time.monotonic()
+                match word:
                     case Preparing(sentence):
                         self.doing = sentence
                     case Prepared():
@@ -117,7 +120,7 @@ class ForkServer:
         with self._lock:
             self._asked = [each for each in self._asked if each[1].unborn]
             patience = PATIENCE if self.ready else FIRST_PATIENCE
-            return any(now - since > patience for since, _ in self._asked)
+            return any(now - max(since, self._heard_at) > patience for since, _ in self._asked)
 
     def fork(self, theirs: socket.socket) -> Forked:
         """A child with this end of its socket. Raises OSError if the server is gone or does not read."""

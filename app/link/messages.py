@@ -251,9 +251,10 @@ class Refused:
 
 @dataclass(frozen=True)
 class Failed:
-    """The simulation stopped with an exception."""
+    """The simulation stopped with an exception; `died`: its process ended without a word of its own."""
 
     sentence: str
+    died: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,7 +89,7 @@ class Process:
         self._ended.set()
         self._outbox.close()
         if not self._closed and not failed:
-            self._pass_on(Failed(_obituary(self._child.exitcode)))
+            self._pass_on(Failed(_obituary(self._child.exitcode), died=True))
         self._wire.hang_up()
         self._outbox.join()
         self._wire.close()

@@ -130,6 +130,25 @@ def test_a_fork_server_that_hangs_is_replaced(start: Start, monkeypatch: pytest.
     assert gone(before) and running(learner)
 
 
+def test_a_fork_server_that_says_what_it_does_is_not_stuck(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slow machine may take minutes to compile."""
+    learner = start("idle", "slow")
+    server = server_of(learner)
+    assert wait_until(lambda: bool(server.doing), LONG)
+    monkeypatch.setattr(forkserver, "FIRST_PATIENCE", 3.0)
+    seen: set[str] = set()
+
+    def gets_ready() -> bool:
+        seen.add(server.doing)
+        return server.ready or not server.alive or server.stuck
+
+    assert wait_until(gets_ready, LONG)
+    assert server.ready and len(seen) > 2
+    assert psutil.Process(born(learner)).ppid() == server.pid
+
+
 # ---------------------------------------------------------------- silence
 
 
@@ -185,6 +204,25 @@ def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.Mo
     assert wait_until(lambda: gone(pid), LONG)
     assert learner.choice.name == "planar3-hold"
     assert learner.ask() is not None
+
+
+@pytest.mark.parametrize("scene", [None, "panda-hold"])
+def test_what_is_pressed_before_a_death_is_known_is_done(start: Start, scene: str | None) -> None:
+    """*Reset all*, or another scene, in the moment between a child's death and the word of it."""
+    learner = start("planar3-hold")
+    assert wait_until(lambda: running(learner), LONG)
+    pid, ready = born(learner), learner.ready
+    with learner._lock:  # nothing is heard meanwhile
+        os.kill(pid, signal.SIGKILL)
+        assert wait_until(lambda: gone(pid), LONG)
+        if scene is None:
+            learner.reset_all()
+        else:
+            learner.load(SceneChoice(scene))
+    assert wait_until(lambda: learner.ready is not ready and running(learner), LONG)
+    assert learner.choice.name == (scene or "planar3-hold") and learner.failure is None
+    os.kill(born(learner), signal.SIGKILL)  # what was done is not done twice
+    assert wait_until(lambda: learner.failure is not None, LONG)
 
 
 def test_a_ghost_that_hangs_is_started_again_with_its_robot(start: Start) -> None:

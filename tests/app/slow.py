@@ -1,0 +1,16 @@
+"""A fork server that takes long to get ready, and says what it does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from stubborn import main
+
+__all__ = ["main", "warm"]
+
+
+def warm(say: Callable[[str], None]) -> None:
+    for done in range(20):
+        say(f"{done} of 20")
+        time.sleep(0.3)
