@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from app.page.scene_ui import Context, Face
 from app.page.torque_ui import TorqueFace
 from app.page.velocity_ui import VelocityFace
+from lessons.settings.settings import Settings
 from lessons.settings.torque import TorqueSettings
+from lessons.settings.velocity import VelocitySettings
 
 __all__ = ["Context", "Face", "face_for"]
+
+_FACES: dict[type[Settings], Callable[[Context], Face]] = {
+    TorqueSettings: TorqueFace,
+    VelocitySettings: VelocityFace,
+}
 
 
 def face_for(context: Context) -> Face:
     """The face of the kind of scene that is loaded."""
-    torque = isinstance(context.ready.settings, TorqueSettings)
-    return TorqueFace(context) if torque else VelocityFace(context)
+    return _FACES[type(context.ready.settings)](context)

@@ -134,7 +134,7 @@ def test_the_first_run_equals_the_second(tmp_path: Path) -> None:
     runs = []
     for name in ("first", "second"):
         file = tmp_path / f"{name}.npz"
-        command = ["run", "planar3-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
+        command = ["run", "iiwa14-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
         done = subprocess.run(
             [sys.executable, "-m", "app", *command],
             cwd=ROOT,
