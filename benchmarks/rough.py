@@ -38,6 +38,7 @@ from browsing.wire import Wire, eventually
 LONG = 60.0  # s
 UPLOAD = 40_000_000  # bytes
 _PART = 500_000
+_REFUSED = "refused in one sentence"
 _INSIDE = "HIMPC_LAB_ROUGH_INSIDE"
 
 
@@ -91,7 +92,8 @@ def treat(kills: int, stops: int) -> dict[str, object]:
                 for each in uploads:
                     each.join(LONG)
                 counts["uploads of 40 MB"] = ", ".join(answers)
-                treated, recovered = treated + 1, recovered + _runs(learners[0])
+                treated += 2
+                recovered += answers.count(_REFUSED) if _runs(learners[0]) else 0
     finally:
         server.close()
 
@@ -169,8 +171,12 @@ def _upload(page: Wire, answers: list[str]) -> None:
     except (ConnectionClosed, OSError):
         answers.append("connection ended")
         return
-    answered = eventually(lambda: any(title == "Not uploaded" for title, _ in page.notices), 10.0)
-    answers.append("refused in a sentence" if answered else "no answer")
+
+    def notices() -> int:
+        return [title for title, _ in page.notices].count("Not uploaded")
+
+    answered = eventually(lambda: notices() > 0, 10.0)
+    answers.append((_REFUSED if notices() == 1 else f"{notices()} notices") if answered else "no answer")
 
 
 @contextlib.contextmanager

@@ -13,14 +13,14 @@ import threading
 import uuid
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
-from app.adapter.probe import answer, reaches, refuse
+from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.wake import WakeUp
 from robots import InputError
 
@@ -38,8 +38,7 @@ _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
 
 _UNSENT = 32_000
-"""Bytes that may wait in the machine's own buffer. Its usual megabytes are seconds of old pictures where the
-line is slow."""
+"""Bytes that may wait in the machine's own buffer; its usual megabytes are seconds of old pictures."""
 
 _OF_MODULES = (
     (_messages, ("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage")),
@@ -70,9 +69,9 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
-        _require(served == [True], "how it serves")
+        require(served == [True], "how it serves")
         for path in _OF_A_SERVER:
-            _require(reaches(server, path), path)
+            require(reaches(server, path), path)
         handlers = server._websock_server
         # Any client could ask for a public tunnel to this machine, button or not.
         for tunnel in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
@@ -95,7 +94,7 @@ def self_test(guard: Guard) -> None:
     server of its own that nothing stands behind, on this machine only. Raises InputError."""
     for module, names in _OF_MODULES:
         for name in names:
-            _require(hasattr(module, name), name)
+            require(hasattr(module, name), name)
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
         bare.start()
@@ -103,7 +102,7 @@ def self_test(guard: Guard) -> None:
             refused = answer(bare._port).startswith(b"HTTP/1.1 503")
         finally:
             bare.stop()
-    _require(served == [True] and refused, "how it serves")
+    require(served == [True] and refused, "how it serves")
 
 
 @contextlib.contextmanager
@@ -131,14 +130,6 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
             yield served
         finally:
             web.serve = plain
-
-
-def _require(found: bool, what: str) -> None:
-    if not found:
-        raise InputError(
-            f"viser {viser.__version__} is not the one this page was made for ({what} has changed): it is "
-            "not served, for nobody could be kept out. Install viser 1.1 again."
-        )
 
 
 def _keep_awake(server: viser.ViserServer) -> None:
@@ -175,8 +166,12 @@ def give_workers(client: viser.ClientHandle, workers: ThreadPoolExecutor) -> Non
 
 def unfinished_uploads(client: viser.ClientHandle) -> int:
     """Bytes that have come of files that are not complete."""
-    uploads = list(client.gui._current_file_upload_states.values())
-    return sum(state["transferred_bytes"] for state in uploads)
+    return sum(one["transferred_bytes"] for one in list(client.gui._current_file_upload_states.values()))
+
+
+def forget_upload(client: viser.ClientHandle, transfer: str) -> None:
+    """Drops what has come of a file; parts of it that still come are dropped, too."""
+    client.gui._current_file_upload_states.pop(transfer, None)
 
 
 async def read_storage(
@@ -242,20 +237,26 @@ def intercept(client: viser.ClientHandle, take: Inlet) -> None:
     connection._handle_incoming_message = handle
 
 
-def is_write(message: Any) -> bool:
-    """Whether it changes a control: `uuid` says which one, `updates` what of it."""
-    return isinstance(message, _messages.GuiUpdateMessage)
+Kind = Literal["write", "upload", "hand", "other"]
 
 
-def is_of_hand(message: Any) -> bool:
-    """Whether it tells what a hand did in the 3D view."""
-    hands = (
-        _messages.TransformControlsUpdateMessage,
-        _messages.SceneNodeDragMessage,
-        _messages.SceneNodeClickMessage,
-        _messages.ScenePointerMessage,
-    )
-    return isinstance(message, hands)
+def kind_of(message: Any) -> Kind:
+    """Whether it changes a control (`uuid`, `updates`), begins a file (for `source_component_uuid`), tells
+    what a hand did in the 3D view, or is anything else."""
+    match message:
+        case _messages.GuiUpdateMessage():
+            return "write"
+        case _messages.FileTransferStartUpload():
+            return "upload"
+        case (
+            _messages.TransformControlsUpdateMessage()
+            | _messages.SceneNodeDragMessage()
+            | _messages.SceneNodeClickMessage()
+            | _messages.ScenePointerMessage()
+        ):
+            return "hand"
+        case _:
+            return "other"
 
 
 # ---------------------------------------------------------------- one control

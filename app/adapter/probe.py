@@ -5,8 +5,11 @@ from __future__ import annotations
 import socket
 from http import HTTPStatus
 
+import viser
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
+
+from robots import InputError
 
 
 def answer(port: int) -> bytes:
@@ -29,3 +32,12 @@ def reaches(start: object, path: str) -> bool:
         except (AttributeError, RecursionError):
             return False
     return True
+
+
+def require(found: bool, what: str) -> None:
+    """Raises InputError unless a seam was found: nothing is served then."""
+    if not found:
+        raise InputError(
+            f"viser {viser.__version__} is not the one this page was made for ({what} has changed): it is "
+            "not served, for nobody could be kept out. Install viser 1.1 again."
+        )

@@ -11,6 +11,7 @@ import viser
 
 from app.adapter import private
 from app.page.values import NotAllowed, allowed, in_reach
+from app.panels.widgets.in_view import tells_what_is_seen
 
 _OFTEN = 2.0  # s between two notices of one page
 _GONE = "What you just pressed or changed was replaced meanwhile: if it is still there, do it once more."
@@ -28,12 +29,15 @@ class Inlet:
 
     async def _take(self, message: Any, go_on: Callable[[Any], Awaitable[None]]) -> None:
         try:
-            if private.is_write(message):
-                await self._write(message, go_on)
-            elif not private.is_of_hand(message) or in_reach(list(vars(message).values())):
-                await go_on(message)
-            else:
-                self._say("Not moved", _FAR)
+            match private.kind_of(message):
+                case "write":
+                    await self._write(message, go_on)
+                case "upload" if not private.control_of(self._client, message.source_component_uuid):
+                    self._say("Not taken", _GONE)
+                case "hand" if not in_reach(list(vars(message).values())):
+                    self._say("Not moved", _FAR)
+                case _:
+                    await go_on(message)
         except Exception as error:
             traceback.print_exc()
             self._say("That did not work", f"{type(error).__name__}: {error}"[:300])
@@ -41,7 +45,8 @@ class Inlet:
     async def _write(self, message: Any, go_on: Callable[[Any], Awaitable[None]]) -> None:
         handle = private.control_of(self._client, message.uuid)
         if handle is None:
-            self._say("Not taken", _GONE)
+            if not tells_what_is_seen(message.updates):
+                self._say("Not taken", _GONE)
             return
         try:
             value = allowed(handle, message.updates)

@@ -20,21 +20,18 @@ from app.server import budget
 from app.server.budget import Budget
 from app.server.crowd import Crowd
 from app.server.door import Answer, Door, is_upgrade, secured
+from app.server.uploads import TRANSFER, Uploads
 
 HANDSHAKE = 5.0
 """s for a request to be complete."""
 FIRST_WORD = 45.0
 """s for a page to say something: drawing the first picture may take long without a graphics card."""
 _SLICE = 4096  # B that are parsed before anybody looks whether it was too much
-_TRANSFER = b"FileTransfer"  # in every message that begins or carries a file
 _PAGE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     "<title>{title}</title><body style='font:16px/1.5 sans-serif;max-width:40em;margin:3em auto'>"
     "<h1>{title}</h1>{text}</body></html>"
 )
-
-Uploads = tuple[Callable[[], int], Callable[[], object]]
-"""Of one page: bytes of unfinished files; and what says that a file was too much."""
 
 
 class Guard:
@@ -65,7 +62,8 @@ class Guard:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
                 return _response(answer)
             if is_upgrade(request):
-                asyncio.get_running_loop().call_later(FIRST_WORD, self._expect_word, connection)
+                if isinstance(connection, GuardedConnection):
+                    connection.expect_word(FIRST_WORD)
                 return None
             return files(connection, request)
 
@@ -102,13 +100,9 @@ class Guard:
         named = [] if request is None else request.headers.get_all("X-Forwarded-For")
         return named[-1].rpartition(",")[2].strip()[:64] if named else None
 
-    def _expect_word(self, connection: ServerConnection) -> None:
-        if not self.crowd.has_spoken(connection):
-            connection.transport.abort()
-
 
 class GuardedConnection(ServerConnection):
-    """Counts before it decodes. `uploads` is what the page it serves tells about its files."""
+    """Counts before it decodes. `uploads` are those of the page it serves."""
 
     def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
         super().__init__(*of, **more)
@@ -116,6 +110,15 @@ class GuardedConnection(ServerConnection):
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0
+        self._expecting: asyncio.TimerHandle | None = None
+
+    def expect_word(self, patience: float) -> None:
+        """Who is silent for so many seconds is gone."""
+        self._expecting = self.loop.call_later(patience, self._end_if_silent)
+
+    def _end_if_silent(self) -> None:
+        if not self._guard.crowd.has_spoken(self):
+            self.transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
@@ -123,6 +126,8 @@ class GuardedConnection(ServerConnection):
             self.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
+        if self._expecting is not None:
+            self._expecting.cancel()  # it would keep all of a page that is gone
         self._guard.crowd.leave(self)
         super().connection_lost(exc)
 
@@ -156,21 +161,15 @@ class GuardedConnection(ServerConnection):
                 await asyncio.sleep(waiting)
             if self._budget.spent:
                 await self._end(CloseCode.POLICY_VIOLATION, "Too many messages.")
-            if _TRANSFER in raw and not await self._may_upload(len(raw)):
+            if TRANSFER in raw and not await self._may_upload(raw):
                 continue
             self._guard.crowd.spoke(self)
             self._guard.taken += 1
             return raw
 
-    async def _may_upload(self, size: int) -> bool:
-        if self.uploads is None:
-            return False
+    async def _may_upload(self, raw: bytes) -> bool:
         await asyncio.sleep(0)  # what came before has been taken
-        unfinished, say = self.uploads
-        if self._budget.uploads(size, unfinished):
-            return True
-        say()
-        return False
+        return self.uploads is not None and self.uploads.takes(raw, self._budget)
 
     async def _end(self, code: CloseCode, reason: str) -> NoReturn:
         await self.close(code, reason)

@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import viser
 
@@ -18,6 +19,7 @@ from app.server.budget import UPLOADS
 from app.server.classroom import Classroom, Watcher
 from app.server.guard import GuardedConnection
 from app.server.sessions import Sessions
+from app.server.uploads import Uploads
 from app.server.workers import Workers, told
 
 STORAGE = 5.0
@@ -55,7 +57,11 @@ class Visit:
         private.keep_short(server, client)
         connection = private.connection_of(server, client)
         if isinstance(connection, GuardedConnection):
-            connection.uploads = (lambda: private.unfinished_uploads(client), self._refuse_upload)
+            connection.uploads = Uploads(
+                partial(private.unfinished_uploads, client),
+                partial(private.forget_upload, client),
+                self._refuse_upload,
+            )
 
     async def arrive(self) -> None:
         """On viser's loop. A browser that does not answer is a new one."""
@@ -149,7 +155,7 @@ class Visit:
         self._client.add_notification(
             "Not uploaded",
             f"Files that are on their way may have {UPLOADS // 1_000_000} MB in all: give a smaller one, or "
-            "reload the page and try again.",
+            "wait until the others have come.",
             color="red",
         )
 

@@ -15,6 +15,7 @@ from app.link.messages import Load
 from app.page.layout import Stage
 from app.page.page import Page
 from app.panels.run.help import HelpPanel
+from app.panels.widgets.in_view import AWAKE, LABEL
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
@@ -73,8 +74,12 @@ def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.Monk
             assert before is not None
             server.sessions.learners[0].send(Load(SceneChoice("ridgeback-ur10-drag")))
             assert eventually(lambda: page.find("Playback") not in (None, before))
+            said = len(page.notices)
+            told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
+            page.write(told, value=f"{AWAKE}\nErrors")  # by the page itself: nobody pressed anything
             page.write(before, value="Pause")
             assert eventually(lambda: any("replaced" in body for _, body in page.notices))
+            assert len(page.notices) == said + 1
     finally:
         server.close()
 

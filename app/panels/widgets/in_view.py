@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 
 import viser
 
@@ -53,6 +54,12 @@ window[key] = () => {
 };
 look();
 """
+
+
+def tells_what_is_seen(updates: Mapping[str, object]) -> bool:
+    """Whether a write to a control is the script's: nobody pressed anything."""
+    value = updates.get("value")
+    return isinstance(value, str) and value.partition("\n")[0] in (AWAKE, ASLEEP)
 
 
 class InView:

@@ -1,0 +1,52 @@
+"""Files that one page sends: each is taken whole or refused in one sentence."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import msgspec
+
+from app.server.budget import UPLOADS, Budget
+
+TRANSFER = b"FileTransfer"
+"""In every message that begins or carries a file."""
+_REMEMBERED = 64  # refused files whose parts may still come
+
+
+class _Transfer(msgspec.Struct):
+    """What is read of such a message; its bytes are skipped."""
+
+    transfer_uuid: str = ""
+    size_bytes: int = 0
+
+
+class Uploads:
+    """Of one page.
+
+    Args:
+        unfinished: bytes of its files that are not complete.
+        forget: drops what has come of a file.
+        say: tells its user that a file was too much.
+    """
+
+    def __init__(
+        self, unfinished: Callable[[], int], forget: Callable[[str], None], say: Callable[[], None]
+    ) -> None:
+        self._unfinished, self._forget, self._say = unfinished, forget, say
+        self._refused: deque[str] = deque(maxlen=_REMEMBERED)
+
+    def takes(self, raw: bytes, budget: Budget) -> bool:
+        """Whether a message that begins or carries a file may go on."""
+        try:
+            part = msgspec.msgpack.decode(raw, type=_Transfer)
+        except msgspec.DecodeError:
+            part = _Transfer()
+        if part.transfer_uuid in self._refused:
+            return False
+        if part.size_bytes <= UPLOADS and budget.uploads(len(raw), self._unfinished):
+            return True
+        self._refused.append(part.transfer_uuid)
+        self._forget(part.transfer_uuid)
+        self._say()
+        return False

@@ -1,0 +1,89 @@
+"""Files that a page sends: what is too much is refused in one sentence, and holds nothing afterwards."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+
+import pytest
+from viser import _messages
+
+from app.adapter import private
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+
+LONG = 60.0
+PART = 500_000
+LARGE = 40_000_000
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=8, grace=1.0)
+    yield running
+    running.close()
+
+
+def shown(page: Wire) -> str:
+    """The button to upload a robot, once it is there."""
+    assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)
+    button = page.find("Upload a URDF")
+    return button or shown(page)
+
+
+def upload(page: Wire, name: str, content: bytes, parts: int = 1, size: int | None = None) -> None:
+    """parts: how often the content is sent; size: what is said beforehand that it is."""
+    button, size = shown(page), parts * len(content) if size is None else size
+    page.say(_messages.FileTransferStartUpload(button, name, "robot.urdf", "text/xml", parts, size))
+    for place in range(parts):
+        page.say(_messages.FileTransferPart(button, name, place, content))
+
+
+def refusals(page: Wire) -> int:
+    return [title for title, _ in page.notices].count("Not uploaded")
+
+
+def taken(page: Wire) -> bool:
+    """A file that comes afterwards is read: the page says what is wrong with it."""
+    upload(page, "small", b"\xff")
+    return eventually(lambda: page.shows("is not text"), LONG)
+
+
+@pytest.mark.parametrize("said", [LARGE, 100], ids=["honest", "lying"])
+def test_each_page_is_told_once(server: PageServer, said: int) -> None:
+    """Two at once, on pages whose robots were killed and started again."""
+    with Wire(server.url) as one, Wire(server.url) as two:
+        before = {page: shown(page) for page in (one, two)}
+        for learner in [each for each in server.sessions.learners if each.attached]:
+            pid = learner.pid
+            assert pid is not None
+            os.kill(pid, signal.SIGKILL)
+            assert eventually(lambda learner=learner: learner.trouble() is not None, LONG)
+            learner.restart()
+        for page, button in before.items():
+            assert eventually(lambda page=page, button=button: shown(page) != button, LONG)
+        for page in (one, two):
+            upload(page, "large", bytes(PART), parts=24, size=said)
+        for page in (one, two):
+            assert eventually(lambda page=page: refusals(page) > 0, LONG)
+            assert taken(page)
+            assert refusals(page) == 1
+        clients = server._viser.get_clients().values()
+        assert eventually(lambda: all(private.unfinished_uploads(each) == 0 for each in clients), LONG)
+
+
+def test_two_large_files_of_one_page_are_two_sentences(server: PageServer) -> None:
+    with Wire(server.url) as page:
+        for name in ("first", "second"):
+            upload(page, name, bytes(PART), parts=2, size=LARGE)
+        assert eventually(lambda: refusals(page) == 2, LONG)
+        assert taken(page) and refusals(page) == 2
+
+
+def test_a_file_for_what_was_replaced_is_told(server: PageServer) -> None:
+    with Wire(server.url) as page:
+        assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)
+        page.say(_messages.FileTransferStartUpload("gone", "one", "robot.urdf", "text/xml", 1, 10))
+        assert eventually(lambda: any("replaced" in body for _, body in page.notices), LONG)
