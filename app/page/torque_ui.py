@@ -21,6 +21,7 @@ from app.panels.torque.tasks import TasksPanel
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import draggable
 from app.view.drag import Hand
+from app.view.ellipsoids import EllipsoidView
 from app.view.pull import Pull
 from app.view.robot import RobotView, camera_for
 from app.view.target import Frames
@@ -99,6 +100,7 @@ class TorqueFace:
             lambda: bool(self._start.clamp.value),
             self._start.dragged,
         )
+        self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [
             (task.path, context.colours[task.level])
@@ -144,6 +146,8 @@ class TorqueFace:
         self._level_plots.draw(moment.window, beside, T_s)
         self._joint_plots.draw(moment.window, beside)
         self._inside.draw(moment)
+        q = moment.latest[context.ready.layout.fields["q"]]
+        self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
 
     def write(self, now: Snapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:

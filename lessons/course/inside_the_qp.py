@@ -1,152 +1,203 @@
 """Inside the QP
 
-One millisecond taken apart: what exactly is solved, and who feels which bound?
+One millisecond on a sheet of paper: what is asked for, what is left, and who feels which bound?
 
-Minutes: 12
-You need: lesson "torque-has-a-limit"; what a Lagrange multiplier is
+Minutes: 15
+You need: lesson "torque-has-a-limit"; ellipses as the contours of a quadratic function
 """
 
 from __future__ import annotations
 
+from lessons.events import MoveLevel, MoveTarget
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
-from lessons.teaching.lesson import Lesson, Step, card_of
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
 from lessons.teaching.measure import Measure, Signal
-from lessons.teaching.prediction import Choice, Option, Value
+from lessons.teaching.prediction import Choice, Option
 
-HAND = Signal("error/position", "mm")
+WRIST = Signal("error/reach", "mm")
+JOINTS = Signal("error/pose", "deg")
 TORQUE = Signal("torque share", "%")
-RESIDUAL_1, RESIDUAL_2 = Signal("kkt/position"), Signal("kkt/q1")
-ACTIVE_1, ACTIVE_2 = Signal("active/position"), Signal("active/q1")
+ACTIVE_1, ACTIVE_2 = Signal("active/reach"), Signal("active/pose")
+LEAK, TRUE_LEAK = Signal("priority_leak", "m/s²"), Signal("dynamic_leak", "m/s²")
+ASIDE = (0.1, MoveTarget("reach", (0.33,)))  # by 10 cm
 SCALE = Control("limits.torque_scale", "Torque limit, factor", 0.01, 1.0, log=True)
-# What the plant of this scene really is, told to the controller.
-EXACT = (
-    "nominal.mass_scale=1",
-    "nominal.inertia_scale=1",
-    "nominal.armature=[0.05,0.05,0.03]",
-    "nominal.damping=[0.15,0.1,0.08]",
-)
-TIGHT = ("q1_amplitude_deg=60", "limits.torque_scale=0.04")
+WEIGHT = Control("levels.reach.Q", "Q of level 1", 1.0, 1000.0, log=True)
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "weighted", "osf"))
 
-ONE_TICK = Step(
-    title="One tick",
+LINE = Step(
+    title="A valley and a line",
     text=r"""
-    Three joints, $N = 5$ steps: $U$ stacks fifteen torque changes. Each level is a quadratic
-    program (35),
+    The picture on the left is one tick. With $N = 1$ the unknowns are three torque changes; joint 3
+    only holds its own angle, so all the rest happens in the plane of $\Delta\tau_1$ and
+    $\Delta\tau_2$. The red frame holds the bounds: nothing outside can be asked for.
 
-    $$\min_U \; U^\top \mathcal{Q}\, U + U^\top \mathcal{L} \quad \text{s.t.} \quad C U + D \le 0,
-    \; \mathcal{H}(U) = 0$$
-
-    with bounds on position, speed and torque at every knot, and the equality (33) towards the
-    levels above. Step by step with the pause key: one tick, one solution.
+    **Level 1** (orange) wants *one* number, the wrist's $x$. One equation for two unknowns: its
+    cost (31) is a long valley, and its optimum the disc 1 ($R$ picks the one nearest to no change
+    at all). **(33)** says: whatever comes below must not touch this. What it leaves is the orange
+    line. **Level 2** (blue) wants both joints to stay where they are. At 0.1 s the wrist's target
+    moves aside by 10 cm.
     """,
-    do="Pause, step tick by tick, and read off the active bounds.",
+    do="Drag the target to and fro: line, valley and both discs move along. Pause, and go tick by tick (T).",
     why=r"""
-    A point is the solution if it satisfies the optimality conditions (KKT): feasible, multipliers
-    of the right sign, gradient balanced. This residual is computed afresh for every point that is
-    applied, whatever the solver says of itself. With room to spare no bound is active, and the
-    solution is that of a linear system.
+    Blue would like to be at the ring "2 alone", the middle of its ellipses. It may only choose on
+    the line, and takes the point where one of its ellipses just touches it. The wrist arrives and
+    blue pays with 14 degrees, for good: seen from the line there is no better point. At rest both
+    discs lie at zero, "leave the torque as it is", and the ring stays outside.
     """,
     prediction=Choice(
-        "Nothing presses on the arm here. How many of the bounds are active, on average, at level 2?",
+        "The wrist goes 10 cm aside, and both joints want to stay. In the end the joints are off by …",
         (
-            Option("none", high=0.01),
-            Option("a few", 0.01, 5.0),
-            Option("about half of them", low=5.0),
+            Option("nothing: three joints are enough for all", high=1.0),
+            Option("ten to twenty degrees, and the wrist is on its target", 10.0, 20.0),
+            Option("half of that: the wrist and the joints share the loss", 5.0, 10.0),
         ),
-        Measure(ACTIVE_2, "mean"),
-        tempting=1,
+        Measure(JOINTS, "last"),
+        tempting=2,
     ),
     claims=(
         Claim(
-            "Level 2's solutions miss their optimality conditions by less than 10⁻¹⁰.",
-            Measure(RESIDUAL_2),
+            "Level 1 gets what it asks for: in the end less than 0.01 mm is missing.",
+            Measure(WRIST, after=1.9),
+            "at most",
+            0.01,
+            fails_with=("controller=weighted",),
+            because="one cost for all has no line, only a compromise",
+        ),
+        Claim(
+            "Level 2 is more than 10° away from what it wants.",
+            Measure(JOINTS, "last"),
+            "at least",
+            10.0,
+            fails_with=("order=pose,reach,wrist",),
+            because="then it chooses first",
+        ),
+        Claim(
+            "Every point of level 2 misses its optimality conditions by less than 10⁻¹⁰.",
+            Measure(Signal("kkt/pose")),
             "at most",
             1e-10,
             fails_with=("route=explicit", "solver=proxqp"),
             because="an iterative solver stops once it is near enough",
         ),
-        Claim(
-            "No bound is active.",
-            Measure(ACTIVE_2),
-            "at most",
-            0.0,
-            fails_with=("limits.torque_scale=0.04",),
-            because="then level 2 meets the torque limit",
-        ),
     ),
-    set=("q1_amplitude_deg=60",),
-    duration=1.0,
-    controls=(SCALE, Control("horizon", "N", 1, 20)),
-    plots=(RESIDUAL_1, RESIDUAL_2, ACTIVE_1, ACTIVE_2),
+    events=(ASIDE,),
+    controls=(WEIGHT, CONTROLLER),
+    plots=(WRIST, JOINTS),
 )
 
-BINDING = Step(
-    title="Who feels the bound",
+SWAP = Step(
+    title="Swap the levels",
     text=r"""
-    Torque is short: 4 % of the limit. An active row has a multiplier $\mu > 0$, the price at which
-    a little more of that bound would be bought. A joint can sit at its bound in both levels; what
-    differs is the price each of them would pay, and so does the cost (31) that is left.
+    The same again, but at 1.2 s the two levels change places: blue becomes level 1. It wants *two*
+    numbers, so look at what (33) can leave of a plane then.
     """,
-    do="In the list of active bounds, compare the multipliers of level 1 and level 2.",
+    do="Swap them back and forth while you watch the line come and go.",
     why=r"""
-    Level 1 is served: its cost is practically zero. Level 2 leaves a hundred million times as much
-    on the table and would pay a lot for torque. The same row, seen by two levels: to one it is a
-    fact, to the other an obstacle.
+    Two equations for two unknowns leave a point. The line is gone, disc 1 sits in the middle of the
+    blue ellipses, and the orange valley has to take what is there: the wrist goes all the way back,
+    10 cm off its target, though it is *wanted* as much as before. Same costs, same numbers, another
+    order: only the roles have changed.
     """,
-    prediction=Value(
-        "How many of the bounds at the five knots are active at level 2, on average?",
-        Measure(ACTIVE_2, "mean"),
-        low=0.1,
-        high=60.0,
-        factor=1.5,
+    prediction=Choice(
+        "The wrist is on its target when its level becomes the second. A second later it is …",
+        (
+            Option("still there: nobody has moved the target", high=10.0),
+            Option("half way back", 10.0, 80.0),
+            Option("back where it began, 10 cm off", low=80.0),
+        ),
+        Measure(WRIST, after=2.2),
+        tempting=0,
     ),
     claims=(
         Claim(
-            "Level 2 has active bounds most of the time: two or more on average.",
-            Measure(ACTIVE_2, "mean"),
-            "at least",
-            2.0,
-            fails_with=("limits.torque_scale=1",),
-            because="there is room to spare",
+            "The joints return to their angles: less than 0.2° is missing in the end.",
+            Measure(JOINTS, "last"),
+            "at most",
+            0.2,
+            fails_with=("controller=weighted",),
+            because="a sum does not care for the order",
         ),
         Claim(
-            "Level 1 is left with a cost below 0.01.",
-            Measure(Signal("cost/position")),
+            "The wrist ends more than 90 mm from its target.",
+            Measure(WRIST, after=2.3),
+            "at least",
+            90.0,
+            fails_with=("controller=weighted",),
+            because="there the wrist keeps half of its way",
+        ),
+    ),
+    events=(ASIDE, (1.2, MoveLevel("pose", 0))),
+    duration=2.6,
+    controls=(Control("order", "Order", choices=("reach,pose,wrist", "pose,reach,wrist")),),
+    plots=(WRIST, JOINTS),
+)
+
+BOUND = Step(
+    title="A torque bound cuts",
+    text=r"""
+    Now the motors give a quarter of their torque. At every tick $\Delta\tau$ may only be what is
+    left up to the limit, so a side of the red frame says *torque* and comes close to zero while the
+    arm speeds up. The box cuts the line: what is left of it is the thick part.
+    """,
+    do="Make the torque scarcer, to 0.1: from when on does the disc 1 hit the frame, too?",
+    why=r"""
+    Level 1 moves along its valley, where other points are as good, and loses nothing: the error is
+    the same as with all the torque. Level 2 slides along the line until the frame stops it, short
+    of the point where its ellipse would touch. Such a bound is *active*, and its multiplier is the
+    price that this level would pay for a little more room. With a tenth of the torque the whole
+    valley is outside for a while: then level 1 pays as well.
+    """,
+    prediction=Choice(
+        "With all of the torque the wrist is never more than 1.1 mm off. With a quarter of it …",
+        (
+            Option("more than 3 mm: it needs the torque most", low=3.0),
+            Option("a little more, 1.5 to 3 mm", 1.5, 3.0),
+            Option("the same", high=1.5),
+        ),
+        Measure(WRIST),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The wrist's error stays below 1.5 mm.",
+            Measure(WRIST),
             "at most",
-            0.01,
-            fails_with=("limits.torque_scale=0.02",),
+            1.5,
+            fails_with=("limits.torque_scale=0.1",),
             because="then not even level 1 gets what it needs",
         ),
         Claim(
-            "Level 2 is left with a mean cost above 100.",
-            Measure(Signal("cost/q1"), "mean"),
+            "At some tick a bound is active at level 2.",
+            Measure(ACTIVE_2),
             "at least",
-            100.0,
+            1.0,
             fails_with=("limits.torque_scale=1",),
-            because="with enough torque it is served as well",
+            because="there is room to spare",
         ),
     ),
-    set=TIGHT,
+    set=("limits.torque_scale=0.25",),
+    events=(ASIDE,),
     duration=1.5,
     controls=(SCALE,),
-    plots=(ACTIVE_1, ACTIVE_2, Signal("cost/position"), Signal("cost/q1")),
+    plots=(WRIST, ACTIVE_1, ACTIVE_2, TORQUE),
 )
 
-LEAK = Step(
-    title="Measure the priority",
+SUM = Step(
+    title="One cost for all",
     text=r"""
-    Strict is a word; here is the number. The leak is what lower levels change about a higher one,
-    $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$, in m/s². By (33) it should be
-    zero. The circle again, and the tasks fight for torque.
+    The violet diamond is the optimum of *one* cost, the sum of all levels': no line, no order. The
+    ghost moves that way. How strict the line is can be measured: the leak is what lower levels
+    change about a higher one, $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$, in
+    m/s². By (33) it should be zero.
     """,
-    do="Switch to the weighted controller and read the leak meter.",
+    do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never gets there.",
     why=r"""
-    Zero up to rounding, since (33) is a constraint and not a wish. It is zero with respect to $\bar
-    M$. With the true $M$ a leak remains, the second meter: the arm is not made the way the
-    controller thinks. Time-delay estimation notices that part a millisecond later and corrects it
-    over tens of milliseconds: a gauge of 0.89 leaves nine tenths of it after one step, a third after
-    ten.
+    The diamond lies between the valley and the ring, where the two costs pull equally hard: the
+    wrist is left 5 cm short and the joints give 7 degrees, half of each. The disc 2 never leaves the
+    line, so nothing leaks, up to rounding. It is the line of $\bar M$, though. With the true $M$ a
+    leak remains, the second meter: the arm is not made the way the controller thinks. Time-delay
+    estimation notices it at the next tick and corrects it over tens of ticks.
     """,
     prediction=Choice(
         "With the arm's true inertia instead of M̄, the leak of the same torques is …",
@@ -154,13 +205,21 @@ LEAK = Step(
             Option("zero as well: priorities are exact", high=1e-9),
             Option("not zero", low=1e-4),
         ),
-        Measure(Signal("dynamic_leak", "m/s²")),
+        Measure(TRUE_LEAK),
         tempting=0,
     ),
     claims=(
         Claim(
+            "Strict priorities cost the joints more than 1.5 times as much.",
+            Measure(JOINTS, "last", over_ghost=True),
+            "at least",
+            1.5,
+            fails_with=("controller=weighted",),
+            because="then it is the ghost",
+        ),
+        Claim(
             "In the controller's own terms nothing leaks: less than 10⁻⁹ m/s².",
-            Measure(Signal("priority_leak", "m/s²")),
+            Measure(LEAK),
             "at most",
             1e-9,
             fails_with=("controller=weighted",),
@@ -168,30 +227,74 @@ LEAK = Step(
         ),
         Claim(
             "In the arm's terms there is a leak, more than 10⁻³ m/s².",
-            Measure(Signal("dynamic_leak", "m/s²")),
+            Measure(TRUE_LEAK),
             "at least",
             1e-3,
-            fails_with=("controller=osf", *EXACT),
+            fails_with=("controller=osf", "nominal.armature=[0.05,0.05,0.03]"),
             because="OSF with the arm's exact inertia projects with the true M",
         ),
+    ),
+    events=(ASIDE,),
+    duration=2.0,
+    ghost=Ghost("weighted: one cost for all", ("controller=weighted",)),
+    controls=(WEIGHT, CONTROLLER),
+    plots=(LEAK, TRUE_LEAK, WRIST, JOINTS),
+)
+
+OUTSIDE = Step(
+    title="Who knows of the box",
+    text=r"""
+    The red triangle is what OSF would ask for in the same tick: projection instead of (33), the
+    same order of tasks, no bounds at all. Torque is at 15 %. The ghost is OSF, and *its* motors
+    give whatever is asked.
+    """,
+    do="Drag the target fast, and see how far outside the triangle gets; then give more torque.",
+    why=r"""
+    A projection splits torques by priority; that a torque must also be *possible* is no part of it.
+    While the arm speeds up the triangle is far outside, at about twice the limit. A real motor would
+    clip it joint by joint, and what is clipped no longer lies on anybody's line. The QP knows both:
+    level 1 takes the best point of the box and the wrist comes late, by about a centimetre, but
+    what is asked for is what is done, and level 2 still has its line.
+    """,
+    prediction=Choice(
+        "At their worst, what HIMPC asks for is which share of what OSF asks for?",
+        (
+            Option("all of it: it is the same motion", low=0.95),
+            Option("most of it: a little is cut", 0.7, 0.95),
+            Option("about half", high=0.7),
+        ),
+        Measure(TORQUE, over_ghost=True),
+        tempting=1,
+    ),
+    claims=(
         Claim(
-            "Of what leaks, more than 85 % are left a millisecond later.",
-            Measure(Signal("gauge_radius"), "mean"),
+            "HIMPC never asks for more than the limit.",
+            Measure(TORQUE),
+            "at most",
+            100.001,
+            fails_with=("controller=osf",),
+            because="it asks for twice as much",
+        ),
+        Claim(
+            "It pays with the wrist: more than 5 mm for a moment.",
+            Measure(WRIST),
             "at least",
-            0.85,
-            fails_with=("M_bar_scale=2",),
-            because="twice the M̄ corrects twice as fast",
+            5.0,
+            fails_with=("limits.torque_scale=1",),
+            because="with enough torque nothing is lost",
         ),
     ),
-    set=TIGHT,
+    set=("limits.torque_scale=0.15",),
+    events=(ASIDE,),
     duration=1.5,
-    controls=(Control("controller", "Controller", choices=("himpc", "weighted")), SCALE),
-    plots=(Signal("priority_leak", "m/s²"), Signal("dynamic_leak", "m/s²"), HAND),
+    ghost=Ghost("OSF, which knows no bounds", ("controller=osf",)),
+    controls=(SCALE,),
+    plots=(TORQUE, WRIST, JOINTS),
 )
 
 LESSON = Lesson(
     name="inside-the-qp",
     card=card_of(__doc__),
-    scene="planar3-circle",
-    steps=(ONE_TICK, BINDING, LEAK),
+    scene="planar3-plane",
+    steps=(LINE, SWAP, BOUND, SUM, OUTSIDE),
 )

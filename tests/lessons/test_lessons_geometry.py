@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from himpc.cascade.level import LevelProblem
+from himpc.configuration import Configuration
 from himpc.limits import Rows
 from himpc.qp import solve_qp
 from lessons.events import MoveLevel, MoveTarget, Set
+from lessons.geometry.ellipsoids import ellipsoids
 from lessons.geometry.look import plane_of, tick_of
 from lessons.geometry.plane import Allowed, Box, Plane, best, cut
 from lessons.scenes.catalog import prepared, torque_scene
@@ -212,3 +214,34 @@ def test_a_cut_that_misses_what_is_allowed_says_so() -> None:
     assert cut([problem], rows, [U], (0, 1), U).levels[0].leaves.span.shape == (2, 2)
     shifted = np.array([[0.0, 0.0, 0.5]])
     assert cut([problem], rows, [U], (0, 1), shifted).levels[0].leaves.at is None
+
+
+def test_ellipsoids_hold_every_velocity_that_is_left() -> None:
+    """Joint speeds of unit length, projected off the levels above, lie in them and reach their ends."""
+    scene = torque_scene("iiwa14-hold")
+    robot, stack = scene.robot, scene.settings.levels
+    here = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
+    found = ellipsoids(here, stack)
+    assert [(each.task, each.turns) for each in found] == [("position", False), ("orientation", True)]
+    rng = np.random.default_rng(4)
+    speeds = rng.normal(size=(4000, robot.n))
+    above = np.empty((0, robot.n))
+    for level, each in zip(stack, found, strict=False):
+        J = level.tasks[0].jacobian(here)[0]
+        off = speeds - speeds @ np.linalg.pinv(above) @ above if len(above) else speeds
+        moved = (off / np.linalg.norm(off, axis=1)[:, None]) @ J.T @ each.axes
+        size = np.linalg.norm(moved / np.maximum(each.radii, 1e-12), axis=1)
+        assert size.max() <= 1.0 + 1e-9 and size.max() > 0.97
+        assert np.linalg.det(each.axes) == pytest.approx(1.0)
+        above = np.vstack([above, J])
+
+
+def test_a_straight_arm_has_a_flat_ellipsoid_and_a_level_without_freedom_none() -> None:
+    robot = torque_scene("planar3-hold").robot
+    stack = torque_scene("planar3-hold").settings.levels
+    straight = Configuration(robot, robot.model.createData(), np.zeros(3), np.zeros(3))
+    position, orientation = ellipsoids(straight, stack)
+    assert position.radii[0] > 0.5 and position.radii[1] == 0.0
+    off = tuple(replace(level, enabled=level.name != "position") for level in stack)
+    alone = ellipsoids(straight, off)
+    assert [each.task for each in alone] == ["orientation"] and alone[0].radii[0] > orientation.radii[0]

@@ -66,6 +66,12 @@ class StartPanel:
             self.trace = gui.add_checkbox("Trace of the hand", True)
             self.prediction = gui.add_checkbox("Predicted path", True)
             self.frames = gui.add_checkbox("Target and actual frames", True)
+            self.ellipsoids = gui.add_checkbox(
+                "Manipulability ellipsoids",
+                False,
+                hint="How fast each level could move its frame with joints of unit speed, by what the levels "
+                "above leave it; flat where it cannot",
+            )
         self.dark = gui.add_checkbox("Dark theme", dark)
 
         @buttons.on_click

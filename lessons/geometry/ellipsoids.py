@@ -1,0 +1,76 @@
+"""Manipulability ellipsoids: how fast each level can still move where its hand is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.configuration import Configuration
+from himpc.stack import Stack
+from himpc.tasks import FrameOrientation, FramePosition
+
+Array = NDArray[np.float64]
+
+_GONE = 1e-6
+"""Directions that joints of unit speed move by less than this, m/s or rad/s, are not there any more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """{ẋ = J_i q̇: ‖q̇‖ ≤ 1, J_p q̇ = 0 for every level p above}, of a frame's velocity.
+
+    Attributes:
+        level, task: names.
+        turns: whether it is of rotation.
+        position: (3,) m, of the frame.
+        axes: (3, 3), orthonormal columns, right-handed: the semi-axes' directions in the world.
+        radii: (3,) m/s or rad/s for joints of unit speed, the longest first; 0 where nothing moves.
+    """
+
+    level: str
+    task: str
+    turns: bool
+    position: Array
+    axes: Array
+    radii: Array
+
+
+def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
+    """Of every frame task of the levels that are on, highest priority first.
+
+    Its axes are the task's own: of a task of x alone there is a needle along x.
+    """
+    n = configuration.q.size
+    free, found = np.eye(n), []
+    for level in stack:
+        if not level.enabled:
+            continue
+        rows = []
+        for task in level.tasks:
+            J = task.jacobian(configuration)[0]
+            rows.append(J)
+            if isinstance(task, (FramePosition, FrameOrientation)):
+                own = np.zeros((3, n))
+                own[task.components] = J
+                axes, radii = _axes(own @ free)
+                turns = isinstance(task, FrameOrientation)
+                position = np.array(configuration.placement(task.frame).translation)
+                found.append(Ellipsoid(level.name, task.name, turns, position, axes, radii))
+        free = free @ _null_space(np.vstack(rows) @ free)
+    return found
+
+
+def _axes(J: Array) -> tuple[Array, Array]:
+    """Directions and lengths of the semi-axes of {J z: ‖z‖ ≤ 1}, J (3, d)."""
+    left, sigma, _ = np.linalg.svd(np.hstack([J, np.zeros((3, 3))]), full_matrices=True)
+    if np.linalg.det(left) < 0:
+        left[:, 2] = -left[:, 2]
+    return left, np.where(sigma[:3] > _GONE, sigma[:3], 0.0)
+
+
+def _null_space(A: Array) -> Array:
+    """Orthonormal columns that A (m, d) maps to nothing, (d, d')."""
+    _, sigma, right = np.linalg.svd(A, full_matrices=True)
+    return right[int((sigma > _GONE).sum()) :].T

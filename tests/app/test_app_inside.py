@@ -1,0 +1,190 @@
+"""The inside of a tick in a real browser: the picture, its numbers, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.inside import Watch
+from app.link.messages import Play, Post
+from app.panels.inside.matrix import TITLE as HESSIAN
+from app.panels.inside.plane import TITLE as PLANE
+from app.panels.inside.spectrum import TITLE as SPECTRUM
+from app.server.server import PageServer
+from browsing.hands import SELDOM, drag_target, eventually, open_page, press, set_number, tab
+from lessons.events import MoveLevel, Set
+from lessons.geometry.plane import Plane
+
+
+@pytest.fixture(scope="module")
+def drawing() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("planar3-plane"), port=0, max_sessions=1, grace=2.0)
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def shared(browser: Browser, drawing: PageServer) -> Iterator[Page]:
+    opened = open_page(browser, drawing.url, 1300, 700)
+    yield opened
+    opened.context.close()
+
+
+@pytest.fixture
+def sheet(shared: Page, drawing: PageServer) -> Page:
+    """The page as it was opened, with the picture painted."""
+    press(shared, "Reset all")
+    tab(shared, "Inside")
+    assert eventually(shared, lambda: point(shared, "optimum-1") is not None)
+    return shared
+
+
+def learner_of(server: PageServer) -> Learner:
+    return server.sessions.learners[0]
+
+
+def point(page: Page, name: str) -> np.ndarray | None:
+    """Where a point of the picture is, N·m, to ten digits."""
+    found = page.evaluate(
+        """([title, name]) => { const all = [...document.querySelectorAll("[data-chart]")];
+             const it = all.find((e) => e.dataset.chart === title)?.querySelector("." + name);
+             return it ? it.dataset.at : null; }""",
+        [PLANE, name],
+    )
+    return None if found is None else np.array([float(value) for value in str(found).split(",")])
+
+
+def plane(server: PageServer) -> Plane:
+    status = learner_of(server).status
+    assert status is not None and status.inside is not None and status.inside.plane is not None
+    return status.inside.plane
+
+
+def stand_still(page: Page, server: PageServer) -> None:
+    """Pauses, and waits until the picture is that of the last tick."""
+    learner = learner_of(server)
+    learner.send(Play(False))
+    assert eventually(page, lambda: learner.status is not None and not learner.status.running)
+    assert eventually(page, lambda: agrees(page, server))
+
+
+def agrees(page: Page, server: PageServer) -> bool:
+    """Drawn where the solver put them."""
+    found = [point(page, f"optimum-{place}") for place in (1, 2)]
+    levels = plane(server).levels
+    return all(
+        at is not None and float(np.abs(at - level.solved).max()) < 1e-6
+        for at, level in zip(found, levels[:2], strict=True)
+    )
+
+
+def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer) -> None:
+    seen: list[list[np.ndarray]] = [[], []]
+
+    def moved() -> bool:
+        for place, at in enumerate((point(sheet, "optimum-1"), point(sheet, "optimum-2"))):
+            if at is not None:
+                seen[place].append(at)
+        return all(len(each) > 1 and float(np.ptp(np.array(each), axis=0).max()) > 1e-3 for each in seen)
+
+    drag_target(sheet, axis=0, along=0.12)
+    assert eventually(sheet, moved)
+    # At rest level 2 is held away from what it would choose alone, and the two agree with the solver.
+    assert eventually(sheet, lambda: point(sheet, "wish-2") is not None)
+    stand_still(sheet, drawing)
+    assert plane(drawing).apart < 1e-6
+    expect(sheet.get_by_text("Geometry and solver agree to")).to_be_visible()
+
+
+def test_swapping_levels_swaps_their_roles(sheet: Page, drawing: PageServer) -> None:
+    learner = learner_of(drawing)
+    before = plane(drawing)
+    assert [level.name for level in before.levels[:2]] == ["reach", "pose"]
+    expect(sheet.get_by_text("1 reach")).to_be_visible()
+    learner.send(Post(MoveLevel("pose", 0)))
+    expect(sheet.get_by_text("1 pose")).to_be_visible()
+    assert eventually(sheet, lambda: plane(drawing).levels[0].name == "pose")
+    stand_still(sheet, drawing)
+    after = plane(drawing)
+    assert before.levels[0].leaves.span.shape == (2, 1)  # a line
+    assert after.levels[0].leaves.span.shape == (2, 0)  # a point
+    assert after.apart < 1e-6
+
+
+def test_a_torque_bound_cuts(sheet: Page, drawing: PageServer) -> None:
+    learner = learner_of(drawing)
+    assert plane(drawing).box.kinds == (("velocity", "velocity"),) * 2
+    learner.send(Post(Set("limits.torque_scale", 0.01)))
+    assert eventually(sheet, lambda: any("torque" in kinds for kinds in plane(drawing).box.kinds))
+    drag_target(sheet, axis=0, along=0.12)
+
+    def cut() -> bool:
+        now = plane(drawing)
+        at = now.levels[1].solved
+        return bool((np.minimum(at - now.box.lower, now.box.upper - at) < 1e-7).any()) and now.apart < 1e-6
+
+    assert eventually(sheet, cut)
+    expect(sheet.locator(f'[data-chart="{PLANE}"]').get_by_text("torque", exact=True).first).to_be_visible()
+
+
+def test_nobody_asks_while_nobody_looks(sheet: Page, drawing: PageServer) -> None:
+    learner = learner_of(drawing)
+    tab(sheet, "Errors")
+    assert eventually(sheet, lambda: learner.status is not None and learner.status.inside is None)
+    tab(sheet, "Inside")
+    assert eventually(sheet, lambda: learner.status is not None and learner.status.inside is not None)
+    status = learner.status
+    inside = None if status is None else status.inside
+    assert inside is not None and inside.matrix is None and inside.spectrum is None
+
+
+def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
+    sheet.get_by_text("The Hessian of one level").click()
+    assert eventually(sheet, lambda: sheet.get_by_text("H = GᵀQG + R of level").is_visible())
+    learner = learner_of(drawing)
+    assert eventually(sheet, lambda: learner.status is not None and learner.status.inside is not None
+                      and learner.status.inside.matrix is not None)  # fmt: skip
+    assert eventually(sheet, lambda: sheet.locator(f'[data-chart="{HESSIAN}"] path').count() > 3)
+    sheet.get_by_text("The Hessian of one level").click()
+
+
+def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
+    def farthest() -> float:
+        found = sheet.evaluate(
+            """(title) => [...document.querySelectorAll("[data-chart]")]
+                 .filter((e) => e.dataset.chart === title)
+                 .flatMap((e) => [...e.querySelectorAll(".eigenvalue")].map((c) => Number(c.dataset.at)))""",
+            SPECTRUM,
+        )
+        return min(found, default=float("nan"))
+
+    tab(sheet, "Control")
+    assert eventually(sheet, lambda: farthest() == farthest())
+    before = farthest()
+    set_number(sheet, "M̄ scale", 2.0)
+    assert eventually(sheet, lambda: farthest() < before - 0.1)
+    tab(sheet, "Start")
+
+
+def test_one_knot_is_a_click_away(browser: Browser) -> None:
+    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    page = open_page(browser, server.url, 1300, 700, rest=SELDOM)
+    try:
+        tab(page, "Inside")
+        expect(page.get_by_text("Later knots are held")).to_be_visible()
+        press(page, "Look one knot ahead (N = 1)")
+        learner = learner_of(server)
+        assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 1)
+        expect(page.get_by_text("Later knots are held")).to_be_hidden()
+        learner.send(Post(Set("controller", "osf")))
+        expect(page.get_by_text("osf solves no such QP")).to_be_visible()
+        learner.send(Watch(plane=(7, 9)))  # a stranger's joints
+        assert eventually(page, lambda: learner.failure is None and learner.status is not None)
+    finally:
+        page.context.close()
+        server.close()
