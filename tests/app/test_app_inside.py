@@ -20,6 +20,9 @@ from browsing.hands import SELDOM, drag_target, eventually, open_page, press, se
 from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
 
+ARM = 0.08
+"""m, where the gizmo of this small arm is taken hold of."""
+
 
 @pytest.fixture(scope="module")
 def drawing() -> Iterator[PageServer]:
@@ -92,7 +95,7 @@ def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer)
                 seen[place].append(at)
         return all(len(each) > 1 and float(np.ptp(np.array(each), axis=0).max()) > 1e-3 for each in seen)
 
-    drag_target(sheet, axis=0, along=0.12)
+    drag_target(sheet, axis=0, along=0.12, arm=ARM)
     assert eventually(sheet, moved)
     # At rest level 2 is held away from what it would choose alone, and the two agree with the solver.
     assert eventually(sheet, lambda: point(sheet, "wish-2") is not None)
@@ -121,7 +124,7 @@ def test_a_torque_bound_cuts(sheet: Page, drawing: PageServer) -> None:
     assert plane(drawing).box.kinds == (("velocity", "velocity"),) * 2
     learner.send(Post(Set("limits.torque_scale", 0.01)))
     assert eventually(sheet, lambda: any("torque" in kinds for kinds in plane(drawing).box.kinds))
-    drag_target(sheet, axis=0, along=0.12)
+    drag_target(sheet, axis=0, along=0.12, arm=ARM)
 
     def cut() -> bool:
         now = plane(drawing)
