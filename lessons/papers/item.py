@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from lessons.experiments.jobs import Job, Results
 from lessons.plots.panels import Picture
 
 CLOSE = 0.10
-"""Ours and the paper's agree if their ratio is within this of 1."""
+"""Ours and the paper's agree if their ratio is within this of 1: neither plant nor model error is printed, so
+that nothing closer could be expected of a reading."""
+
+TIE = 0.02
+"""An effect within this of where it turns is none."""
+
+Verdict = Literal["agrees", "differs", "opposite", "no number", ""]
+Side = Literal["below", "above", "about"]
 
 
 @dataclass(frozen=True)
@@ -18,11 +26,16 @@ class Row:
     """One number of a paper beside ours.
 
     Attributes:
-        quantity: what it is.
+        quantity: what it is; no two rows of an item have the same.
         unit: of both.
         paper: the printed value; None: the paper prints none.
         ours: the measured one; NaN: there is none.
         why: one sentence for the reader if the two differ, or if there is none to compare.
+        turns_at: for an effect, where it turns into its opposite: 1 for a ratio, 0 for a difference.
+        says: where the paper prints no number but says on which side of `turns_at` it is.
+        within: ours and the paper's agree if their ratio is within this of 1.
+        band: how far ours may be from the stored number, as a share; a machine's times need a wide one.
+        topic: the disagreement (`lessons.papers.topics`) that explains it, if the two do not agree.
     """
 
     quantity: str
@@ -30,6 +43,11 @@ class Row:
     paper: float | None
     ours: float
     why: str = ""
+    turns_at: float | None = None
+    says: Side | None = None
+    within: float = CLOSE
+    band: float = CLOSE
+    topic: str = ""
 
     @property
     def ratio(self) -> float | None:
@@ -39,10 +57,44 @@ class Row:
         return self.ours / self.paper
 
     @property
+    def verdict(self) -> Verdict:
+        """How ours stands to the paper's; "" if the paper neither prints nor says anything."""
+        if self.paper is None and self.says is None:
+            return ""
+        if not math.isfinite(self.ours):
+            return "no number"
+        if self.says is not None:
+            return self._verdict_on_a_side()
+        close = self.ratio is not None and abs(self.ratio - 1.0) <= self.within
+        if close or self.paper == self.ours:
+            return "agrees"
+        return "opposite" if self._turned() else "differs"
+
+    def _verdict_on_a_side(self) -> Verdict:
+        turn = self.turns_at if self.turns_at is not None else 1.0
+        if self.says == "about":
+            return "agrees" if abs(self.ours - turn) <= self.within * (abs(turn) or 1.0) else "differs"
+        if abs(self.ours - turn) <= TIE * (abs(turn) or 1.0):
+            return "differs"  # the paper sees an effect where ours has none
+        return "agrees" if (self.ours < turn) == (self.says == "below") else "opposite"
+
+    def _turned(self) -> bool:
+        """Whether an effect is the other way round; one that is none, here or there, cannot be."""
+        if self.turns_at is None or self.paper is None:
+            return False
+        theirs, own = self.paper - self.turns_at, self.ours - self.turns_at
+        return theirs * own < 0 and min(abs(theirs), abs(own)) > TIE * abs(self.turns_at)
+
+    @property
     def remark(self) -> str:
         """`why`, unless ours and the paper's agree."""
-        close = self.ratio is not None and abs(self.ratio - 1.0) <= CLOSE
-        return f"agrees within {CLOSE:.0%}" if close else self.why
+        if self.verdict == "agrees" and self.says is None:
+            return (
+                f"agrees within {self.within:.4g}"
+                if self.within < 0.01
+                else f"agrees within {self.within:.0%}"
+            )
+        return self.why
 
 
 @dataclass(frozen=True)
@@ -56,11 +108,19 @@ class Table:
 
 @dataclass(frozen=True)
 class Check:
-    """A measurable sentence, the number it is about, and whether it holds."""
+    """A measurable sentence, the number it is about, and whether it holds.
+
+    Attributes:
+        text: the sentence; no two checks of an item have the same.
+        value: the number.
+        holds: whether it is so.
+        band: how far the number may be from the stored one, as a share; None: it may be anything that holds.
+    """
 
     text: str
     value: float
     holds: bool
+    band: float | None = CLOSE
 
 
 @dataclass(frozen=True)
@@ -101,11 +161,16 @@ class Item:
     report: Callable[[Results, bool], Section]
 
 
-def at_most(text: str, value: float, limit: float) -> Check:
+def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> Check:
     """The check that a value is at most a limit; NaN is not."""
-    return Check(f"{text} ≤ {limit:g}", value, bool(value <= limit))
+    return Check(f"{text} ≤ {limit:g}", value, bool(value <= limit), band)
 
 
-def at_least(text: str, value: float, limit: float) -> Check:
+def at_least(text: str, value: float, limit: float, band: float | None = CLOSE) -> Check:
     """The check that a value is at least a limit; NaN is not."""
-    return Check(f"{text} ≥ {limit:g}", value, bool(value >= limit))
+    return Check(f"{text} ≥ {limit:g}", value, bool(value >= limit), band)
+
+
+def between(text: str, value: float, low: float, high: float, band: float | None = CLOSE) -> Check:
+    """The check that a value is within two limits; NaN is not."""
+    return Check(f"{text}, {low:g} to {high:g}", value, bool(low <= value <= high), band)

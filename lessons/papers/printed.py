@@ -9,4 +9,9 @@ from typing import Any
 
 def printed(table: str) -> dict[str, Any]:
     """The printed values of a table, e.g. printed("himpc_table_2")."""
+    return read(table)
+
+
+def read(table: str) -> dict[str, Any]:
+    """A values file as it is."""
     return tomllib.loads((Path(__file__).parent / "values" / f"{table}.toml").read_text(encoding="utf-8"))

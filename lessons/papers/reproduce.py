@@ -10,24 +10,36 @@ from pathlib import Path
 from typing import Any
 
 from lessons.experiments.jobs import Results, perform_all
+from lessons.papers.disagreements import page
 from lessons.papers.item import Check, Item, Row, Section, Table
-from lessons.papers.words import number
+from lessons.papers.stored import from_memory, judged, store, stored
+from lessons.papers.words import number, tally
 from lessons.plots.draw import draw
 from robots import InputError
 
 
 @dataclass(frozen=True)
 class Report:
-    """An item with what it reports and the runs that failed or lost control."""
+    """An item with what it reports and the runs that failed or lost control.
+
+    Attributes:
+        judged: every row and check against the stored numbers.
+    """
 
     item: Item
     section: Section
     troubles: tuple[str, ...]
+    judged: tuple[Check, ...] = ()
 
     @property
     def sound(self) -> bool:
         """Whether every check holds."""
-        return all(check.holds for check in self.section.checks)
+        return not self.faults
+
+    @property
+    def faults(self) -> tuple[Check, ...]:
+        """The checks that do not hold."""
+        return tuple(check for check in (*self.section.checks, *self.judged) if not check.holds)
 
 
 def reproduce(
@@ -41,9 +53,27 @@ def reproduce(
         progress: called with the share of the runs that is done.
     """
     results = perform_all((job for item in items for job in item.jobs(quick)), progress)
-    return [
-        Report(item, item.report(results, quick), tuple(_troubles(item, quick, results))) for item in items
-    ]
+    memory = stored(quick)
+    reports = []
+    for item in items:
+        section = item.report(results, quick)
+        checks = judged(section, memory.get(item.name))
+        reports.append(Report(item, section, tuple(_troubles(item, quick, results)), checks))
+    return reports
+
+
+def recalled(items: Sequence[Item]) -> list[Report]:
+    """The reports without a run, from the stored numbers; items that were never stored are left out."""
+    found = []
+    for quick in (True, False):
+        for name, memory in stored(quick).items():
+            item = next((each for each in items if each.name == name), None)
+            if item is not None:
+                section = from_memory(item, memory, quick)
+                found.append(Report(item, section, (), judged(section, memory)))
+    # The whole version counts where both are stored.
+    latest = {report.item.name: report for report in found}
+    return [latest[item.name] for item in items if item.name in latest]
 
 
 def _troubles(item: Item, quick: bool, results: Results) -> list[str]:
@@ -66,10 +96,39 @@ def write(reports: Sequence[Report], folder: Path, quick: bool) -> None:
                 draw(picture, folder)
         (folder / "results.json").write_text(json.dumps(as_data(reports, quick), indent=1) + "\n")
         (folder / "report.md").write_text(_markdown(reports, quick), encoding="utf-8")
+        (folder / PAGE).write_text(_page(reports), encoding="utf-8")
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+PAGE = "disagreements.md"
+
+
+def write_page(reports: Sequence[Report], folder: Path) -> None:
+    """Writes disagreements.md alone. Raises InputError if it cannot."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / PAGE).write_text(_page(reports), encoding="utf-8")
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def keep(reports: Sequence[Report], quick: bool) -> None:
+    """Stores what was measured. Raises InputError if it cannot be written."""
+    try:
+        store({report.item.name: report.section for report in reports}, quick)
     except OSError as error:
         raise InputError(
-            f"--out {folder}: cannot be written ({error.strerror}); give another folder"
+            f"--store: cannot be written ({error.strerror}); install himpc-lab editable"
         ) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> InputError:
+    return InputError(f"--out {folder}: cannot be written ({error.strerror}); give another folder")
+
+
+def _page(reports: Sequence[Report]) -> str:
+    return page([(report.item.name, row) for report in reports for row in report.section.rows])
 
 
 # -------------------------------------------------------------------------------- JSON
@@ -95,6 +154,7 @@ def _item_data(report: Report) -> dict[str, Any]:
             {"text": check.text, "value": _finite(check.value), "holds": check.holds}
             for check in section.checks
         ],
+        "not as stored": [check.text for check in report.judged if not check.holds],
         "notes": list(section.notes),
         "pictures": [f"{picture.name}.png" for picture in section.pictures],
         "troubles": list(report.troubles),
@@ -108,7 +168,10 @@ def _row_data(row: Row) -> dict[str, Any]:
         "paper": row.paper,
         "ours": _finite(row.ours),
         "ratio": row.ratio,
+        "verdict": row.verdict,
+        "within": row.within,
         "remark": row.remark,
+        "topic": row.topic,
     }
 
 
@@ -122,13 +185,18 @@ def _finite(value: float) -> float | None:
 def _markdown(reports: Sequence[Report], quick: bool) -> str:
     checks = [check for report in reports for check in report.section.checks]
     held = sum(check.holds for check in checks)
+    rows = [row for report in reports for row in report.section.rows]
     lines = [
         "# The papers' tables and figures, reproduced",
         "",
         "Written by `himpc-lab reproduce" + (" --quick" if quick else "") + "`. "
         f"{held} of {len(checks)} checks hold." + (" Quick: shorter and fewer runs." if quick else ""),
         "",
-        "Ratio: ours over the paper's. – : no such number.",
+        f"Numbers and statements of the papers: {tally(rows)}. [Where we disagree](disagreements.md).",
+        "",
+        "Ratio: ours over the paper's. – : no such number. *agrees*: the ratio is within 10 % of 1, if no "
+        "other tolerance is named, since neither paper prints its plant; *opposite*: an effect is the other "
+        "way round. Every number is also held against the one stored before, on both sides.",
     ]
     for report in reports:
         lines += ["", f"## {report.item.name}: {report.item.title}", "", f"*{report.item.source}*"]
@@ -141,6 +209,9 @@ def _markdown(reports: Sequence[Report], quick: bool) -> str:
             lines += ["", *_table_markdown(table)]
         if section.checks:
             lines += ["", *(_check_markdown(check) for check in section.checks)]
+        changed = [check for check in report.judged if not check.holds]
+        if changed:
+            lines += ["", "Not as stored:", "", *(_check_markdown(check) for check in changed)]
         for picture in section.pictures:
             lines += ["", f"![{picture.caption}]({picture.name}.png)", "", f"*{picture.caption}*"]
         if report.troubles:
@@ -150,10 +221,18 @@ def _markdown(reports: Sequence[Report], quick: bool) -> str:
 
 def _rows_markdown(rows: Sequence[Row]) -> list[str]:
     table = [
-        (row.quantity, row.unit, number(row.paper), number(row.ours), number(row.ratio), row.remark)
+        (
+            row.quantity,
+            row.unit,
+            row.says or number(row.paper),
+            number(row.ours),
+            number(row.ratio),
+            row.verdict,
+            row.remark,
+        )
         for row in rows
     ]
-    return _grid(("", "unit", "paper", "ours", "ratio", "remark"), table)
+    return _grid(("", "unit", "paper", "ours", "ratio", "verdict", "remark"), table)
 
 
 def _table_markdown(table: Table) -> list[str]:

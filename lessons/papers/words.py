@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from lessons.experiments.jobs import Run
-from lessons.papers.item import Row
+from lessons.papers.item import Row, Verdict
 from lessons.scenes.catalog import load_scene
 
 
 def number(value: float | None) -> str:
     """Three figures, "–" for none."""
     return "–" if value is None or not math.isfinite(value) else f"{value:.3g}"
+
+
+def tally(rows: Sequence[Row]) -> str:
+    """How many agree, differ and are opposite, in words; "–" for none."""
+    found = [row.verdict for row in rows]
+    counted = [f"{found.count(each)} {words}" for each, words in _VERDICTS.items() if each in found]
+    return ", ".join(counted) or "–"
+
+
+_VERDICTS: dict[Verdict, str] = {"agrees": "agree", "differs": "differ", "opposite": "opposite"}
 
 
 def trouble(run: Run) -> str:
@@ -34,6 +45,14 @@ def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:
             used = np.unique(np.asarray(getattr(task, gain), float))
             ours = float(used[0]) if used.size == 1 else math.nan
             rows.append(
-                Row(f"{entry['label']}, {words}", unit, entry[gain], ours, "the scene was given other gains")
+                Row(
+                    f"{entry['label']}, {words}",
+                    unit,
+                    entry[gain],
+                    ours,
+                    "the scene was given other gains",
+                    within=1e-9,
+                    band=1e-9,
+                )
             )
     return tuple(rows)

@@ -248,7 +248,7 @@ def test_what_a_script_changes_is_undone_before_the_next_run(learn: Start) -> No
     """Else a challenge whose script hangs on a load would begin with the load the second time."""
     challenge = load_lesson("no-model-needed").challenge
     assert challenge is not None and any(isinstance(event, Set) for _, event in challenge.events)
-    learner = learn("no-model-needed", 3)
+    learner = learn("no-model-needed", len(load_lesson("no-model-needed").steps))
     first = learner.runs(RunStep(fast=True))
     assert learner.body.session.settings != learner.body.scene.settings
     second = learner.runs(RunStep(fast=True))

@@ -57,7 +57,7 @@ def test_what_the_paper_left_open_is_switchable() -> None:
         "plant.gravity=true",
         "limits.velocity=true",
         "limits.velocity_approach=15",
-        "limits.position=paper",
+        "limits.position=viability",
     )
     found = summary(record(NAME, *choices, duration=0.2))
     assert found["finite"]
@@ -66,14 +66,15 @@ def test_what_the_paper_left_open_is_switchable() -> None:
 
 
 def test_the_paper_run_is_sound_and_near_the_printed_figures() -> None:
-    """Every QP solved; q₁ within 5 % of 8.773° (over the whole run); levels 1 and 2 of the printed size."""
+    """q₁ within 0.5 % of 8.773° (over the whole run); a few position rows give way near the limits."""
     found = result()
     assert found["diverged"] is False
-    assert found["solver"]["unsolved"] == 0
+    assert 1 <= found["solver"]["unsolved"] <= 10
+    assert found["solver"]["unsolved"] == found["solver"]["fallbacks"]["soften"]
     assert found["solver"]["max_kkt_residual"] <= 1e-6
     assert found["solver"]["iterations"] == {"mean": 1.0, "max": 1.0}
     position, orientation, q1 = found["tasks"]
-    assert q1["rmse"][0] == pytest.approx(8.773, rel=0.05)
+    assert q1["rmse"][0] == pytest.approx(8.773, rel=0.005)
     assert max(position["rmse"]) < 1e-3
     assert max(orientation["rmse"]) < 1.5
 
@@ -88,16 +89,32 @@ def test_table_5_a_disturbed_inertia_costs_little(scene: str, reading: str) -> N
         ratio = np.array(disturbed["tasks"][0][key]) / np.array(nominal["tasks"][0][key])
         assert ratio.max() <= 1.10
         assert np.abs(ratio - 1).max() > 1e-4  # the plant did change
-    assert disturbed["solver"]["unsolved"] == 0
+    # Printed position rows, which only the paper's scene has, give way a few times.
+    assert disturbed["solver"]["unsolved"] <= (10 if scene == NAME else 0)
+
+
+def test_a_speed_from_which_one_can_stop_leaves_no_qp_unsolved() -> None:
+    """The lab's own position limits cost q₁ 4 % of the paper's figure, and every QP has a solution."""
+    found = result("limits.position=viability")
+    assert found["solver"]["unsolved"] == 0
+    assert found["tasks"][2]["rmse"][0] == pytest.approx(9.15, rel=0.01)
 
 
 def test_table_6_a_longer_horizon_does_not_hurt_if_R_weighs_accelerations() -> None:
     """With R on M̄⁻¹Δτ the RMSE of x falls from N = 5 to 10 to 20 by the paper's share, ± 5 %."""
-    errors = [result(f"horizon={N}", "R_on=acceleration")["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
+    soft = ("R_on=acceleration", "limits.position=viability")
+    errors = [result(f"horizon={N}", *soft)["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
     for before, after in pairwise(errors):
         assert after < before
     assert errors[1] / errors[0] == pytest.approx(1.710 / 1.849, rel=0.05)
     assert errors[2] / errors[0] == pytest.approx(1.613 / 1.849, rel=0.05)
+
+
+def test_table_6_with_R_as_printed_a_longer_horizon_helps_a_little() -> None:
+    """Over the whole run, position rows as printed: by 3 to 6 %, a third of the paper's 8 to 17 %."""
+    errors = [result(f"horizon={N}")["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
+    assert errors[2] < errors[1] < errors[0]
+    assert 0.93 < errors[2] / errors[0] < 0.97
 
 
 def test_table_6_new_jacobians_change_next_to_nothing() -> None:
@@ -110,7 +127,9 @@ def test_table_6_new_jacobians_change_next_to_nothing() -> None:
 
 def test_strict_against_weighted_is_one_switch() -> None:
     """The same scene, weights and bounds: without priorities level 3 gains and level 1 pays."""
-    strict, weighted = result(), result(controller="weighted")
+    strict, weighted = (
+        result("limits.position=viability", controller=each) for each in ("himpc", "weighted")
+    )
     assert max(weighted["tasks"][0]["rmse"]) > 5 * max(strict["tasks"][0]["rmse"])
     assert weighted["tasks"][2]["rmse"][0] < 0.5 * strict["tasks"][2]["rmse"][0]
     assert strict["priority_leak_max"] <= 1e-6

@@ -263,11 +263,15 @@ def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
         "paper": 2.0,
         "ours": 4.0,
         "ratio": 2.0,
+        "verdict": "differs",
+        "within": 0.1,
         "remark": "differs | because",
+        "topic": "",
     }
     assert data["items"][0]["rows"][1]["ours"] is None
     text = (tmp_path / "report.md").read_text()
-    assert "| x | m | 2 | 4 | 2 | differs \\| because |" in text
+    assert "| x | m | 2 | 4 | 2 | differs | differs \\| because |" in text
+    assert "1 differ" in text and "| x | m | 2 | 4 | 2 | differs |" in text
     assert "1 of 2 checks hold" in text
     assert "✗ does not" in text
     assert (tmp_path / "seen.png").read_bytes().startswith(b"\x89PNG")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.planar import RT1
-from lessons.papers.item import Item, Section, Table, at_least
+from lessons.papers.item import Item, Section, Table, between
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
 from lessons.scenes.catalog import prepared, torque_scene
@@ -94,7 +94,7 @@ def _section(results: Results, quick: bool) -> Section:
     rows += [] if quick else [("iiwa14-circle", results[_RT4])]
     errors = {words: model_errors(run) for words, run in rows}
     checks = [
-        at_least(f"{words}: γ of (21) over δ of (25)", errors[words].gamma / errors[words].delta, 10.0)
+        between(f"{words}: γ of (21) over δ of (25)", errors[words].gamma / errors[words].delta, 10.0, 1e3)
         for words in (f"{RT1}, T_s = 1 ms",)
     ]
     table = Table(

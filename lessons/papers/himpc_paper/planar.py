@@ -23,9 +23,9 @@ def rt1(controller: str, *assignments: str) -> Job:
     return Job(RT1, controller, assignments)
 
 
-def rt2(controller: str) -> Job:
+def rt2(controller: str, *assignments: str) -> Job:
     """RT2, 8 s."""
-    return Job(RT2, controller)
+    return Job(RT2, controller, assignments)
 
 
 def rt3(controller: str) -> Job:

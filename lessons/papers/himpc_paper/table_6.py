@@ -8,12 +8,17 @@ import numpy as np
 
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import OPEN, SOURCE, rt4
-from lessons.papers.item import Item, Row, Section, Table, at_most
+from lessons.papers.item import Item, Row, Section, between
 from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.words import trouble
 from lessons.plots.style import name
 
-_ON = {"Δτ, as printed": (), "M̄⁻¹Δτ": ("R_on=acceleration",)}
+_ON = {
+    "Δτ, as printed": (),
+    "M̄⁻¹Δτ, with viability": ("R_on=acceleration", "limits.position=viability"),
+}
+"""What R weighs. On accelerations the controller is soft, and soft it cannot keep the printed position rows:
+with them x is off by 5 mm at N = 5."""
 
 
 def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: bool = False) -> Job:
@@ -39,7 +44,7 @@ def _table_6_jobs(quick: bool) -> tuple[Job, ...]:
 
 def _table_6(results: Results, quick: bool) -> Section:
     paper = printed("himpc_table_6")
-    rows, relative, checks = [], [], []
+    rows, checks = [], []
     for what, extra in _ON.items():
         base = results[horizon_job("himpc", 5, extra, quick)].error_of("position", 0, "rmse")
         for controller in ("himpc", "nhimpc"):
@@ -55,39 +60,37 @@ def _table_6(results: Results, quick: bool) -> Section:
                         printed_value,
                         1e4 * errors[N],
                         trouble(run) or "as in Table V; compare the trend over N below",
+                        topic="rt4-errors",
                     )
                 )
-                relative.append(
-                    (
-                        what,
-                        name(controller),
-                        str(N),
-                        number(printed_value / paper["himpc"]["5"] if printed_value else None),
-                        number(errors[N] / base),
+                if N != 5 or controller != "himpc":
+                    rows.append(
+                        Row(
+                            f"R on {what}: {name(controller)}, N = {N}, over HIMPC with N = 5",
+                            "1",
+                            printed_value / paper["himpc"]["5"] if printed_value else None,
+                            errors[N] / base,
+                            trouble(run) or "what R weighs decides whether a horizon helps",
+                            turns_at=1.0,
+                            topic="horizon",
+                        )
                     )
-                )
-            if what == "M̄⁻¹Δτ":
-                # NHIMPC's trend starts from HIMPC with N = 5 in the paper, too.
-                chain = [base, *errors.values()] if controller == "nhimpc" else list(errors.values())
-                worst = float(np.max([b / a for a, b in pairwise(chain)]))
-                checks.append(
-                    at_most(f"R on {what}: {name(controller)}'s RMSE of x, next N over this N", worst, 1.0)
-                )
+            # NHIMPC's trend starts from HIMPC with N = 5 in the paper, too.
+            chain = [base, *errors.values()] if controller == "nhimpc" else list(errors.values())
+            worst = float(np.max([b / a for a, b in pairwise(chain)]))
+            text = f"R on {what}: {name(controller)}'s RMSE of x, next N over this N, at worst"
+            # In 2 s no joint comes near its limit: what is left of a gain, as printed, comes from there.
+            checks.append(between(text, worst, 0.8, 1.0 if extra or not quick else 1.01))
     return Section(
         notes=(
             f"RMSE of x over the whole run. {OPEN} With R on Δτ as printed the step is all but deadbeat: a "
-            "longer horizon has nothing to gain and, along predicted Jacobians with active bounds, something "
-            "to lose. With R on M̄⁻¹Δτ, the accelerations, the paper's trend appears.",
+            "longer horizon gains little: a third of the paper's gain, and that where joints meet their "
+            "limits, which it sees sooner. With R on M̄⁻¹Δτ, the accelerations, the paper's trend appears; "
+            "position limits are then those one can stop before, since the printed rows break a soft "
+            "controller.",
             *(("Quick: 2 s of the 4, without N = 30 and most of NHIMPC.",) if quick else ()),
         ),
         rows=tuple(rows),
-        tables=(
-            Table(
-                "Relative to HIMPC with N = 5",
-                ("R on", "controller", "N", "paper", "ours"),
-                tuple(relative),
-            ),
-        ),
         checks=tuple(checks),
     )
 

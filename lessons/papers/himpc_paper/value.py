@@ -60,11 +60,11 @@ def _section(results: Results, quick: bool) -> Section:
         notes=(
             "V_N(k) is the optimal cost of each level, from the telemetry. Level 1 must decrease as long as "
             "it is far above the bound ε_N that the estimation error leaves (39); lower levels only as far "
-            f"as level 1 lets them. {trouble(run)}",
+            f"as level 1 lets them. ε_N = {number(epsilon)}. {trouble(run)}",
         ),
         checks=(
             Check(
-                f"level 1, ticks with V_N above {_FAR:g} ε_N = {number(_FAR * epsilon)}: least α of (39) > 0",
+                f"level 1, ticks with V_N above {_FAR:g} ε_N: least α of (39) > 0",
                 alpha,
                 bool(alpha > 0),
             ),

@@ -8,7 +8,7 @@ import numpy as np
 
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE
-from lessons.papers.item import Check, Item, Row, Section, Table, at_least, at_most
+from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
 from lessons.papers.printed import printed
 from lessons.papers.words import number
 from lessons.plots.panels import Curve, Panel, Picture
@@ -48,9 +48,8 @@ def _report(results: Results, quick: bool) -> Section:
     columns = ("seats", "HT (s)", "ST (s)", "ST/HT", "HT way (m)", "ST way (m)", "ST/HT")
     checks = (
         Check("every layout completes", float(np.mean(done)), all(done)),
-        at_least("ST/HT time, smallest", float(ratio.min()), 1.9),
-        at_least("ST/HT time, mean", float(ratio.mean()), 2.1),
-        at_least("ST/HT way of the base, smallest", float(shorter.min()), 1.0),
+        between("ST/HT time, smallest", float(ratio.min()), 1.9, 3.5),
+        between("ST/HT way of the base, smallest", float(shorter.min()), 1.0, 2.5),
         at_most("velocity over its limit", _largest(results, quick, "velocity"), 1.001),
         at_most("acceleration over its limit", _largest(results, quick, "acceleration"), 1.001),
     )
@@ -62,7 +61,17 @@ def _report(results: Results, quick: bool) -> Section:
             curves.append(Curve(base[:, 0], base[:, 1], architecture.replace("_", " "), str(place)))
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     return Section(
-        rows=(Row("ST/HT execution time, mean over the layouts", "1", paper, float(ratio.mean()), why),),
+        rows=(
+            Row(
+                "ST/HT execution time, mean over the layouts",
+                "1",
+                paper,
+                float(ratio.mean()),
+                why,
+                turns_at=1.0,
+                topic="deliveries",
+            ),
+        ),
         tables=(Table("Three of six seats, four rounds", columns, tuple(lines)),),
         checks=checks,
         pictures=(Picture("htmpc-fig-9", "Base paths of the first layout.", (panel,)),),

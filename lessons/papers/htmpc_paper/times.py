@@ -27,7 +27,9 @@ def _report(results: Results, quick: bool) -> Section:
         run = results[job]
         for key, printed_value in (("median", paper.get(words)), ("p99", None)):
             ours = run.figure("step_ms", key)
-            rows.append(Row(f"{words}: {key} of the step", "ms", printed_value, ours, trouble(run) or _WHY))
+            why = trouble(run) or _WHY
+            quantity = f"{words}: {key} of the step"
+            rows.append(Row(quantity, "ms", printed_value, ours, why, band=9.0, topic="computing-time"))
     return Section(rows=tuple(rows))
 
 

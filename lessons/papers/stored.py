@@ -1,0 +1,142 @@
+"""What was measured before: it judges a new measurement, and stands in for one where nothing is run.
+
+`stored.json` holds, for the whole and for the quick version, the rows and checks of every item as they were
+measured when somebody last looked at all of them. Written by `himpc-lab reproduce --store`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from lessons.experiments.jobs import Run
+from lessons.papers.item import Check, Item, Row, Section
+from lessons.papers.topics import topics
+
+FILE = Path(__file__).with_name("stored.json")
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The stored numbers of one item.
+
+    Attributes:
+        rows: by quantity: (ours, ratio or None, verdict, the side that the paper says or None).
+        checks: by text: (the value, whether it held).
+    """
+
+    rows: Mapping[str, tuple[float, float | None, str, str | None]]
+    checks: Mapping[str, tuple[float, bool]]
+
+
+def stored(quick: bool) -> dict[str, Memory]:
+    """The stored numbers by item; items that were never stored are missing."""
+    data = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    return {
+        item: Memory(
+            {quantity: (_number(ours), *rest) for quantity, (ours, *rest) in kept["rows"].items()},
+            {text: (_number(value), held) for text, (value, held) in kept["checks"].items()},
+        )
+        for item, kept in data.get(_version(quick), {}).items()
+    }
+
+
+def _version(quick: bool) -> str:
+    return "quick" if quick else "whole"
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def store(sections: Mapping[str, Section], quick: bool) -> None:
+    """Keeps what was measured, item by item; other items stay as they are."""
+    data: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    kept = data.setdefault(_version(quick), {})
+    for item, section in sections.items():
+        kept[item] = {
+            "rows": {
+                row.quantity: [_short(row.ours), _short(row.ratio), row.verdict, row.says]
+                for row in section.rows
+            },
+            "checks": {check.text: [_short(check.value), check.holds] for check in section.checks},
+        }
+        if not (section.rows or section.checks):
+            del kept[item]
+    FILE.write_text(json.dumps(data, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _short(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(f"{value:.{_DIGITS}g}")
+
+
+# -------------------------------------------------------------------------------- judging
+
+
+def judged(section: Section, memory: Memory | None) -> tuple[Check, ...]:
+    """A check for every row and every check of a section: is it, on both sides, what it was?
+
+    A row must have the stored verdict and ratio (or, where the paper prints no number, value) within its
+    band; one that does not agree must have a topic that explains it; nothing stored may be missing, and
+    nothing be new. Without a memory there is only the need to explain.
+    """
+    found = [_explained(row) for row in section.rows if row.verdict in ("differs", "opposite")]
+    if memory is None:
+        return tuple(found)
+    found += [_row(row, memory) for row in section.rows]
+    found += [_check(check, memory) for check in section.checks if check.band is not None]
+    names = {row.quantity for row in section.rows} | {check.text for check in section.checks}
+    gone = [name for name in (*memory.rows, *memory.checks) if name not in names]
+    return (*found, *(Check(f"“{name}” was stored and is still measured", math.nan, False) for name in gone))
+
+
+def _explained(row: Row) -> Check:
+    return Check(f"{row.quantity}: {row.verdict}, and a topic explains it", row.ours, row.topic in topics())
+
+
+def _row(row: Row, memory: Memory) -> Check:
+    if row.quantity not in memory.rows:
+        return Check(f"“{row.quantity}” has a stored number", row.ours, False)
+    ours, ratio, verdict, says = memory.rows[row.quantity]
+    before, now = (ours, row.ours) if ratio is None or row.ratio is None else (ratio, row.ratio)
+    same = (row.verdict, row.says, row.ratio is None) == (verdict, says, ratio is None)
+    text = f"{row.quantity}: {verdict or 'nothing printed'}, ours {ours:.4g} ± {row.band:.0%}"
+    return Check(text, row.ours, same and _near(now, before, row.band))
+
+
+def _check(check: Check, memory: Memory) -> Check:
+    if check.text not in memory.checks:
+        return Check(f"“{check.text}” has a stored number", check.value, False)
+    before, _ = memory.checks[check.text]
+    text = f"{check.text}: {before:.4g} ± {check.band or 0:.0%}"
+    return Check(text, check.value, _near(check.value, before, check.band or 0))
+
+
+def _near(now: float, before: float, band: float) -> bool:
+    if math.isnan(before) or math.isnan(now):
+        return math.isnan(before) and math.isnan(now)
+    low, high = sorted((before / (1.0 + band), before * (1.0 + band)))
+    return low - 1e-12 <= now <= high + 1e-12
+
+
+# -------------------------------------------------------------------------------- without running
+
+
+def from_memory(item: Item, memory: Memory, quick: bool = False) -> Section:
+    """An item's section as if its runs had given the stored numbers; without pictures and further tables."""
+    nothing = {job: Run(job, {}, {}, "not run") for job in item.jobs(quick)}
+    section = item.report(nothing, quick)
+    rows = tuple(
+        replace(row, ours=memory.rows[row.quantity][0]) if row.quantity in memory.rows else row
+        for row in section.rows
+    )
+    checks = []
+    for check in section.checks:
+        value, holds = memory.checks.get(check.text, (math.nan, False))
+        checks.append(replace(check, value=value, holds=holds))
+    return Section(section.notes, rows, checks=tuple(checks))
