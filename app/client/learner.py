@@ -40,7 +40,7 @@ class Learner(Simulation):
 
     def __init__(self, token: str, choice: SceneChoice, spares: Spares) -> None:
         self.token = token
-        self.choice = choice
+        self.choice = self._start_choice = choice
         self.attached = False
         self.left_at = time.monotonic()
         self.ghost: Ghost | None = None
@@ -59,6 +59,7 @@ class Learner(Simulation):
 
     def load(self, choice: SceneChoice) -> None:
         """Another scene, in a new process if this one is in trouble."""
+        choice = choice.admitting(self._start_choice)
         self._begin_anew(Load(choice), choice)
 
     def reset_all(self) -> None:
@@ -85,7 +86,7 @@ class Learner(Simulation):
             self.failure = self._unheard = None
             self._forget_questions()
             self._start()
-            self.send(Load(choice or self.choice))
+            self.send(Load((choice or self.choice).admitting(self._start_choice)))
             if ghost is not None:
                 self.send(Lead(True))
         aside(lambda: before.close(0.0 if mute else 1.0))

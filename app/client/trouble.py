@@ -19,7 +19,7 @@ class Trouble:
     """state: a word for the badge; sentence: what is the matter; offer: what the button says that starts the
     scene again, None if waiting is all there is to do."""
 
-    state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING"]
+    state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING", "YOUR CODE"]
     sentence: str
     offer: str | None = "Start again"
 

@@ -43,12 +43,14 @@ def run(
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
+    from lessons.own.files import is_file
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
     from lessons.scenes.catalog import prepared
 
-    given = _given(scene, urdf, tip, state)
+    files = (controller,) if controller is not None and is_file(controller) else ()
+    given = _given(scene, urdf, tip, state, files)
     given = replace(given, seed=given.seed if seed is None else seed)
     loaded = prepared(given.prepared(), controller, set)
     with progress_bar(f"{given.scene} …", json is None) as progress:
@@ -72,17 +74,19 @@ def run(
     return 0
 
 
-def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> State:
+def _given(
+    scene: str | None, urdf: str | None, tip: str | None, code: str | None, files: tuple[str, ...]
+) -> State:
     """What to run: the scene that was named, or the state of a code."""
     from lessons.replay.state import State, decode
 
     if code is None:
         if scene is None:
             raise InputError("run needs a scene, e.g. himpc-lab run iiwa14-hold, or --state CODE")
-        return State(scene, urdf, tip)
+        return State(scene, urdf, tip, files=files)
     if (scene, urdf, tip) != (None, None, None):
         raise InputError("--state brings its own scene and robot: leave out the scene, --urdf and --tip")
-    return decode(code)
+    return replace(decode(code), files=files)
 
 
 def _save(path: str, data: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import tyro
@@ -14,6 +15,7 @@ def serve(
     scene: str | None = None,
     urdf: str | None = None,
     tip: str | None = None,
+    controller: str | None = None,
     state: str | None = None,
     max_sessions: int = 4,
     classroom: bool = False,
@@ -28,8 +30,9 @@ def serve(
     """Open the page: a robot under HIMPC whose target you can drag.
 
     Args:
-        lesson: lesson to start with; himpc-lab lessons lists them.
-        scene: scene to start with; iiwa14-hold by default, hold with --urdf.
+        lesson: lesson to start with; himpc-lab lessons lists them. Or a Python file of your own.
+        scene: scene to start with; iiwa14-hold by default, hold with --urdf. Or a Python file of your own.
+        controller: controller to start with, or a Python file of your own: what is saved there, runs.
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
         state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
@@ -51,14 +54,15 @@ def serve(
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
         raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
+    own = SceneChoice.starting(scene or ("hold" if urdf else FIRST.name), urdf, tip, controller)
     if lesson is not None:
-        choice = SceneChoice.opening(lesson)
+        choice = SceneChoice.opening(lesson).admitting(own)
     elif state is not None:
         from lessons.replay.state import decode
 
-        choice = SceneChoice.of_state(decode(state))
+        choice = SceneChoice.of_state(replace(decode(state), files=own.controllers)).admitting(own)
     else:
-        choice = SceneChoice(scene or ("hold" if urdf else FIRST.name), urdf, tip)
+        choice = own
     return serve_page(
         choice,
         host=host,

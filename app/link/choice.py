@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 from app.link.exercise import Exercise
 from lessons.course import COURSE
+from lessons.own.files import is_file
 from lessons.scenes.names import ALL_SCENES
+from lessons.settings.assignments import assignment
 from robots.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -19,7 +21,8 @@ if TYPE_CHECKING:
 class SceneChoice:
     """Which scene to load, for `hold` which robot, and with which settings and seed: assignments
     "PATH=VALUE" on top of the scene's own. The step of a lesson brings all of it, and its script; `mine` is
-    what the learner had changed of it, made anew once when it is loaded."""
+    what the learner had changed of it, made anew once when it is loaded. `scenes` and `controllers` are the
+    Python files that whoever started the program named: no others are run."""
 
     name: str
     urdf: str | None = None
@@ -29,12 +32,32 @@ class SceneChoice:
     seed: int = 0
     exercise: Exercise | None = None
     mine: tuple[str, ...] = ()
+    scenes: tuple[str, ...] = ()
+    controllers: tuple[str, ...] = ()
+
+    @classmethod
+    def starting(
+        cls, scene: str, urdf: str | None = None, tip: str | None = None, controller: str | None = None
+    ) -> SceneChoice:
+        """What the command line asks for: scene and controller by name, or by the path of a file."""
+        return cls(
+            scene,
+            urdf,
+            tip,
+            set=() if controller is None else (assignment("controller", controller),),
+            scenes=(scene,) if is_file(scene) else (),
+            controllers=(controller,) if controller is not None and is_file(controller) else (),
+        )
+
+    def admitting(self, start: SceneChoice) -> SceneChoice:
+        """The same with the files of what the program was started with."""
+        return replace(self, scenes=start.scenes, controllers=start.controllers)
 
     @classmethod
     def opening(cls, lesson: str) -> SceneChoice:
         """The first step of a lesson whose file is not read yet. Raises InputError if there is no such
         lesson."""
-        if lesson not in COURSE:
+        if lesson not in COURSE and not is_file(lesson):
             raise unknown_name("lesson", lesson, COURSE)
         return cls("", exercise=Exercise(lesson))
 
@@ -56,14 +79,19 @@ class SceneChoice:
                 f"step {state.step or 1} of lesson '{state.lesson}' has another scene than the code: "
                 "it was made by another version; open the lesson itself"
             )
+        from lessons.own.resolve import with_controllers
         from lessons.settings.assignments import differences
 
-        mine = differences(exercise.run.prepared().settings, state.prepared().settings)
+        mine = differences(
+            with_controllers(exercise.run.prepared(), state.files).settings, state.prepared().settings
+        )
         return replace(lesson, seed=state.seed, mine=mine)
 
     @property
     def known(self) -> bool:
         """Whether names alone tell that it can be loaded: no file, frame or setting of somebody's own."""
+        if self.controllers or (self.exercise is not None and is_file(self.exercise.lesson)):
+            return False
         if self.exercise is not None:
             return not self.name
         return (
@@ -72,12 +100,17 @@ class SceneChoice:
 
     def resolved(self) -> SceneChoice:
         """The same, with what a lesson's file says about its step. Raises InputError if there is none."""
-        return self if self.name or self.exercise is None else SceneChoice.of_lesson(self.exercise)
+        if self.name or self.exercise is None:
+            return self
+        return SceneChoice.of_lesson(self.exercise).admitting(self)
 
     def scene(self) -> Scene:
         """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
-        if self.exercise is not None:
-            return self.exercise.run.prepared()
+        from lessons.own.resolve import scene_named, with_controllers
         from lessons.scenes.catalog import load_scene, prepared
 
-        return prepared(load_scene(self.name, self.urdf, self.tip, self.urdf_text), None, self.set)
+        if self.exercise is not None:
+            return with_controllers(self.exercise.run.prepared(), self.controllers)
+        load = scene_named if self.name in self.scenes else load_scene
+        scene = with_controllers(load(self.name, self.urdf, self.tip, self.urdf_text), self.controllers)
+        return prepared(scene, None, self.set)

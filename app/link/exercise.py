@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from lessons.course import load_lesson
+from lessons.own.files import is_file
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class Exercise:
     """A step of a lesson, or, at the place after the last step, its challenge.
 
     Attributes:
-        lesson: its name.
+        lesson: its name, or the path of a file of one's own.
         place: 0-based.
     """
 
@@ -39,7 +40,7 @@ class Exercise:
     @classmethod
     def at(cls, lesson: str, step: int) -> Exercise:
         """The step (1 being the first) of a lesson. Raises InputError if there is no such lesson or step."""
-        count = len(parts_of(load_lesson(lesson)))
+        count = len(parts_of(_lesson(lesson)))
         if not 1 <= step <= count:
             raise InputError(f"lesson '{lesson}' has no step {step}: choose one from 1 to {count}")
         return cls(lesson, step - 1)
@@ -47,7 +48,7 @@ class Exercise:
     @property
     def whole(self) -> Lesson:
         """The lesson. Raises InputError if there is none of that name."""
-        return load_lesson(self.lesson)
+        return _lesson(self.lesson)
 
     @property
     def part(self) -> Step | Challenge:
@@ -76,6 +77,14 @@ class RunStep:
 
     own: bool = True
     fast: bool = False
+
+
+def _lesson(name: str) -> Lesson:
+    if not is_file(name):
+        return load_lesson(name)
+    from lessons.own.resolve import lesson_named
+
+    return lesson_named(name)
 
 
 def parts_of(lesson: Lesson) -> tuple[Step | Challenge, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
 from app.link.inside import Inside, Watch
+from app.link.own_code import OwnCode
 from app.link.wire import Handle
 
 if TYPE_CHECKING:
@@ -214,7 +215,8 @@ class Status:
     resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
     path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
     I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one; lecture:
-    of a lesson, when there is news; inside: while the page watches.
+    of a lesson, when there is news; inside: while the page watches;
+    own: of a controller from a file.
     """
 
     t: float
@@ -235,6 +237,7 @@ class Status:
     mission: MissionView | None = None
     lecture: Lecture | None = None
     inside: Inside | None = None
+    own: OwnCode | None = None
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,7 @@ class Page:
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
         self._next_plots = 0.0
+        self._saves = 0
         self._waiting: viser.GuiHtmlHandle | None = None
         self._again: viser.GuiButtonHandle | None = None
         self._closed = threading.Event()
@@ -119,7 +120,7 @@ class Page:
         if stage is None:
             self._show_early_trouble()
             return
-        trouble = learner.trouble()
+        trouble = learner.trouble() or self._own_trouble()
         if trouble != self._trouble:
             self._trouble = trouble
             stage.show_trouble(trouble)
@@ -132,6 +133,23 @@ class Page:
             # Another scene may come in at any moment: its rows and poses do not fit this stage.
             if learner.ready is self._built:
                 raise
+
+    def _own_trouble(self) -> Trouble | None:
+        """What is wrong with the learner's own code; says also when a saved text took over."""
+        status = self.learner.status
+        own = None if status is None else status.own
+        if own is None:
+            return None
+        if own.saves > self._saves:
+            self._client.add_notification(
+                "Saved is running",
+                f"{own.file} took over at t = {own.at:.2f} s. It is read from the disk of the machine that "
+                "runs the lab.",
+                color="green",
+                auto_close_seconds=4.0,
+            )
+        self._saves = own.saves
+        return None if own.fault is None else Trouble("YOUR CODE", own.fault, None)
 
     def _plots_due(self) -> bool:
         now = time.perf_counter()

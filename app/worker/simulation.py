@@ -269,8 +269,7 @@ class Body:
         )
 
     def status(self, real_time_factor: float = 0.0, capped: bool = False) -> Status:
-        run, session = self.run, self.session
-        notices = tuple(session.notices)
+        run, session, notices = self.run, self.session, tuple(self.session.notices)
         session.notices.clear()
         settings, sent, ran = session.settings, self._sent, self.ticks > 0
         self._sent = settings
@@ -293,6 +292,7 @@ class Body:
             mission=run.mission(),
             lecture=None if self.lecturer is None else self.lecturer.report(),
             inside=run.inside() if ran else None,
+            own=run.own(),
         )
 
     def close(self) -> None:

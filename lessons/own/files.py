@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,6 +65,30 @@ def read(path: str) -> Source:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise InputError(f"{path}, line {line}: is no text in UTF-8; save it as UTF-8") from None
+
+
+def fingerprint(path: str) -> str:
+    """What a file is called and what is in it, e.g. "mine.py@3fa9c1d20b7e". Raises InputError if it cannot be
+    read."""
+    return f"{Path(path).name}@{read(path).digest[:12]}"
+
+
+def with_fingerprint(mark: str, files: Iterable[str]) -> str:
+    """The file among several that a fingerprint is of. Raises InputError if it is none of them."""
+    name = mark.partition("@")[0]
+    alike = [each for each in files if is_file(each) and Path(each).name == name]
+    for each in alike:
+        if fingerprint(each) == mark:
+            return each
+    if alike:
+        raise InputError(
+            f"{alike[0]} is not the {name} that this was made with: its content is another "
+            f"({fingerprint(alike[0])}, not {shortened(mark, 100)})"
+        )
+    raise InputError(
+        f"this was made with a controller of somebody's own, {shortened(mark, 100)}: get that file and add "
+        f"--controller {shortened(name, 60)}"
+    )
 
 
 def execute(source: Source) -> ModuleType:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache
 from types import ModuleType
@@ -16,7 +16,7 @@ from himpc.tasks import Task
 from lessons.own.files import Source, execute, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
-from lessons.scenes.catalog import load_scene
+from lessons.scenes.catalog import admitted, load_scene
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
 from robots import InputError, Robot
@@ -53,6 +53,13 @@ def scene_named(
             "or change one of lessons.headless.load_scene"
         )
     return replace(found, name=name)
+
+
+def with_controllers(scene: Scene, files: Iterable[str]) -> Scene:
+    """The scene, under whose controllers are now those of files as well, if it takes torques."""
+    if not isinstance(scene, TorqueScene):
+        return scene
+    return replace(scene, settings=admitted(scene.settings, files))
 
 
 def lesson_named(name: str) -> Lesson:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from lessons.events import Event, Reset
+from lessons.own.files import is_file
 from lessons.replay.state import State
-from lessons.settings.assignments import differences
+from lessons.settings.assignments import differences, parse_assignment
 from lessons.settings.settings import Settings, settings_after
 
 Log = Sequence[tuple[float, Event]]
@@ -35,6 +36,8 @@ def script(state: State, log: Log, duration: float) -> str:
     settings = settings_after(scene.settings, (event for _, event in log[:start]))
     assignments = differences(state.loaded().settings, settings)
     events = log[start:]
+    own = next((each for each in assignments if each.startswith("controller=") and is_file(each)), None)
+    assignments = tuple(each for each in assignments if each != own)
     find = ", ".join(repr(each) for each in _arguments(state))
     parts = [
         _HEAD.format(
@@ -44,7 +47,8 @@ def script(state: State, log: Log, duration: float) -> str:
         ),
         *_imports(events),
         _IMPORTS,
-        f"SCENE = load_scene({find})",
+        f"SCENE = {'scene_named' if is_file(state.scene) else 'load_scene'}({find})",
+        f"CONTROLLER = {None if own is None else parse_assignment(own)[1]!r}",
         _tuple("SETTINGS", (repr(each) for each in assignments)),
         _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
         f"DURATION = {_literal(float(duration))}  # s",
@@ -72,11 +76,11 @@ import numpy as np
 _CAUTION = """
 Measured computing times took part in it, so every repetition comes out a little different."""
 
-_IMPORTS = """from lessons.headless import arrays, load_scene, prepared, run, summary
+_IMPORTS = """from lessons.headless import arrays, load_scene, prepared, run, scene_named, summary
 """
 
 _TAIL = """
-scene = replace(prepared(SCENE, None, SETTINGS), events=EVENTS)
+scene = replace(prepared(SCENE, CONTROLLER, SETTINGS), events=EVENTS)
 recording = run(scene, DURATION, SEED, to_the_end=True)
 print(json.dumps(summary(recording), indent=2))
 if len(sys.argv) > 1:

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from lessons.course import COURSE
-from lessons.own.resolve import scene_named
+from lessons.own.files import fingerprint, is_file
+from lessons.own.resolve import scene_named, with_controllers
 from lessons.scenes.catalog import prepared
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
 from lessons.scenes.scene import Scene
-from lessons.settings.assignments import differences, parse_assignment
+from lessons.settings.assignments import assignment, differences, parse_assignment
 from lessons.settings.settings import Settings
 from robots import CATALOG, InputError
 from robots.errors import unknown_name
@@ -47,6 +48,7 @@ class State:
         seed: of the run.
         lesson: name of the lesson that is being taken.
         step: its place in the lesson, 1 being the first.
+        files: Python files that may be the controller; whoever started the program named them, no code does.
     """
 
     scene: str
@@ -56,10 +58,11 @@ class State:
     seed: int = 0
     lesson: str | None = None
     step: int | None = None
+    files: tuple[str, ...] = ()
 
     def loaded(self) -> Scene:
         """The scene as it is without the assignments. Raises InputError for one that cannot be loaded."""
-        return scene_named(self.scene, self.urdf, self.tip)
+        return with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
 
     def prepared(self) -> Scene:
         """The scene with every assignment. Raises InputError, one sentence, for what cannot be."""
@@ -81,8 +84,9 @@ def state_of(
     Raises:
         InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
     """
-    own = scene_named(scene, urdf, tip)
-    return State(scene, urdf, tip, differences(own.settings, settings), seed, lesson, step)
+    files = tuple(filter(is_file, settings.controllers))
+    own = with_controllers(scene_named(scene, urdf, tip), files)
+    return State(scene, urdf, tip, differences(own.settings, settings), seed, lesson, step, files)
 
 
 def command_line(state: State) -> str:
@@ -112,12 +116,25 @@ def encode(state: State) -> str:
         raise InputError(
             "a code cannot carry a robot from a file: pass on the file and the command line instead"
         )
-    given = {_KEYS[name]: value for name, value in vars(state).items() if value not in (None, (), 0)}
+    if is_file(state.scene):
+        raise InputError("a code cannot carry a scene from a file: pass on file and command line")
+    given = {
+        key: value for name, key in _KEYS.items() if (value := getattr(state, name)) not in (None, (), 0)
+    }
+    given["a"] = [_carried(each) for each in state.set]
+    if not given["a"]:
+        del given["a"]
     text = json.dumps(given, ensure_ascii=False, separators=(",", ":")).encode()
     code = f"hl{VERSION}-" + base64.urlsafe_b64encode(zlib.compress(text, 9)).decode().rstrip("=")
     if len(code) > MAX_CODE or len(text) > _MAX_TEXT or not _fits(state.set):
         raise InputError("this setting is too long for a code: use the command line or the script instead")
     return code
+
+
+def _carried(text: str) -> str:
+    """An assignment as a code carries it: of a file of one's own the name and what tells its content."""
+    path, value = parse_assignment(text)
+    return assignment(path, fingerprint(value)) if path == "controller" and is_file(value) else text
 
 
 def decode(code: str) -> State:

@@ -25,6 +25,7 @@ from robots import InputError
 from robots.errors import unknown_name
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
+AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
 _MAKERS: dict[str, Callable[[], TorqueScene]] = {
@@ -98,7 +99,7 @@ def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]
     return replace(scene, settings=with_assignments(settings, assignments))
 
 
-def admitted(settings: Settings, files: Iterable[str]) -> Settings:
+def admitted(settings: AnySettings, files: Iterable[str]) -> AnySettings:
     """The settings with Python files, given by whoever started the program, that may be their controller.
 
     Raises:

@@ -210,7 +210,6 @@ class TorqueSession(Session):
         self._write_truth(row, plan, q, ahead)
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
         if plan.notice is not None:
-            self.notices.append(plan.notice)
             self.failure = plan.notice
         late = settings.is_late(1e-3 * plan.step_us)
         row[fields["late"]] = late

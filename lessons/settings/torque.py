@@ -17,7 +17,7 @@ from himpc.references import Reference
 from himpc.stack import Level, Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
-from lessons.own.files import is_file
+from lessons.own.files import is_file, with_fingerprint
 from lessons.settings.entry import Entry
 from lessons.settings.levels import moved, ordered
 from lessons.settings.settings import (
@@ -207,6 +207,8 @@ def _now(route: Any) -> Any:
 
 
 def _known(form: Form, path: str, name: Any) -> Any:
+    if isinstance(name, str) and ".py@" in name:
+        return with_fingerprint(name, form.words)
     if isinstance(name, str) and is_file(name) and name not in form.words:
         raise InputError(
             f"{path} is {shortened(name, 100)}: a file of your own is named when himpc-lab is started, by "

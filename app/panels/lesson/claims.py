@@ -29,7 +29,8 @@ def heading(exercise: Exercise) -> str:
         f"{'●' if k == exercise.place else '○'}</span>"
         for k, name in enumerate(names)
     )
-    title = f"Lesson {COURSE.index(lesson.name) + 1}: {esc(lesson.card.title)}"
+    number = f"Lesson {COURSE.index(lesson.name) + 1}" if lesson.name in COURSE else "A lesson of your own"
+    title = f"{number}: {esc(lesson.card.title)}"
     return STYLE + block(
         f'<div style="opacity:0.8">{title} &nbsp;{dots} &nbsp;{exercise.place + 1} of {len(parts)}</div>'
         f'<div style="font-size:1.25em;font-weight:700;margin-top:0.15em">{esc(names[exercise.place])}</div>',

@@ -77,7 +77,7 @@ class SharePanel:
 
     def _save(self, client: viser.ClientHandle, told: Told) -> None:
         choice = _from_a_name(told.choice)
-        start = State(choice.name, choice.urdf, choice.tip, choice.set, choice.seed)
+        start = State(choice.name, choice.urdf, choice.tip, choice.set, choice.seed, files=choice.controllers)
         text = script(start, told.log, told.t)
         client.send_file_download(f"{choice.name}.py", text.encode(), save_immediately=True)
 

@@ -12,7 +12,6 @@ from app.panels.widgets.controls import Controls
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
-from himpc.catalog import CONTROLLERS
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
@@ -37,7 +36,7 @@ class ControllerPanel:
         controls = Controls(gui, bindings, settings)
         with gui.add_folder("Which controller"):
             controls.add("controller")
-            self._what = gui.add_html(block(esc(CONTROLLERS[settings.controller])))
+            self._what = gui.add_html(block(esc(settings.controllers[settings.controller])))
         self._shown = settings.controller
         with gui.add_folder("Horizon"):
             controls.add("horizon", "T_s")
@@ -63,7 +62,7 @@ class ControllerPanel:
         self._deadline.update(now)
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller
-            self._what.content = block(esc(CONTROLLERS[self._shown]))
+            self._what.content = block(esc(now.settings.controllers[self._shown]))
         norm, radius = now.number("gauge_norm"), now.number("gauge_radius")
         self._gauge.content = block(
             f"spectral radius of I − M⁻¹M̄: <b>{radius:.3f}</b>{_verdict(radius)}"

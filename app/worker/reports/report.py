@@ -9,6 +9,7 @@ import numpy as np
 
 from app.link.inside import Inside, Watch
 from app.link.messages import BindingRow, MissionView, TaskView
+from app.link.own_code import OwnCode
 
 LISTED = 24
 """Binding rows sent to the page: more cannot be read in a tenth of a second."""
@@ -24,6 +25,10 @@ class Run(ABC):
         """session: of the kind that the subclass is for."""
         self.session = session
         self.watch = Watch()
+
+    def own(self) -> OwnCode | None:
+        """Of a controller from a file: whether it runs; what was saved meanwhile takes over."""
+        return None
 
     @abstractmethod
     def tasks(self) -> tuple[TaskView, ...]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from app.link.inside import Inside, Watch
 from app.link.messages import TaskView
+from app.link.own_code import OwnCode
+from app.worker.reports.own_code import File
 from app.worker.reports.report import Run
 from himpc.tasks import Task
 from lessons.geometry.look import matrix_of, plane_of
@@ -20,6 +22,13 @@ class TorqueRun(Run):
     """See `app.worker.reports.report.Run`."""
 
     session: TorqueSession
+
+    def __init__(self, session: TorqueSession) -> None:
+        super().__init__(session)
+        self._file = File()
+
+    def own(self) -> OwnCode | None:
+        return self._file.look(self.session)
 
     def tasks(self) -> tuple[TaskView, ...]:
         levels = self.session.settings.levels

@@ -1,0 +1,173 @@
+"""A controller from a file on the page: what is saved runs, what is wrong is a sentence, the rest goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.link.choice import SceneChoice
+from app.link.messages import Lead, Post, Refused
+from app.link.process import wait_until
+from app.server.server import PageServer
+from app.worker.follower import Shadow
+from app.worker.simulation import Body
+from browsing.wire import Wire, eventually
+from lessons.events import Reset, Set
+from lessons.replay.script import script
+from lessons.replay.state import State, decode, encode, state_of
+from robots import InputError
+
+HOLDS = "def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n"
+LONG = 60.0  # s
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.py"
+    path.write_text(HOLDS)
+    return path
+
+
+@pytest.fixture
+def body(file: Path) -> Iterator[Body]:
+    made = Body(SceneChoice.starting("planar3-hold", controller=str(file)))
+    yield made
+    made.close()
+
+
+def after(body: Body, condition: Callable[[], bool]) -> bool:
+    """Whether something comes true while the body runs and reports."""
+
+    def looked() -> bool:
+        body.tick(5)
+        return condition()
+
+    return wait_until(looked, LONG, period=0.05)
+
+
+def test_own_code_that_is_saved_runs(body: Body, file: Path) -> None:
+    body.tick(20)
+    own = body.status().own
+    assert own is not None
+    assert (own.file, own.fault, own.saves) == (str(file), None, 0)
+    before = body.session.plant.tau.copy()
+    file.write_text(HOLDS.replace("now.bias", "now.bias + 0.1"))
+    assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)
+    assert np.abs(body.session.plant.tau - before).max() < 0.11
+    body.tick(400)
+    assert not body.session.failure
+
+
+def test_own_code_that_is_wrong_leaves_what_ran_before(body: Body, file: Path) -> None:
+    body.tick(20)
+    body.status()
+    file.write_text("def torque(now)\n    return 1\n")
+    assert after(body, lambda: (now := body.status().own) is not None and now.fault is not None)
+    own = body.status().own
+    assert own is not None
+    assert own.fault is not None
+    assert "line 1: expected ':'. What ran before goes on." in own.fault
+    assert body.session.failure is None
+    file.write_text(HOLDS + "\n")
+    assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)
+    assert (found := body.status().own) is not None
+    assert found.fault is None
+
+
+def test_own_code_that_fails_can_be_reset(body: Body, file: Path) -> None:
+    body.tick(20)
+    body.status()
+    file.write_text("def torque(now):\n    return now.q[7]\n")
+    assert after(body, lambda: body.status().own is not None and body.session.failure is not None)
+    own = body.status().own
+    assert own is not None
+    assert own.fault is not None
+    assert "line 2: IndexError" in own.fault
+    file.write_text(HOLDS)
+    assert after(body, lambda: (now := body.status().own) is not None and now.saves == 2)
+    body.handle(Post(Reset()))
+    body.tick(50)
+    assert (found := body.status().own) is not None
+    assert found.fault is None
+
+
+def test_own_code_has_a_ghost_beside_it(body: Body, file: Path) -> None:
+    """The lab's controller as the ghost of one's own, and the other way round."""
+    body.handle(Lead(True))
+    begin = body.leader.script(body.session)
+    assert begin is not None and begin.begin is not None
+    for own in ("controller=himpc", f"controller={file}"):
+        shadow = Shadow(begin.begin, (own,))
+        shadow.follower.hear((), 0.1)
+        shadow.catch_up(np.inf)
+        assert shadow.session.settings.controller == own.partition("=")[2]
+        assert shadow.session.t == pytest.approx(0.1)
+        shadow.close()
+
+
+def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(body: Body, file: Path) -> None:
+    body.handle(Post(Set("controller", "himpc")))
+    body.handle(Post(Set("controller", str(file))))
+    body.tick(20)
+    assert not body.session.notices
+    other = file.with_name("other.py")
+    other.write_text(HOLDS)
+    body.handle(Post(Set("controller", str(other))))
+    body.tick(1)
+    assert "--controller FILE.py" in body.session.notices[0]
+    with pytest.raises(InputError):
+        Body(SceneChoice("planar3-hold", set=(f"controller={file}",)))
+    with pytest.raises(InputError, match="scene"):
+        Body(SceneChoice(str(file)))
+
+
+def test_own_code_is_known_by_its_content(body: Body, file: Path) -> None:
+    """A code names the file and what is in it; it opens for whoever started with the same one."""
+    state = state_of("planar3-hold", body.session.settings_now)
+    code = encode(state)
+    with pytest.raises(InputError, match=r"add --controller mine\.py"):
+        decode(code).prepared()
+    found = State(**{**vars(decode(code)), "files": (str(file),)})
+    assert found.prepared().settings.controller == str(file)
+    text = script(State("planar3-hold", set=state.set, files=state.files), (), 0.1)
+    assert f"CONTROLLER = {str(file)!r}" in text
+    file.write_text(HOLDS + "# changed\n")
+    with pytest.raises(InputError, match="its content is another"):
+        found.prepared()
+
+
+def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
+    choice = SceneChoice.starting("planar3-hold", controller=str(file))
+    server = PageServer(choice, port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows("a controller of your own"))
+            learner = server.sessions.learners[0]
+            assert eventually(lambda: learner.status is not None and learner.status.own is not None)
+            file.write_text("def torque(now):\n    return oops\n")
+            assert eventually(lambda: page.shows("line 2: NameError"))
+            assert page.shows("YOUR CODE")
+            file.write_text(HOLDS + "\n")
+            assert eventually(lambda: any("took over at t" in body for _, body in page.notices))
+            learner.load(SceneChoice("planar3-circle"))
+            assert eventually(lambda: learner.choice.name == "planar3-circle")
+            assert learner.settings is not None
+            assert str(file) in learner.settings.controllers
+    finally:
+        server.close()
+
+
+def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
+    from lessons.own.new import text_of
+
+    scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.py"
+    scene.write_text(text_of("scene", None, "scene.py"))
+    lesson.write_text(text_of("lesson", None, "lesson.py"))
+    for choice in (SceneChoice.starting(str(scene)), SceneChoice.opening(str(lesson))):
+        body = Body(choice)
+        body.tick(3)
+        assert not isinstance(body.ready(), Refused)
+        body.close()
