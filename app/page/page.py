@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import viser
 
 from app.adapter import private
@@ -21,6 +22,7 @@ from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.inlet import Inlet
+from app.panels.widgets.command import add_command
 from lessons.scenes.names import ALL_SCENES
 
 if TYPE_CHECKING:
@@ -202,11 +204,23 @@ class Page:
                 self._event_loop,
                 self._notebook,
             )
+            add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
             seen = (replace(ready.choice, exercise=None, set=()), ready.robot.name)
             if seen != self._seen:  # a restart leaves the learner's view as it was
                 aim(self._client.camera, ready.robot, self._phone, ready.room)
                 self._seen = seen
         self._trouble = None
+
+    def _frame(self) -> None:
+        """The robot as it stands now into the middle of the picture, seen from where it is seen."""
+        from app.view.camera import look
+
+        poses = self.learner.read(lambda block, _: block.poses())
+        ready = self._built
+        if poses is None or ready is None or not np.isfinite(poses).all():
+            return
+        base = np.zeros((0 if len(ready.room) else 1, 3))  # of a robot on wheels it is not where it began
+        look(self._client.camera, np.vstack([base, poses[:, :3]]), self._phone, None)
 
     def _break(self, error: Exception) -> None:
         """Something of the page does not work: a sentence and a way on, instead of what no longer moves."""

@@ -8,6 +8,7 @@ import viser
 
 from app.adapter import private
 from app.html.palette import RGB
+from app.view.camera import look
 from robots import Robot
 from robots.shapes import link_shapes
 
@@ -65,29 +66,37 @@ class RobotView:
 
 def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     """(position, look_at) from which a robot is well seen, and the length of its arm, m."""
+    points, direction, reach = _home(robot)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return middle + reach * direction, middle, reach
+
+
+def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
+    """Base, joints and tip at home, (k, 3) m; from where to look at them; and the length of the arm, m."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, robot.home)
     joints = np.array([data.oMi[j].translation for j in range(1, robot.model.njoints)])
     tip = data.oMf[robot.frame_id(robot.tip)].translation
     points = np.vstack([np.zeros(3), joints, tip])
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     length = float(np.sum(np.linalg.norm(np.diff(points[1:], axis=0), axis=1)))
     reach = max(0.4, length)
     planar = float(np.ptp(points[:, 2])) < 0.05 * reach
-    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5])
-    return middle + reach * direction, middle, reach
+    return points, np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5]), reach
 
 
 def aim(camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray) -> None:
     """Turns the camera to a robot and the points (k, 3) it will go to, m. phone: viser's sheet covers the
     lower half of the scene, so the robot goes, smaller, into the upper one."""
-    eye, at, reach = camera_for(robot)
-    if len(room):
-        points = np.vstack([at, room])
-        low, high = points.min(axis=0), points.max(axis=0)
-        at = np.array([*(0.5 * (low + high))[:2], 0.4])
-        wide = 0.5 * float(np.linalg.norm((high - low)[:2])) + 0.5 * reach
-        eye = at + 1.15 * wide * np.array([0.7, -0.95, 0.9])
+    if not len(room):
+        points, direction, _ = _home(robot)
+        look(camera, points, phone, direction)
+        return
+    _, at, reach = camera_for(robot)
+    points = np.vstack([at, room])
+    low, high = points.min(axis=0), points.max(axis=0)
+    at = np.array([*(0.5 * (low + high))[:2], 0.4])
+    wide = 0.5 * float(np.linalg.norm((high - low)[:2])) + 0.5 * reach
+    eye = at + 1.15 * wide * np.array([0.7, -0.95, 0.9])
     if phone:
         eye = at + 1.7 * (eye - at)
         down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])

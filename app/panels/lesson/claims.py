@@ -148,7 +148,7 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 def pictures(part: Part, lecture: Lecture) -> str:
     """The signals to look at, over the run."""
     if not lecture.curves:
-        return block("The curves of the run appear here.")
+        return block("The curves of the run appear here: run this step (key P) to see them.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
     drawn = ""
     for k, signal in enumerate(signals_of(part)):

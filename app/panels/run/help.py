@@ -14,6 +14,7 @@ _KEYS = (
     ("R", "robot back to its start, settings kept"),
     ("J, K", "while paused: look back and forward, with Shift in larger steps"),
     ("G", "pull by hand or not: drag any link, the red arrow is the force"),
+    ("F", "the camera finds all of the robot again"),
     ("L", "all lessons"),
     ("P, N, B", "in a lesson: play the step's script, next step, step before"),
     ("?", "this help"),

@@ -14,6 +14,7 @@ from app.adapter import private
 from app.client.corners import corners
 from app.client.decimated import BUCKETS, WINDOW, Window
 from app.html.palette import RGB, css
+from app.html.text import block
 from app.panels.widgets.in_view import InView
 
 _NUDGE = 10
@@ -24,6 +25,15 @@ _FINE = 0.35  # px: what is closer to a curve lies on it
 _TOP = 30_000.0
 """The end of every axis as it is sent, in two bytes a value; the beginning is 0. No screen shows more."""
 _TICKS = 5
+_SECONDS = tuple(range(-round(WINDOW), 1, 2))
+_TIMES: uplot.Axis = {
+    "size": 36,
+    "splits": tuple(float(second) for second in _SECONDS),
+    "values": tuple(f"{second} s".replace("-", "−") if second else "now" for second in _SECONDS),
+}
+_PATIENCE = 12
+"""Looks at a chart without a value after which words say why."""
+_NOTHING = block("Nothing has happened yet: run (Space), or take single ticks (T), to see a curve.")
 
 
 @dataclass(frozen=True)
@@ -72,7 +82,7 @@ class Chart:
         self._span = span
         self._title, self._in_view = title, in_view
         self._tolerance = _FINE * _TOP / (height - _AROUND)
-        self._shows = 0
+        self._shows = self._blank = 0
         self._sent: tuple[np.ndarray, np.ndarray] | None = None
         x = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
         scale: uplot.Scale = {"range": (0.0, _TOP), "auto": False}
@@ -81,7 +91,7 @@ class Chart:
             ({"label": "s"}, *(_series(line) for line in lines)),
             title=title,
             scales={"x": {"time": False}, "y": scale},
-            axes=({"size": 36, "space": 60}, _axis(span, log)),
+            axes=(_TIMES, _axis(span, log)),
             bands=tuple(
                 {"series": (upper + 1, lower + 1), "fill": css(colour, 0.10)}
                 for upper, lower, colour in bands
@@ -92,6 +102,7 @@ class Chart:
             height=height,
             padding=(6, 12, 0, 0),
         )
+        self._note = gui.add_html(_NOTHING, visible=False)
 
     @property
     def in_view(self) -> bool:
@@ -109,7 +120,9 @@ class Chart:
         values = np.array(curves())
         known = np.isfinite(values[0])
         if np.count_nonzero(known) < 2:
+            self._explain(blank=True)
             return
+        self._explain(blank=False)
         low, high = self._span
         if self._log:
             values = np.log10(np.maximum(values, 10.0 ** (low - 1)))
@@ -132,6 +145,12 @@ class Chart:
             ages[0] -= 1e-5 * (self._shows // _NUDGE % 2)
         private.send_curves(self._handle, (ages.astype(np.float32), *np.rint(values).astype(np.int16)))
 
+    def _explain(self, blank: bool) -> None:
+        """Words below a chart that stays blank."""
+        self._blank = self._blank + 1 if blank else 0
+        if self._note.visible != (self._blank >= _PATIENCE):
+            self._note.visible = not self._note.visible
+
     def _looks_the_same(self, kept: np.ndarray, values: np.ndarray) -> bool:
         if self._sent is None or not np.array_equal(kept, self._sent[0]):
             return False
@@ -139,6 +158,7 @@ class Chart:
 
     def remove(self) -> None:
         self._handle.remove()
+        self._note.remove()
 
 
 def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:

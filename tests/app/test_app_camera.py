@@ -1,0 +1,38 @@
+"""Where the camera goes: all of what is looked at is seen, in the middle of what is free."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app.view.camera import fit
+
+
+def on_picture(points: np.ndarray, eye: np.ndarray, at: np.ndarray, fov: float, aspect: float) -> np.ndarray:
+    """Where points are in a picture from −1 to 1, (k, 2), by the geometry of a pinhole."""
+    back = (eye - at) / np.linalg.norm(eye - at)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    seen = (points - eye) @ np.array([right, np.cross(back, right), -back]).T
+    assert (seen[:, 2] > 0).all()
+    return seen[:, :2] / seen[:, 2:] / math.tan(0.5 * fov) / [aspect, 1.0]
+
+
+@pytest.mark.parametrize("aspect", [0.4, 0.75, 1.6])
+@pytest.mark.parametrize("size", [0.3, 2.0])
+def test_all_of_it_is_seen_and_in_the_middle(aspect: float, size: float) -> None:
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-size, size, (9, 3)) + np.array([3.0, -1.0, 0.5])
+    direction = np.array([0.95, -0.95, 0.5])
+    seen = on_picture(points, *fit(points, direction, 0.9, aspect, False), 0.9, aspect)
+    assert np.abs(seen).max() < 0.8 and np.ptp(seen, axis=0).max() > 0.6
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    assert np.abs(0.5 * (low + high)).max() < 0.15
+
+
+def test_on_a_phone_it_is_above_the_sheet() -> None:
+    points = np.random.default_rng(2).uniform(-0.5, 0.5, (9, 3))
+    seen = on_picture(points, *fit(points, np.array([0.9, -0.9, 0.5]), 0.9, 0.46, True), 0.9, 0.46)
+    assert seen[:, 1].min() > 0.0 and seen[:, 1].max() < 1.0 and np.abs(seen[:, 0]).max() < 1.0
