@@ -13,6 +13,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
+from himpc.references import Outlook
 from himpc.telemetry import write_plan
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
@@ -33,7 +34,7 @@ def measure(scene: str, ticks: int) -> dict[str, dict[str, float] | float]:
         done = perf_counter_ns()
         plan = session.plan
         assert plan is not None
-        write_plan(row, session.layout, plan)
+        write_plan(row, session.layout, plan, Outlook(session.references, session.t, T_s, N))
         spent["reference"].append(read - started)
         spent["tick"].append(done - read)
         spent["telemetry"].append(perf_counter_ns() - done)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelSolution
 from himpc.limits import LimitsInForce, Rows
+
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
 
 Array = NDArray[np.float64]
 
@@ -38,11 +41,24 @@ class Evidence(NamedTuple):
     rows: Rows
 
 
+class AtOnce(NamedTuple):
+    """What the levels do at this very tick.
+
+    Attributes:
+        increments: Δτ_{i,k|k} of every level, highest priority first, (r, n) N·m.
+        jacobians: J_i at the measured state, (m_i, n), of all levels but the last.
+    """
+
+    increments: Array
+    jacobians: list[Array]
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The first input, the prediction, and per level what was found.
 
-    Its numbers are its own: a plan that is kept stays as it is.
+    A plan shows what its controller has at hand until the next tick: whoever keeps one freezes it. What was
+    looked at before is its own and stays.
 
     Attributes:
         tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; what controllers
@@ -51,9 +67,13 @@ class Plan:
         limits: the bounds in force.
         step_us: wall time from state to torque, microseconds, kinematics included.
         unsolved: how many QPs had no verified point at the first attempt.
-        find_evidence: puts together what else was found, when somebody looks at it for the first time.
+        find_evidence: puts together what else was found, when somebody looks at it for the first time. Raises
+            RuntimeError if the controller has gone on since.
         iterations: how many times the cascade was solved; 1 but for NHIMPC.
         notice: a sentence for the learner, said once: code of their own failed at this tick.
+        fill: writes what it knows into a row of telemetry at once, references included; returns False if it
+            cannot. None: field by field.
+        at_once: what the levels do now, from the numbers at hand; None: see `levels`.
     """
 
     tau: Array
@@ -64,6 +84,13 @@ class Plan:
     find_evidence: Callable[[], Evidence]
     iterations: int = 1
     notice: str | None = None
+    fill: Callable[[Array, Layout], bool] | None = None
+    at_once: Callable[[], AtOnce] | None = None
+
+    def freeze(self) -> Plan:
+        """The same plan, whose numbers are its own from now on."""
+        _ = self.evidence
+        return self
 
     @cached_property
     def evidence(self) -> Evidence:

@@ -53,7 +53,15 @@ def is_installed(solver: Solver) -> bool:
     return solver != "qpoases" or find_spec("casadi") is not None
 
 
-def solve_qp(H: Array, f: Array, A: Array, lower: Array, upper: Array, solver: Solver = "daqp") -> QPSolution:
+def solve_qp(
+    H: Array,
+    f: Array,
+    A: Array,
+    lower: Array,
+    upper: Array,
+    solver: Solver = "daqp",
+    iterations: int | None = None,
+) -> QPSolution:
     """min ½xᵀHx + fᵀx subject to lower ≤ Ax ≤ upper; a row with lower = upper is an equality.
 
     Args:
@@ -62,31 +70,67 @@ def solve_qp(H: Array, f: Array, A: Array, lower: Array, upper: Array, solver: S
         A: (r, k).
         lower, upper: (r,), ±inf where there is no bound.
         solver: which of SOLVERS.
+        iterations: that all attempts of DAQP may take together; None: as many as it likes.
 
     Returns:
         The solver's point with the residual that we computed ourselves: never trust the status.
     """
+    left = _Iterations(iterations)
     attempts = _ATTEMPTS[solver]
-    solution = _attempt(attempts[0], H, f, A, lower, upper)
+    solution = _attempt(attempts[0], H, f, A, lower, upper, left)
     for attempt in attempts[1:]:
-        if solution.solved:
+        if solution.solved or left.none:
             break
-        again = _attempt(attempt, H, f, A, lower, upper)
+        again = _attempt(attempt, H, f, A, lower, upper, left)
         solution = replace(again, time_us=solution.time_us + again.time_us)
     return solution
 
 
+class _Iterations:
+    """How many iterations are left."""
+
+    def __init__(self, left: int | None) -> None:
+        self._left = left
+
+    @property
+    def none(self) -> bool:
+        return self._left is not None and self._left <= 0
+
+    @property
+    def options(self) -> dict[str, float]:
+        return {} if self._left is None else {"iter_limit": self._left}
+
+    def spend(self, used: int) -> None:
+        if self._left is not None:
+            self._left -= used
+
+
 def _attempt(
-    attempt: Callable[..., tuple[Array, Array, str]], H: Array, f: Array, A: Array, lower: Array, upper: Array
+    attempt: Callable[..., tuple[Array, Array, str]],
+    H: Array,
+    f: Array,
+    A: Array,
+    lower: Array,
+    upper: Array,
+    left: _Iterations,
 ) -> QPSolution:
     started = perf_counter_ns()
-    x, multipliers, status = attempt(H, f, A, lower, upper)
+    x, multipliers, status = attempt(H, f, A, lower, upper, left)
     time_us = (perf_counter_ns() - started) / 1e3
-    return QPSolution(x, multipliers, kkt_residual(H, f, A, lower, upper, x, multipliers), status, time_us)
+    with np.errstate(all="ignore"):  # a point that was given up may be anything
+        residual = kkt_residual(H, f, A, lower, upper, x, multipliers)
+    return QPSolution(x, multipliers, residual, status, time_us)
 
 
 def _daqp(
-    H: Array, f: Array, A: Array, lower: Array, upper: Array, scaled: bool = True, **options: float
+    H: Array,
+    f: Array,
+    A: Array,
+    lower: Array,
+    upper: Array,
+    left: _Iterations,
+    scaled: bool = True,
+    **options: float,
 ) -> tuple[Array, Array, str]:
     size, stretch = 1.0, np.ones(len(A))
     if scaled:
@@ -105,7 +149,9 @@ def _daqp(
         sense,
         primal_tol=_PRIMAL_TOLERANCE,
         **options,
+        **left.options,
     )
+    left.spend(int(info["iterations"]))
     return x, info["lam"] * stretch * size, "optimal" if flag == 1 else f"daqp {flag}"
 
 
@@ -119,7 +165,9 @@ _DAQP = (
 find the optimum."""
 
 
-def _proxqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:
+def _proxqp(
+    H: Array, f: Array, A: Array, lower: Array, upper: Array, _: _Iterations
+) -> tuple[Array, Array, str]:
     equal = lower == upper
     free = ~equal
     qp = proxsuite.proxqp.dense.QP(f.size, int(equal.sum()), int(free.sum()))
@@ -133,7 +181,9 @@ def _proxqp(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[A
     return qp.results.x, multipliers, "optimal" if status == "PROXQP_SOLVED" else status.lower()
 
 
-def _qpoases(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, Array, str]:
+def _qpoases(
+    H: Array, f: Array, A: Array, lower: Array, upper: Array, _: _Iterations
+) -> tuple[Array, Array, str]:
     casadi = import_module("casadi")
     shapes = {"h": casadi.Sparsity.dense(*H.shape), "a": casadi.Sparsity.dense(*A.shape)}
     options = {"printLevel": "none", "error_on_fail": False, "print_time": False}

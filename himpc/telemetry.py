@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,10 @@ from himpc.cascade.level import RUNGS, ActiveRows
 from himpc.configuration import Configuration
 from himpc.limits import Rows
 from himpc.plan import Plan
+from himpc.references import Preview
 from himpc.rotation import quaternion
 from himpc.stack import DAMPING_LEVEL, Stack
+from himpc.tick.kernel.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -31,9 +33,6 @@ __all__ = [
     "relaid",
     "write_plan",
 ]
-
-AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
-"""Bits of the field `at_bound`: which limits bind. A position limit does so through the velocity row, too."""
 
 _SCALARS = (
     "t",
@@ -160,14 +159,33 @@ def relaid(rows: Array, old: Layout, new: Layout) -> Array:
     return found
 
 
-def write_plan(row: Array, layout: Layout, plan: Plan) -> None:
-    """Writes what a plan knows into a row; the session adds time, plant state and the honest leak."""
+def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Preview]) -> None:
+    """Writes what a plan knows, and the references, into a row; the session adds time, states and what needs
+    the plant's M. Fields that the plan says nothing about become NaN."""
     fields = layout.fields
-    row[fields["step_us"]] = plan.step_us
+    if plan.fill is None or not plan.fill(row, layout):
+        row.fill(math.nan)
+        _write_by_field(row, layout, plan)
+        _write_references(row, layout, ahead)
+    row[fields["step_us"].start] = plan.step_us
+    row[fields["unsolved"].start] = plan.unsolved
+    row[fields["iterations"].start] = plan.iterations
+
+
+def _write_references(row: Array, layout: Layout, ahead: Mapping[str, Preview]) -> None:
+    fields = layout.fields
+    for task in layout.tasks:
+        preview = ahead[task.name]
+        value = preview.value
+        row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
+        row[fields[f"v_d/{task.name}"]] = preview.velocity[0]
+        row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
+
+
+def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
+    fields = layout.fields
     leak = plan.leak
     row[fields["priority_leak"]] = math.nan if leak is None else leak
-    row[fields["unsolved"]] = plan.unsolved
-    row[fields["iterations"]] = plan.iterations
     row[fields["delta_tau"]] = plan.tau - plan.tau_0
     row[fields["tau_0"]] = plan.tau_0
     # Six fields of n numbers each that stand side by side in the order of _PER_JOINT.

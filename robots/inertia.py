@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pinocchio as pin
 
@@ -71,8 +73,12 @@ def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
     only: errors die out, but may grow first. Raises LinAlgError if M is singular.
     """
     diagonal = np.asarray(M_bar, dtype=float)
-    norm = np.linalg.norm(np.eye(len(diagonal)) - np.linalg.solve(M, np.diag(diagonal)), 2)
-    return float(norm), float(np.abs(convergence_eigenvalues(M, M_bar)).max())
+    inverse, root = np.linalg.inv(M), np.sqrt(diagonal)
+    error = np.eye(len(diagonal)) - inverse * diagonal
+    largest = float(np.abs(error).max()) or 1.0
+    error /= largest  # so that its squares stay finite
+    squares, values = np.linalg.eigvalsh(np.array((error.T @ error, root[:, None] * inverse * root)))
+    return largest * math.sqrt(max(float(squares[-1]), 0.0)), float(np.abs(1.0 - values).max())
 
 
 def convergence_eigenvalues(M: np.ndarray, M_bar: np.ndarray) -> np.ndarray:

@@ -221,7 +221,7 @@ class Plant:
             data.time += h
         else:
             mujoco.mj_step(self._model, data)
-        if not np.abs(data.qvel).max() < _BROKEN:  # true of what is not a number, too
+        if not ((v := data.qvel).dot(v) < _BROKEN**2 or np.abs(v).max() < _BROKEN):  # NaN is not, either
             data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = before, 0.0, 0.0
             self.broken = True
 

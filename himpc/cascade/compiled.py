@@ -14,7 +14,8 @@ from types import CellType, FunctionType
 from typing import Any
 
 from numba import boolean, float64, int64, intp, njit, types
-from numba.core import config, event
+from numba.core import cgutils, config, event
+from numba.extending import intrinsic
 
 from himpc.cascade.compiler import compile_apart, compiles_here
 
@@ -74,6 +75,23 @@ def compiled(*arguments: Any, by: Callable[[Function], Any] = inner) -> Callable
 
 piece = njit(error_model="numpy", fastmath=_ANY_ORDER)
 """Compiles a function as a part of the `entry` that calls it, wherever that stands."""
+
+
+def _unowned(_: Any, array: Any) -> Any:
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        given, found = (context.make_array(array)(context, builder, *each) for each in ((arguments[0],), ()))
+        for name in ("nitems", "itemsize", "data", "shape", "strides"):
+            setattr(found, name, getattr(given, name))
+        for name in ("meminfo", "parent"):
+            setattr(found, name, cgutils.get_null_value(getattr(found, name).type))
+        return found._getvalue()
+
+    return array(array), generate
+
+
+borrowed: Any = intrinsic(_unowned)
+"""The same array without an owner: nobody counts who looks at it, and slices of it cost nothing. Whoever
+calls the `entry` keeps it."""
 
 
 def entry(*arguments: Any) -> Callable[[Function], Any]:

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _BINDING = 1e-9
 """N·m: a row closer than this to its bound is binding."""
+_ALONG = 1e-6
+"""A row of which this share lies in what RANK_TOLERANCE leaves to lower levels is rounding noise."""
 _ON_SUBSPACE = 1e-7
 """N·m: how far a point may lie from the subspace that (33) leaves."""
 
@@ -27,12 +29,16 @@ def solve_explicit(
     above: Sequence[tuple[Array, Array]],
     Z: Array,
     solver: Solver,
+    iterations: int | None = None,
 ) -> Point | None:
     """Problem i over all N·n increments with every bound and every equality (33) handed to the solver.
 
     Near a singularity the printed equality rows are dependent: active-set solvers may refuse them, and a
-    point that meets them to the tolerance may be far from their subspace. The same subspace is then described
-    by orthonormal rows. Knots beyond the level's own horizon keep the increments of the level above.
+    point that meets them to the tolerance may be far from their subspace. Next to it a row may be nothing but
+    rounding: level 1 of the straight planar arm feels one direction by 6e-12 of the other, which as a row of
+    its own would take that direction from level 2 for no reason (and moved the torque by 2.6 N·m). In both
+    cases the subspace that RANK_TOLERANCE leaves is described by orthonormal rows. Knots beyond the level's
+    own horizon keep the increments of the level above.
 
     Args:
         problem: the level's data.
@@ -41,6 +47,7 @@ def solve_explicit(
         above: (B_p, U_p) of every level above.
         Z: orthonormal bases of what (33) leaves free, (N, n, d).
         solver: which solver.
+        iterations: that one attempt may take, see `solve_qp`; None: as many as it likes.
 
     Returns:
         the optimum, or None if the solver gave no point within the KKT tolerance.
@@ -57,7 +64,8 @@ def solve_explicit(
     for equalities in _equalities(above, U_above, Z):
         E = np.vstack([equalities, tail])
         target = E @ U_above.ravel()
-        solution = solve_qp(H, f, np.vstack([bounds, E]), np.r_[lower, target], np.r_[upper, target], solver)
+        A, low, high = np.vstack([bounds, E]), np.r_[lower, target], np.r_[upper, target]
+        solution = solve_qp(H, f, A, low, high, solver, iterations)
         if solution.solved and _off_subspace(solution.x.reshape(N, n) - U_above, Z) <= _ON_SUBSPACE:
             return _point(solution, rows, lower, upper, bounds, (N, n))
     return None
@@ -83,12 +91,13 @@ def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
 
 
 def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) -> Iterator[Array]:
-    """(33) as printed, then, if that is refused, the same subspace by orthonormal rows."""
+    """(33) as printed unless rows of it are noise; then, or if that is refused, by orthonormal rows."""
     N, n = U_above.shape
     if not above:
         yield np.empty((0, N * n))
         return
-    yield np.vstack([_block_diagonal(B) for B, _ in above])
+    if not any(_binds(B, Z) for B, _ in above):
+        yield np.vstack([_block_diagonal(B) for B, _ in above])
     fixed = []
     for j in range(N):
         left, singular, _ = np.linalg.svd(np.eye(n) - Z[j] @ Z[j].T)
@@ -99,6 +108,12 @@ def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) 
         rows[start : start + len(block), j * n : (j + 1) * n] = block
         start += len(block)
     yield rows
+
+
+def _binds(B: Array, Z: Array) -> bool:
+    """Whether a row, however short, points along what is left to lower levels."""
+    length = np.sqrt((B * B).sum(axis=2, keepdims=True))
+    return bool((np.abs(B @ Z) > _ALONG * length).any())
 
 
 def _block_diagonal(B: Array) -> Array:

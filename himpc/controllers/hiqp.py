@@ -37,7 +37,9 @@ class HIQP(HIMPC):
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
         """One control period, see `HIMPC.step`; of the previews it reads the next knot only."""
-        return super().step(q, v, {name: _next(each) for name, each in previews.items()}, tau_applied)
+        if self.kernel is None:
+            previews = {name: _next(each) for name, each in previews.items()}
+        return super().step(q, v, previews, tau_applied)
 
 
 def _next(preview: Preview) -> Preview:

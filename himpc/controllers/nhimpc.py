@@ -22,10 +22,10 @@ class NHIMPC(HIMPC):
     on Δτ. It is the only difference to HIMPC.
 
     Solved by sequential QPs: all levels under the Jacobians of the last prediction, a new prediction by (18)
-    from their increments, and again until the increments stay within `tolerance`. The point this ends in
-    satisfies (15), (33) and all bounds with the Jacobians of its own prediction. An exact SQP would also have
-    the derivative of the Jacobians in its gradient: over N periods that is of the order of (N T_s)² times the
-    rest.
+    from their increments, and again until the increments stay within `tolerance` or a level has no optimum.
+    The point this ends in satisfies (15), (33) and all bounds with the Jacobians of its own prediction. An
+    exact SQP would also have the derivative of the Jacobians in its gradient: over N periods that is of the
+    order of (N T_s)² times the rest.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class NHIMPC(HIMPC):
         fading = dict(self._weight)
         found = super()._search(tick)
         iterations = 1
-        while found is not None and found.solutions and iterations < self.max_iterations:
+        while found is not None and _solved(found) and iterations < self.max_iterations:
             # A level that fades in advances once per tick, not once per iteration.
             self._weight = dict(fading)
             again = self._solve(tick, found.predicted_q[1:-1])
@@ -67,6 +67,11 @@ class NHIMPC(HIMPC):
             if change <= self.tolerance:
                 break
         return None if found is None else found._replace(iterations=iterations)
+
+
+def _solved(found: Found) -> bool:
+    """Whether every level is at its optimum; what is none leads to none by being solved again."""
+    return bool(found.solutions) and all(solution.rung == "solve" for solution in found.solutions)
 
 
 def _change(before: list[LevelSolution], after: list[LevelSolution]) -> float:

@@ -19,6 +19,8 @@ from himpc.limits import Limits, LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
 from himpc.tasks import Damping
+from himpc.tick.configure import is_built_in
+from himpc.tick.kinematics import Kinematics
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -105,6 +107,8 @@ class OneStepController(ABC):
         self._adopt(settings)
         self._form, self._idle, self._off = prepared
         self._goal = in_force(self.robot, settings.limits)
+        known = all(is_built_in(task) for task in (*self._form.tasks, *self._off))
+        self._kinematics = Kinematics(self.robot, self._form, self._off) if known else None
         self._settings = settings
 
     @abstractmethod
@@ -167,15 +171,20 @@ class OneStepController(ABC):
     ) -> list[Demand]:
         """The demands of a form's levels; x and x̃ of every task are written to `values` and `errors`."""
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
-        both = np.array((q + h * v, q - h * v))
-        configuration = Configuration(self.robot, self._data, q, v, both, previews)
-        J, ahead, behind = form.jacobian(configuration)
-        drift = (ahead - behind) @ v / (2 * h)
-        error = measure(form.tasks, configuration, previews, values, errors)
-        if self._off:
-            measure(self._off, configuration, previews, values, errors)
+        if self._kinematics is not None:
+            J, drift, error, x, x_error = self._kinematics.at(q, v, h, previews)
+            values.update(x)
+            errors.update(x_error)
+        else:
+            both = np.array((q + h * v, q - h * v))
+            configuration = Configuration(self.robot, self._data, q, v, both, previews)
+            J, ahead, behind = form.jacobian(configuration)
+            drift = (ahead - behind) @ v / (2 * h)
+            error = measure(form.tasks, configuration, previews, values, errors)
+            if self._off:
+                measure(self._off, configuration, previews, values, errors)
+            previews = form.asked(configuration, previews)
         wanted = np.zeros((2, error.size))
-        previews = form.asked(configuration, previews)
         start = 0
         for task, rows in zip(form.tasks, form.sizes, strict=True):
             if not isinstance(task, Damping):

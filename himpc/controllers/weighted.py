@@ -47,7 +47,7 @@ class Weighted(HIMPC):
         """One control period, see `HIMPC.step`."""
         self._evidence_us = 0.0
         plan = super().step(q, v, previews, tau_applied)
-        return replace(plan, step_us=plan.step_us - self._evidence_us)
+        return replace(plan, step_us=plan.step_us - self._evidence_us) if self._evidence_us else plan
 
     def _compile(self) -> CompiledTick:
         levels = [] if self._idle else list(accumulated(self._form.levels))

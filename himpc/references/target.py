@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from himpc.references.preview import Array, Preview
-from himpc.rotation import exp3, log3
 
 
 @dataclass(frozen=True)
@@ -24,22 +21,6 @@ class Caps:
 POSITION_CAPS = Caps()
 ROTATION_CAPS = Caps(speed=1.2, acceleration=6.0, jerk=120.0)
 JOINT_CAPS = Caps(speed=1.0, acceleration=5.0, jerk=100.0)
-
-_APPROACH = 6.0
-"""1/s: how fast the remaining distance closes near the raw target."""
-_RATE = 36.0
-"""1/s: how fast the filtered velocity follows the one wanted."""
-_STILL = 1e-9
-"""Below this distance and speed the filtered target snaps to rest: it must not drift for ever."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sample:
-    value: Array
-    velocity: Array
-    acceleration: Array
-    step: Array
-    """How far this sample lies from the one before, (m,)."""
 
 
 class Target:
@@ -63,8 +44,11 @@ class Target:
         self.caps = caps
         self._rotation = value.ndim == 2
         self._axes = axes
-        zero = np.zeros(3 if self._rotation else value.size)
-        self._samples: deque[_Sample] = deque([_Sample(value, zero, zero, zero)])
+        self._m = 3 if self._rotation else value.size
+        self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
+        # See `tick.kernel.target.roll`; the first `_known` samples are there, the first of them is now.
+        self._samples = np.zeros((2, value.size + 3 * self._m + 1))
+        self._samples[0, : value.size], self._samples[0, -1], self._known = value.ravel(), 1.0, 1
         self._time: float | None = None
         self._period = 0.0
         self._rest: tuple[int, Preview] | None = None
@@ -72,11 +56,12 @@ class Target:
     @property
     def value(self) -> Array:
         """x_d now."""
-        return self._samples[0].value
+        return self._samples[0, : self.raw.size].reshape(self.raw.shape).copy()
 
     def move(self, raw: Array) -> None:
         """Puts the hand somewhere else. The motion so far continues smoothly from where it is."""
         self.raw = np.array(raw, float)
+        self._samples[0, -1] = 0.0
         self._forget_future()
 
     def jump(self, value: Array) -> None:
@@ -84,88 +69,40 @@ class Target:
         self.__init__(value, self.caps, self._axes)
 
     def _forget_future(self) -> None:
-        first = self._samples[0]
-        self._samples = deque([first])
-        self._rest = None
+        self._known, self._rest = 1, None
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         """The filtered motion at t … t + N·T_s; each later t advances the filter by one period."""
         if T_s != self._period:
             self._period = T_s
             self._forget_future()
-        if self._time is not None and t > self._time:
-            if len(self._samples) == 1:
-                self._samples.append(self._next(self._samples[0], T_s))
-            self._samples.popleft()
-        self._time = t
-        if self._rest is not None and self._rest[0] == N:
+        later, self._time = self._time is not None and t > self._time, t
+        rests = self._samples[0, -1] > 0.0
+        if later and not rests:
+            if self._known == 1:
+                self._roll(1)
+            self._samples[:-1] = self._samples[1:]
+            self._known -= 1
+            rests = self._samples[0, -1] > 0.0
+        if rests:
+            if self._rest is None or self._rest[0] != N:
+                self._rest = N, self._gathered(np.zeros((3, N + 1, self._m)))
             return self._rest[1]
-        while len(self._samples) < N + 1:
-            self._samples.append(self._next(self._samples[-1], T_s))
-        return self._gather(N)
+        return self._gathered(self._roll(N))
 
-    def _gather(self, N: int) -> Preview:
-        samples = [self._samples[j] for j in range(N + 1)]
-        displacement = np.cumsum([np.zeros_like(samples[0].step), *(s.step for s in samples[1:])], axis=0)
-        velocity = np.array([s.velocity for s in samples])
-        acceleration = np.array([s.acceleration for s in samples])
-        if self._axes is not None:
-            displacement, velocity, acceleration = (
-                array[:, self._axes] for array in (displacement, velocity, acceleration)
-            )
-        preview = Preview(samples[0].value, displacement, velocity, acceleration)
-        if samples[0].value is self.raw:
-            self._rest = (N, preview)
-        return preview
+    def _roll(self, N: int) -> Array:
+        """Displacement, velocity and acceleration at knots 0 … N, (3, N+1, m)."""
+        # It loads the compiler: only a target that moves needs it.
+        from himpc.tick.kernel.target import roll
 
-    def _distance(self, value: Array) -> Array:
-        return log3(self.raw @ value.T) if self._rotation else self.raw - value
+        if len(self._samples) < N + 2:
+            more = np.zeros((N + 2 - len(self._samples), self._samples.shape[1]))
+            self._samples = np.vstack([self._samples, more])
+        motion = np.empty((3, N + 1, self._m))
+        roll(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
+        self._known = max(self._known, N + 1)
+        return motion
 
-    def _next(self, now: _Sample, T_s: float) -> _Sample:
-        if now.value is self.raw:
-            zero = np.zeros_like(now.velocity)
-            return _Sample(self.raw, zero, zero, zero)
-        caps = self.caps
-        away = self._distance(now.value)
-        distance = math.sqrt(float(away @ away))
-        speed = math.sqrt(float(now.velocity @ now.velocity))
-        if distance < _STILL and speed < _STILL * 10:
-            zero = np.zeros_like(now.velocity)
-            return _Sample(self.raw, zero, zero, away)
-        # Never faster than a stop with half the acceleration cap allows; linear close to the goal.
-        wanted_speed = min(caps.speed, _APPROACH * distance, math.sqrt(caps.acceleration * distance))
-        wanted = away * (wanted_speed / distance) if distance > 0 else 0 * away
-        acceleration = _limited(_RATE * (wanted - now.velocity), caps.acceleration)
-        acceleration = now.acceleration + _change(now, acceleration, speed, caps, T_s)
-        velocity = _limited(now.velocity + T_s * acceleration, caps.speed)
-        acceleration = (velocity - now.velocity) / T_s
-        step = 0.5 * T_s * (now.velocity + velocity)
-        value = exp3(step) @ now.value if self._rotation else now.value + step
-        return _Sample(value, velocity, acceleration, step)
-
-
-def _change(now: _Sample, wanted: Array, speed: float, caps: Caps, T_s: float) -> Array:
-    """How the acceleration changes in one period towards the one wanted, within the jerk cap.
-
-    Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
-    half of what a straight line would allow, since in a curve speed also grows by itself. If it is above
-    already, coming down has the first claim on the jerk.
-    """
-    budget = caps.jerk * T_s
-    if speed == 0.0:
-        return _limited(wanted - now.acceleration, budget)
-    forward = now.velocity / speed
-    most = math.sqrt(caps.jerk * max(caps.speed - speed, 0.0))
-    wanted = wanted - max(float(wanted @ forward) - most, 0.0) * forward
-    change = wanted - now.acceleration
-    if float(now.acceleration @ forward) <= most:
-        return _limited(change, budget)
-    along = max(float(change @ forward), -budget)
-    across = change - float(change @ forward) * forward
-    return along * forward + _limited(across, math.sqrt(max(budget**2 - along**2, 0.0)))
-
-
-def _limited(vector: Array, cap: float) -> Array:
-    """The vector, shortened to `cap` if it is longer."""
-    length = math.sqrt(float(vector @ vector))
-    return vector if length <= cap else vector * (cap / length)
+    def _gathered(self, motion: Array) -> Preview:
+        seen = motion if self._axes is None else motion[:, :, self._axes]
+        return Preview(self.value, seen[0], seen[1], seen[2])

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from himpc.configuration import joint_indices
 from himpc.controllers.forms import StackForm
 from himpc.controllers.settings import Settings
 from himpc.geometry import geometry
 from himpc.limits import LimitsInForce
 from himpc.limits.rows import approached, reaction, toeplitz
+from himpc.references import Preview, Reference
+from himpc.references.curve import curve_of
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
 from himpc.tasks.frame import AXES, FrameTask
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
+from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
 from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
 from robots import Robot
 
@@ -42,22 +47,59 @@ def arena_for(
     """
     tasks = (*form.tasks, *off)
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
+    paper = settings.limits.position == "paper"
+    N, solved = settings.horizon, sum(form.sizes)
+    bounds = (3 if paper else 2) * N
+    arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds)
+    f = arena.f
+    model = form.model
+    f["M_bar"][:] = settings.M_bar
+    f["K_p"][:solved], f["K_v"][:solved] = model.K_p, model.K_v
+    f["on_velocity"][:, :solved], f["on_acceleration"][:, :solved] = model.on_velocity, model.on_acceleration
+    for level in form.levels:
+        write_effects(arena, level.rows, level.root_Q, level.weighted_C)
+    write_levels(arena, levels)
+    limits = settings.limits
+    f["L"][:] = toeplitz(N, ("torque", "velocity", "position") if paper else ("torque", "velocity"))
+    f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
+    f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
+    f["nothing"][:] = np.nan
+    arena.i["sizes"][9] = {"viability": VIABILITY, "paper": PAPER, "off": OFF}[limits.position]
+    return arena, spans
+
+
+def write_tasks(
+    robot: Robot,
+    tasks: Sequence[Task],
+    counts: Sequence[int],
+    N: int,
+    solved: int,
+    levels: int = 0,
+    bounds: int = 0,
+) -> tuple[Arena, list[Span]]:
+    """An arena with the geometry of a robot and its tasks, and where the rows of each task are.
+
+    Args:
+        robot: gives the geometry.
+        tasks: one below the other.
+        counts: rows of each.
+        N: knots.
+        solved: rows of the tasks that are solved for; they come first.
+        levels, bounds: how many.
+    """
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
     given = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
-    N, solved = settings.horizon, sum(form.sizes)
-    paper = settings.limits.position == "paper"
     arena = sizes(
         robot.n,
         N,
         sum(counts),
         solved,
-        len(levels),
-        (3 if paper else 2) * N,
+        levels,
+        bounds or 2 * N,
         len(tasks),
         max(len(frames), 1),
         max(given, 1),
     )
-    f = arena.f
     _write_geometry(arena, robot, frames)
     spans, start, given = [], 0, 0
     for place, (task, count) in enumerate(zip(tasks, counts, strict=True)):
@@ -70,25 +112,45 @@ def arena_for(
             arena.i["part"][span] = range(given, given + count)
             given += count
         start += count
-    model = form.model
-    f["M_bar"][:] = settings.M_bar
-    f["K_p"][:solved], f["K_v"][:solved] = model.K_p, model.K_v
-    f["on_velocity"][:, :solved], f["on_acceleration"][:, :solved] = model.on_velocity, model.on_acceleration
-    for level in form.levels:
-        write_effects(arena, level.rows, level.root_Q, level.weighted_C)
-    write_levels(arena, levels)
-    limits = settings.limits
-    f["L"][:] = toeplitz(N, ("torque", "velocity", "position") if paper else ("torque", "velocity"))
-    f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
-    f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
-    arena.i["sizes"][9] = {"viability": VIABILITY, "paper": PAPER, "off": OFF}[limits.position]
     return arena, spans
 
 
 def write_limits(arena: Arena, limits: LimitsInForce, paper: bool) -> None:
-    """The bounds in force; positions as they are for `paper`, else where joints are stopped."""
-    stops = (limits.q_lower, limits.q_upper) if paper else limits.stops
-    arena.f["limits"][:] = limits.tau_lower, limits.tau_upper, limits.v_limit, *stops, limits.a_max
+    """The bounds in force; positions as they are for `paper`, else where joints are stopped; and, for
+    telemetry, as they are."""
+    q = limits.q_lower, limits.q_upper
+    stops = q if paper else limits.stops
+    arena.f["limits"][:] = limits.tau_lower, limits.tau_upper, limits.v_limit, *stops, limits.a_max, *q
+
+
+def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach: int) -> None:
+    """What a task's reference says at `reach` knots."""
+    f = arena.f
+    arena.i["law"][place] = SAMPLED
+    if preview.value.ndim == 2:
+        f["R_d"][place] = preview.value
+    else:
+        f["x_d"][span] = preview.value
+    f["displacement"][:, span] = preview.displacement[:reach]
+    f["velocity_d"][:, span] = preview.velocity[:reach]
+    f["acceleration_d"][:, span] = preview.acceleration[:reach]
+
+
+def write_curve(arena: Arena, place: int, span: slice, reference: Reference) -> bool:
+    """Lets the kernel evaluate a task's reference from now on; False if it is not one that it knows."""
+    curve, f = curve_of(reference), arena.f
+    if curve is None or curve.centre.shape not in ((span.stop - span.start,), (3, 3)):
+        return False
+    arena.i["law"][place] = SAMPLED
+    if curve.phase is None:
+        zero = np.zeros((1, span.stop - span.start))
+        write_preview(arena, place, span, Preview(curve.centre, zero, zero, zero), 1)
+    else:
+        arena.i["law"][place] = EASED if curve.phase.law == "eased" else UNIFORM
+        f["pace"][place] = curve.phase.omega, curve.phase.offset
+        for column, part in enumerate((curve.centre, *curve.swing)):
+            f["curve"][span, column] = part
+    return True
 
 
 def _write_geometry(arena: Arena, robot: Robot, frames: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from himpc.cascade.explicit import solve_explicit
 from himpc.cascade.last_resort import containing, last_resort, softened
-from himpc.cascade.level import NO_ROWS, Point, Rung
+from himpc.cascade.level import NO_ROWS, RUNGS, Point, Rung
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
 from himpc.limits.rows import Kind
@@ -19,8 +19,10 @@ from himpc.tick.kernel.cascade import ALONE
 from himpc.tick.kernel.solve import solve
 from himpc.tick.printed import printed_problem
 
-_SMALL = 72
-"""Unknowns up to which the printed QP is a matter of milliseconds: it is asked where the kernel gives up."""
+_SMALL = 40
+"""Unknowns up to which the printed QP is asked where the kernel gives up."""
+_ITERATIONS = 100
+"""What DAQP may take then, at each of at most two attempts: together a matter of milliseconds."""
 
 
 def solve_levels(
@@ -29,7 +31,8 @@ def solve_levels(
     """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
     on and its time, microseconds.
 
-    The ladder is that of `solve_cascade`.
+    The ladder is that of `solve_cascade`. All levels share the budget that the arena was granted: what one
+    used up the next ones do not get, and then they stand on lower rungs. So the time of a tick is bounded.
 
     Args:
         arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.
@@ -40,7 +43,9 @@ def solve_levels(
     for place in range(int(arena.i["sizes"][4])):
         started = perf_counter_ns()
         rung = "solve" if solve(*arena.arguments, place, 0.0) else _climb_down(arena, place, kinds, damped)
-        found.append((rung, (perf_counter_ns() - started) / 1e3))
+        time_us = (perf_counter_ns() - started) / 1e3
+        arena.f["rung"][place], arena.f["time_us"][place] = RUNGS.index(rung), time_us
+        found.append((rung, time_us))
     return found
 
 
@@ -88,7 +93,7 @@ def _as_printed(arena: Arena, place: int, rows: Rows) -> Point | None:
     U_above = np.zeros((N, n)) if alone or not place else arena.f["U"][place - 1]
     Z = nested_bases(upper)[-1] if upper else whole_space(N, n)
     above = [(B, arena.f["U"][p]) for p, B in enumerate(upper)]
-    return solve_explicit(printed_problem(arena, place), rows, U_above, above, Z, "daqp")
+    return solve_explicit(printed_problem(arena, place), rows, U_above, above, Z, "daqp", _ITERATIONS)
 
 
 def _write(arena: Arena, rows: Rows) -> None:

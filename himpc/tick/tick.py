@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter_ns
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,18 +15,23 @@ from himpc.controllers.memory import Memory
 from himpc.controllers.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.rows import Kind
-from himpc.plan import Evidence, Plan
-from himpc.references import Preview
+from himpc.plan import AtOnce, Evidence, Plan
+from himpc.references import Outlook, Preview, Reference, Target
 from himpc.tasks import Damping, Task
-from himpc.tick.configure import arena_for, write_limits
+from himpc.tick.configure import arena_for, write_curve, write_limits, write_preview
+from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
-from himpc.tick.kernel.arena import Array, Snapshot
+from himpc.tick.kernel.arena import NOW, Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
+from himpc.tick.kernel.solve import BUDGET
 from himpc.tick.ladder import solve_levels
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, write_effects
 from robots import Robot
+
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
 
 
 class CompiledTick:
@@ -62,6 +68,10 @@ class CompiledTick:
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
         self._started = self._looked = False
+        self._led = [each for each in self._given.spans if not isinstance(each[1], Damping)]
+        self._read: dict[int, Reference | Preview | None] = {}
+        self._gathered: tuple[Layout, Array | None] | None = None
+        self._ticks = 0
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
@@ -148,6 +158,7 @@ class CompiledTick:
         arena = self.arena
         rungs: list[tuple[Rung, float]] = []
         change, iterations = math.inf, 0
+        arena.f["budget"][:] = BUDGET
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
                 # J_i(q_{k+j|k}): the knots of this tick's own prediction take the place of the last one's.
@@ -166,6 +177,8 @@ class CompiledTick:
                 return None
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
+            if any(rung != "solve" for rung, _ in rungs):
+                break  # what is no optimum leads to none by being solved again
         if self._most > 1:
             conclude(*arena.arguments, True)
         return self._plan(rungs, tau_0, limits, iterations, started)
@@ -175,23 +188,27 @@ class CompiledTick:
     ) -> None:
         if not self._started:
             self.recall(None, q, v)
+        self._ticks += 1
         f = self.arena.f
         f["q"][:], f["v"][:], f["tau_0"][:] = q, v, tau_0
         if limits is not self._limits:
             self._limits = limits
             write_limits(self.arena, limits, len(self._kinds) == 3)
-        reach = self._settings.horizon + 1
-        for place, task, span in self._given.spans:
-            if isinstance(task, Damping):
+        references: Mapping[str, Reference] = {}
+        if isinstance(previews, Outlook):
+            references, f["scalars"][NOW] = previews.references, previews.t
+        for place, task, span in self._led:
+            reference, read = references.get(task.name), self._read.get(place)
+            if reference is not None and reference is read:
                 continue
-            value, displacement, velocity, acceleration = previews[task.name]
-            if value.ndim == 2:
-                f["R_d"][place] = value
-            else:
-                f["x_d"][span] = value
-            f["displacement"][:, span] = displacement[:reach]
-            f["velocity_d"][:, span] = velocity[:reach]
-            f["acceleration_d"][:, span] = acceleration[:reach]
+            if reference is not None and write_curve(self.arena, place, span, reference):
+                self._read[place] = reference
+                continue
+            preview = previews[task.name]
+            if preview is not read:
+                write_preview(self.arena, place, span, preview, self._settings.horizon + 1)
+            # A target at rest shows the same preview again; of others nobody knows whether it has changed.
+            self._read[place] = preview if isinstance(reference, Target) else None
 
     def _solutions(self, found: Snapshot, rungs: Sequence[tuple[Rung, float]]) -> list[LevelSolution]:
         return solutions([level.name for level in self._form.levels], found, rungs) if self._levels else []
@@ -204,31 +221,57 @@ class CompiledTick:
         iterations: int,
         started: int,
     ) -> Plan:
-        found = self.arena.found()
+        ticks, unsolved, idle_us = self._ticks, 0, 0.0
+        for rung, time_us in rungs:
+            unsolved += rung != "solve"
+            idle_us += time_us
         # Levels that stand alone are evidence but for the last one, which is applied.
-        idle_us = sum(time_us for _, time_us in rungs[:-1]) if self._levels and self._levels[0].alone else 0.0
+        idle_us = idle_us - rungs[-1][1] if rungs and self._levels[0].alone else 0.0
 
         def evidence() -> Evidence:
-            R, value, error = found("R_now"), found("value"), found("error")
-            values = {
-                task.name: R[place] if task.name in self._given.turning else value[span]
-                for place, task, span in self._spans
-            }
-            stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
-            return Evidence(
-                levels=tuple(self._solutions(found, rungs)),
-                q=found("predicted"),
-                errors={task.name: error[span] for _, task, span in self._spans},
-                values=values,
-                rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._kinds, stopping),
-            )
+            if self._ticks != ticks:
+                raise RuntimeError("the controller has gone on since this plan: keep plan.freeze() instead")
+            return self._evidence(rungs)
 
         return Plan(
-            tau=found("tau"),
+            tau=self.arena.f["tau"].copy(),
             tau_0=tau_0,
             limits=limits,
             step_us=(perf_counter_ns() - started) / 1e3 - idle_us,
-            unsolved=sum(rung != "solve" for rung, _ in rungs),
+            unsolved=unsolved,
             find_evidence=evidence,
             iterations=iterations,
+            fill=self._fill,
+            at_once=self._at_once,
         )
+
+    def _evidence(self, rungs: Sequence[tuple[Rung, float]]) -> Evidence:
+        found = self.arena.found()
+        R, value, error = found("R_now"), found("value"), found("error")
+        stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
+        return Evidence(
+            levels=tuple(self._solutions(found, rungs)),
+            q=found("predicted"),
+            errors={task.name: error[span] for _, task, span in self._spans},
+            values={
+                task.name: R[place] if task.name in self._given.turning else value[span]
+                for place, task, span in self._spans
+            },
+            rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._kinds, stopping),
+        )
+
+    def _at_once(self) -> AtOnce:
+        f, count = self.arena.f, len(self._levels)
+        J = f["B"][0] * f["M_bar"]
+        return AtOnce(f["U"][:count, 0].copy(), [J[level.own_rows] for level in self._levels[:-1]])
+
+    def _fill(self, row: Array, layout: Layout) -> bool:
+        """A row of telemetry in one gather, see `Plan.fill`."""
+        if self._gathered is None or self._gathered[0] is not layout:
+            levels = [level.name for level in self._form.levels] if self._levels else []
+            self._gathered = layout, gathered(self.arena, layout, self._spans, levels)
+        index = self._gathered[1]
+        if index is None:
+            return False
+        self.arena.data.take(index, out=row, mode="clip")
+        return True

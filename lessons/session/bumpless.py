@@ -71,7 +71,7 @@ class Handover:
             self._old = None
             return plan
         share = x * x * (3.0 - 2.0 * x)
-        return replace(plan, tau=(1.0 - share) * leaving + share * plan.tau)
+        return replace(plan, tau=(1.0 - share) * leaving + share * plan.tau, fill=None)
 
 
 def settled(controller: Controller) -> Controller:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.controllers import Controller
 from himpc.plan import Binding, Plan
-from himpc.references import Preview, Reference, Target, previews
-from himpc.rotation import quaternion
+from himpc.references import Outlook, Preview, Reference, Target
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of, write_plan
@@ -22,7 +21,8 @@ from lessons.own.controllers import controller_of
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
 from lessons.session.deadline import Outbox
-from lessons.session.leak import dynamic_leak
+from lessons.session.leak import at_once, dynamic_leak
+from lessons.session.places import Places
 from lessons.session.session import LOST_SPEED, Session
 from lessons.session.targets import carried, kept, move_target, target_at
 from lessons.settings.stack import same_tasks
@@ -68,7 +68,7 @@ class TorqueSession(Session):
         self.controller = controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
         self._data = scene.robot.model.createData()
-        self._row = np.full(self.layout.size, np.nan)
+        self._row, self._at = np.full(self.layout.size, np.nan), Places.of(self.layout)
         self.reset()
 
     @property
@@ -98,7 +98,7 @@ class TorqueSession(Session):
         self._push_until = math.inf
         self._ticks = 0
         self._outbox = Outbox()
-        self._hands = _hands(self.settings.levels)
+        self._hands = self._first_hands()
         self._truth = (math.nan, math.nan, math.nan)
 
     def _fresh_references(self) -> dict[str, Reference]:
@@ -170,9 +170,9 @@ class TorqueSession(Session):
             self._hand_over(controller_of(settings, self.robot))
         if recomposed:
             self.layout, self.references, self.plan, self.given = layout, references, None, None
-            self._row = np.full(layout.size, np.nan)
+            self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
         self.settings = settings
-        self._hands = _hands(settings.levels)
+        self._hands = self._first_hands()
 
     def _hand_over(self, taking: Controller) -> None:
         taking.reset(self.plant.tau)
@@ -190,60 +190,49 @@ class TorqueSession(Session):
         A row holds the true joint state, the references, what the controller decided, and the torque
         applied from this tick on.
         """
-        self.drain()
+        if self._mailbox or self._script or self._push_until < math.inf:
+            self.drain()
         settings, plant = self.settings, self.plant
-        T_s, N, t = settings.T_s, settings.horizon, plant.t
+        T_s, t = settings.T_s, plant.t
         q, v = plant.q, plant.v
         state = plant.measure(T_s)
-        ahead = previews(self.references, t, T_s, N)
+        ahead = Outlook(self.references, t, T_s, settings.horizon)
         self.controller = settled(self.controller)
         plan = self.controller.step(state.q, state.v, ahead, plant.tau)
-        row = self._row
-        row.fill(np.nan)
-        fields = self.layout.fields
-        row[fields["t"]] = t
-        row[fields["q"]] = q
-        row[fields["v"]] = v
-        row[fields["q_measured"]], row[fields["v_measured"]] = state.q, state.v
-        write_plan(row, self.layout, plan)
-        self._write_references(row, ahead)
-        self._write_truth(row, plan, q, ahead)
+        row, at = self._row, self._at
+        write_plan(row, self.layout, plan, ahead)
+        row[at.t] = t
+        row[at.q], row[at.v] = q, v
+        row[at.q_measured], row[at.v_measured] = state.q, state.v
+        row[at.truth] = self._true(plan, q, ahead)
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
         if plan.notice is not None:
             self.failure = plan.notice
         late = settings.is_late(1e-3 * plan.step_us)
-        row[fields["late"]] = late
-        row[fields["tau"]] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
+        row[at.late] = late
+        row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
-            if wild or self._is_far(plan):
+            if wild or self._is_far(row):
                 # A hand that drags a target out of reach loses level 1, too: that is no notice.
                 self._lost(t, notice=wild)
         return row
 
-    def _write_references(self, row: Array, ahead: Mapping[str, Preview]) -> None:
-        fields = self.layout.fields
-        for task in self.layout.tasks:
-            preview = ahead[task.name]
-            value = preview.value
-            row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
-            row[fields[f"v_d/{task.name}"]] = preview.velocity[0]
-            row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
-
-    def _write_truth(self, row: Array, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> None:
-        """What only the plant's M can tell: the gauge of M̄ and the honest leak, held between refreshes."""
+    def _true(self, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> tuple[float, float, float]:
+        """What only the plant's M can tell: the honest leak and the gauge of M̄, held between refreshes."""
         if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
             M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
-            leak = math.nan
-            if plan.leak is not None and not math.isnan(plan.leak):
-                at = Configuration(self.robot, self._data, q, q, previews=ahead)
-                leak = dynamic_leak(M, plan, self.settings.levels, at)
+            done = None
+            if plan.at_once is not None:
+                done = plan.at_once()
+            elif plan.leak is not None and not math.isnan(plan.leak):
+                here = Configuration(self.robot, self._data, q, q, previews=ahead)
+                done = at_once(plan, self.settings.levels, here)
+            leak = math.nan if done is None or len(done.increments) < 2 else dynamic_leak(M, done)
             self._truth = (leak, *convergence_gauge(M, M_bar))
-        # The layout puts these three side by side.
-        start = self.layout.fields["dynamic_leak"].start
-        row[start : start + 3] = self._truth
+        return self._truth
 
     def _is_wild(self, q: Array, v: Array) -> bool:
         share = v / self.robot.v_limit
@@ -251,10 +240,17 @@ class TorqueSession(Session):
         slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
         return self.plant.broken or not slow or not math.isfinite(q.dot(q))
 
-    def _is_far(self, plan: Plan) -> bool:
+    def _is_far(self, row: Array) -> bool:
         """Level 1 is lost."""
-        errors = (plan.errors.get(name) for name in self._hands)
-        return any(error is not None and error.dot(error) > LOST_POSITION**2 for error in errors)
+        errors = (row[where] for where in self._hands)
+        return any(error.dot(error) > LOST_POSITION**2 for error in errors)
+
+    def _first_hands(self) -> tuple[slice, ...]:
+        """Where the errors of the position tasks of the first level that is on stand in a row."""
+        first = next((level.tasks for level in self.settings.levels if level.enabled), ())
+        return tuple(
+            self.layout.fields[f"error/{task.name}"] for task in first if isinstance(task, FramePosition)
+        )
 
     def predicted_path(self, frame: str = "") -> Array:
         """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""
@@ -289,9 +285,3 @@ class TorqueSession(Session):
 
 def _tasks(stack: Stack) -> list[Task]:
     return [task for level in stack for task in level.tasks]
-
-
-def _hands(stack: Stack) -> tuple[str, ...]:
-    """Names of the position tasks of the first level that is on."""
-    first = next((level.tasks for level in stack if level.enabled), ())
-    return tuple(task.name for task in first if isinstance(task, FramePosition))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import daqp
 import numpy as np
 import pytest
 from cascade_checks import assert_within, largest_difference
@@ -16,7 +18,11 @@ from himpc import qp
 from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.rows import least_slack
+from himpc.references import Outlook
 from himpc.tick import ladder, problems
+from himpc.tick.kernel.solve import BUDGET
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]
 
@@ -207,3 +213,48 @@ def feasible(rows: Rows) -> bool:
         if not linprog(np.zeros(N), A_ub=A, b_ub=b, bounds=(None, None), method="highs").success:
             return False
     return True
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("limit", [1, 7, 40])
+def test_a_qp_takes_no_more_iterations_than_it_may(monkeypatch: pytest.MonkeyPatch, limit: int) -> None:
+    """All attempts of DAQP together stay within their budget; what is given up is not called solved."""
+    rng = np.random.default_rng(0)
+    used: list[int] = []
+    healthy = daqp.solve
+
+    def counted(*arguments: Any, **options: Any) -> Any:
+        found = healthy(*arguments, **options)
+        used.append(found[3]["iterations"])
+        return found
+
+    monkeypatch.setattr(daqp, "solve", counted)
+    k = 40
+    f, width = 10 * rng.normal(size=k), 0.01
+    A = np.vstack([np.eye(k), rng.normal(size=(k, k))])
+    found = qp.solve_qp(np.eye(k), f, A, np.full(2 * k, -width), np.full(2 * k, width), iterations=limit)
+    assert sum(used) <= limit + len(used)
+    assert qp.solve_qp(np.eye(k), f, A, np.full(2 * k, -width), np.full(2 * k, width)).solved
+    assert not found.solved or sum(used) > limit
+
+
+@pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
+def test_a_hostile_state_costs_no_more_than_the_budget_of_a_tick(controller: str) -> None:
+    """Whatever the state, the kernel's changes of active rows stay within the tick's multiplications."""
+    scene = torque_scene("iiwa14-hold")
+    session = TorqueSession(
+        replace(scene, settings=replace(scene.settings, horizon=20, controller=controller))
+    )
+    session.tick()
+    kernel = getattr(session.controller, "kernel")  # noqa: B009  (other controllers have none)
+    rng, spent = np.random.default_rng(0), []
+    for k in range(60):
+        q = session.plant.q + rng.normal(0, 10.0 ** (k % 6 - 3), 7)
+        v = session.robot.v_limit * rng.normal(0, 10.0 ** (k % 4 - 2), 7)
+        outlook = Outlook(session.references, session.t, 1e-3, 20)
+        plan = session.controller.step(q, v, outlook, session.robot.tau_limit * rng.normal(size=7))
+        assert (np.abs(plan.tau) <= session.robot.tau_limit).all()
+        spent.append(BUDGET - kernel.arena.f["budget"][0])
+    # What is begun is ended: one change of rows is far less than a tenth.
+    assert max(spent) <= 1.1 * BUDGET
+    assert max(spent) > 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -16,11 +17,12 @@ from problems import Hierarchy, random_hierarchy, shifted
 
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
 from himpc.catalog import Route
-from himpc.references import Hold
+from himpc.references import Circle, FigureEight, Hold, Outlook, Phase, Reference, Sinusoid
+from himpc.telemetry import write_plan
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
 from himpc.tick.kernel.solve import solve
-from lessons.events import MoveTarget
+from lessons.events import MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 from robots import Robot, load_robot
@@ -110,6 +112,7 @@ def test_kinematics_are_pinocchio_s(tmp_path_factory: pytest.TempPathFactory, se
         ("iiwa14-hold", 3),
         ("planar3-circle", 5),
         ("planar3-conflict", 10),
+        ("planar3-singular", 5),
         ("ridgeback-ur10-hold", 2),
     ],
 )
@@ -189,18 +192,79 @@ def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
 
 
 def test_a_plan_that_is_kept_stays_as_it_is() -> None:
-    """Its evidence is that of its own tick, whenever it is looked at."""
+    """Frozen, its evidence is that of its own tick, whenever it is looked at; else it says what to do."""
     session = TorqueSession(torque_scene("iiwa14-circle"))
     session.tick()
-    kept, other = session.plan, TorqueSession(torque_scene("iiwa14-circle"))
+    shown, other = session.plan, TorqueSession(torque_scene("iiwa14-circle"))
     other.tick()
+    assert shown is not None
+    assert other.plan is not None
+    kept, late = replace(shown).freeze(), replace(shown)
     for _ in range(20):
         session.tick()
-    assert kept is not None
-    assert other.plan is not None
     for one, two in zip(kept.levels, other.plan.levels, strict=True):
         np.testing.assert_array_equal(one.U, two.U)
     np.testing.assert_array_equal(kept.q, other.plan.q)
+    np.testing.assert_array_equal(late.tau, kept.tau)
+    with pytest.raises(RuntimeError, match="freeze"):
+        _ = late.levels
+
+
+@pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
+@pytest.mark.parametrize("name", ["iiwa14-circle", "iiwa14-circle-paper", "iiwa14-hold", "planar3-conflict"])
+def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, controller: str) -> None:
+    """What the kernel puts aside for telemetry is what the plan's evidence says."""
+    scene = torque_scene(name)
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
+    session.post(Set("limits.velocity_scale", 0.3))  # so that bounds bind
+    target = session.target("orientation")
+    if target is not None:
+        target.move(pin.exp3(np.array([0.4, -0.2, 1.5])) @ target.value)
+    binding = 0
+    for k in range(40):
+        session.tick()
+        plan = session.plan
+        assert plan is not None
+        assert plan.fill is not None
+        previews = Outlook(session.references, session.t - session.settings.T_s, session.settings.T_s, 5)
+        gathered, by_field = np.empty((2, session.layout.size))
+        write_plan(gathered, session.layout, plan, previews)
+        write_plan(by_field, session.layout, replace(plan, fill=None), previews)
+        if k % 10 == 9:
+            np.testing.assert_allclose(gathered, by_field, rtol=0, atol=1e-12)
+        binding += bool(gathered[session.layout.fields["at_bound"]].any())
+    assert binding or not name.startswith("iiwa14-circle")
+
+
+@pytest.mark.parametrize("law", ["uniform", "eased"])
+@given(seeds)
+@settings(max_examples=20)
+def test_the_kernel_s_references_are_the_printed_ones(law: Literal["uniform", "eased"], seed: int) -> None:
+    """A curve that the kernel evaluates is the one that previews itself, at any time, phase and period."""
+    rng = np.random.default_rng(seed)
+    robot = load_robot("planar3")
+    stack = (Level((FramePosition(name="position", axes="xy"),)), Level((Posture(name="posture"),)))
+    phase = Phase(float(rng.normal(0, 3)), law, float(rng.normal()))
+    u, w, c = rng.normal(size=(3, 2))
+    given_: dict[str, Reference] = {
+        "position": (Circle if seed % 2 else FigureEight)(c, u, w, phase),
+        "posture": Sinusoid(robot.home, rng.normal(size=3), phase) if seed % 3 else Hold(robot.home),
+    }
+    N = int(rng.integers(1, 12))
+    controller = HIMPC(robot, Settings(stack, (1.0, 1.0, 1.0), horizon=N, T_s=0.002))
+    assert controller.kernel is not None
+    outlook = Outlook(given_, float(rng.uniform(0, 20)), 0.002, N)
+    controller.step(robot.home, np.zeros(3), outlook)
+    f = controller.kernel.arena.f
+    for name, span in (("position", slice(0, 2)), ("posture", slice(2, 5))):
+        preview = given_[name].preview(outlook.t, 0.002, N)
+        np.testing.assert_allclose(f["x_d"][span], preview.value, atol=1e-12)
+        for each, found in (
+            (preview.displacement, "displacement"),
+            (preview.velocity, "velocity_d"),
+            (preview.acceleration, "acceleration_d"),
+        ):
+            np.testing.assert_allclose(f[found][:, span], each, atol=1e-10)
 
 
 def test_nothing_is_compiled_while_a_robot_moves() -> None:

@@ -28,6 +28,8 @@ NUMBERS = {
     "velocity_d": "N1 M",
     "acceleration_d": "N1 M",
     "given": "N1 G n",
+    "curve": "M 4",
+    "pace": "T 2",
     # What is remembered from the tick before.
     "q_was": "n",
     "v_was": "n",
@@ -48,7 +50,7 @@ NUMBERS = {
     "metric": "r n",
     "R": "r n",
     "accuracy": "r",
-    "limits": "6 n",
+    "limits": "8 n",
     "L": "b N",
     "approach": "N",
     "scalars": "4",
@@ -73,6 +75,16 @@ NUMBERS = {
     "leak": "r",
     "multiplier": "r k",
     "slack": "r k",
+    # What else telemetry tells of it; nothing is NaN.
+    "quaternion": "T 4",
+    "quaternion_d": "T 4",
+    "delta_tau": "n",
+    "at_bound": "n",
+    "priority_leak": "1",
+    "active": "r",
+    "rung": "r",
+    "time_us": "r",
+    "nothing": "1",
     # Scratch.
     "placed": "J 12",
     "axis_now": "J 3",
@@ -91,7 +103,6 @@ NUMBERS = {
     "low": "b n",
     "high": "b n",
     "reached": "b n",
-    "trial": "N n",
     "effect": "r N M",
     "normal": "k w",
     "white": "k w",
@@ -120,6 +131,7 @@ WHOLES = {
     # The settings.
     "task": "T 4",
     "part": "M",
+    "law": "T",
     "row_knots": "M",
     "level": "r 8",
     # The robot.
@@ -146,8 +158,8 @@ AT = namedtuple("AT", tuple(NUMBERS))(*range(len(NUMBERS)))
 WHOLE_AT = namedtuple("WHOLE_AT", tuple(WHOLES))(*range(len(WHOLES)))
 """Where in `Arena.where` the place of an array is noted."""
 
-PERIOD, T_S, REACTION = range(3)
-"""What `scalars` holds: s since the tick before, s until the next one, and the reaction of `viable_speed`."""
+PERIOD, T_S, REACTION, NOW = range(4)
+"""What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t."""
 
 _LINE = 8
 """Arrays begin at multiples of so many numbers: a line of the processor's cache."""

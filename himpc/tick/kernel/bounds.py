@@ -45,7 +45,7 @@ def bounds(
         q, v, v_was: measured state, and the velocity one `period` ago, (n,).
         tau_0: torque that acts now, (n,) N·m.
         M_bar: diagonal of M̄, (n,).
-        limits: (6, n) torque, velocity limit, positions (stops but for PAPER), and deceleration.
+        limits: (8, n) torque, velocity limit, positions (stops but for PAPER), and deceleration first.
         approach: share of the distance to a velocity bound that may be gone at knots 1 … N.
         mode: VIABILITY, PAPER or OFF.
         reaction: s, see `viable_speed`.

@@ -145,31 +145,6 @@ def solve_level(
 
 
 @piece
-def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whole, knots: int) -> float:
-    """The value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
-    total = 0.0
-    for i in range(first, last):
-        for k in range(row_knots[i]):
-            total += e[k, i] * e[k, i]
-    for j in range(knots):
-        for a in range(U.shape[1]):
-            total += R[a] * U[j, a] * U[j, a]
-    return total
-
-
-@piece
-def leak_of(place: int, levels: Whole, effect: Array) -> float:
-    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect (r, N, m) is J M̄⁻¹ Δτ."""
-    most = 0.0
-    N = effect.shape[1]
-    for p in range(place):
-        for j in range(N):
-            for i in range(levels[p, OWN_FIRST], levels[p, OWN_LAST]):
-                most = max(most, abs(effect[place, j, i] - effect[p, j, i]))
-    return most
-
-
-@piece
 def predict(
     q: Array, v: Array, v_was: Array, U: Array, M_bar: Array, period: float, T_s: float, path: Array
 ) -> None:

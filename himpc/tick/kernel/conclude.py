@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from himpc.cascade.compiled import INDICES, VECTOR, WHOLE, entry
@@ -11,11 +12,10 @@ from himpc.tick.kernel.cascade import (
     OWN_FIRST,
     OWN_KNOTS,
     OWN_LAST,
-    cost_of,
     finite,
-    leak_of,
     predict,
 )
+from himpc.tick.kernel.evidence import bounds_met, cost_of, leak_of, quaternions
 from himpc.tick.kernel.residual import add_effects, effects
 from himpc.tick.kernel.views import matrices, matrix, vector
 
@@ -25,7 +25,7 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
     """Evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18). False if the
     torque is not finite; else the tick is remembered, if it is to be kept."""
     s = vector(whole, whole_where[WHOLE_AT.sizes], 10)
-    n, N, M, m, r, k = s[0], s[1], s[2], s[3], s[4], s[8] + 1
+    n, N, M, m, r, T, k = s[0], s[1], s[2], s[3], s[4], s[5], s[8] + 1
     last = max(r, 1) - 1
     levels = matrix(whole, whole_where[WHOLE_AT.level], r, 8)
     U, effect = matrices(data, where[AT.U], last + 1, N, n), matrices(data, where[AT.effect], r, N, M)
@@ -46,8 +46,13 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
         add_effects(C, effect[applied], first, end, row_knots, e)
         data[where[AT.cost] + i] = cost_of(e, U[applied], R[i], first, end, row_knots, levels[i, OWN_KNOTS])
         data[where[AT.leak] + i] = leak_of(i, levels, effect)
+    active_row, active_joint = (
+        matrix(whole, whole_where[WHOLE_AT.active_row], r, k),
+        matrix(whole, whole_where[WHOLE_AT.active_joint], r, k),
+    )
+    multiplier, stopping = matrix(data, where[AT.multiplier], r, k), matrix(data, where[AT.stopping], 2, n)
     tau_0, tau = vector(data, where[AT.tau_0], n), vector(data, where[AT.tau], n)
-    bound, predicted = matrix(data, where[AT.limits], 6, n), matrix(data, where[AT.predicted], N + 1, n)
+    bound, predicted = matrix(data, where[AT.limits], 8, n), matrix(data, where[AT.predicted], N + 1, n)
     for a in range(n):
         tau[a] = min(max(tau_0[a] + U[last, 0, a], bound[0, a]), bound[1, a])
     predict(
@@ -62,6 +67,19 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
     )
     if not finite(tau):
         return False
+    delta_tau, at_bound = vector(data, where[AT.delta_tau], n), vector(data, where[AT.at_bound], n)
+    for a in range(n):
+        delta_tau[a], at_bound[a] = tau[a] - tau_0[a], 0.0
+    most = 0.0
+    for i in range(r):
+        count = whole[whole_where[WHOLE_AT.active_count] + i]
+        data[where[AT.active] + i] = count
+        most = max(most, data[where[AT.leak] + i])
+        bounds_met(N, count, active_row[i], active_joint[i], multiplier[i], stopping, at_bound)
+    data[where[AT.priority_leak]] = most if r > 1 else math.nan
+    task = matrix(whole, whole_where[WHOLE_AT.task], T, 4)
+    quaternions(task, matrices(data, where[AT.R_now], T, 3, 3), matrix(data, where[AT.quaternion], T, 4))
+    quaternions(task, matrices(data, where[AT.R_d], T, 3, 3), matrix(data, where[AT.quaternion_d], T, 4))
     if keep:
         q_was[:] = q
         v_was[:] = v
@@ -74,11 +92,7 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
             matrix(whole, whole_where[WHOLE_AT.pressed_row], r, k),
             matrix(whole, whole_where[WHOLE_AT.pressed_joint], r, k),
         )
-        active_row, active_joint = (
-            matrix(whole, whole_where[WHOLE_AT.active_row], r, k),
-            matrix(whole, whole_where[WHOLE_AT.active_joint], r, k),
-        )
-        pressed, multiplier = matrix(data, where[AT.pressed], r, k), matrix(data, where[AT.multiplier], r, k)
+        pressed = matrix(data, where[AT.pressed], r, k)
         for i in range(r):
             active = whole[whole_where[WHOLE_AT.active_count] + i]
             whole[whole_where[WHOLE_AT.pressed_count] + i] = active

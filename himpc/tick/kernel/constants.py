@@ -6,3 +6,6 @@ RANK_TOLERANCE = 1e-10
 
 RETURN_RATE = 5.0
 """1/s: a joint beyond its limit is asked to come back at this rate times the excess."""
+
+AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
+"""Bits of telemetry's `at_bound`: which limits bind. A position limit does so through velocity rows, too."""

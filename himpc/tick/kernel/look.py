@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from himpc.cascade.compiled import INDICES, VECTOR, entry
-from himpc.tick.kernel.arena import AT, PERIOD, REACTION, T_S, WHOLE_AT, Whole
+from himpc.tick.kernel.arena import AT, NOW, PERIOD, REACTION, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (
     DAMPING,
@@ -20,6 +20,7 @@ from himpc.tick.kernel.kinematics import (
     turned_away,
 )
 from himpc.tick.kernel.linear import dot
+from himpc.tick.kernel.references import curves
 from himpc.tick.kernel.residual import free_motion
 from himpc.tick.kernel.views import matrices, matrix, vector
 
@@ -76,6 +77,23 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         place(at, parent, turns, turn, shift, axis, placed, z)
         points(placed, frame_joint, frame_shift, point)
         jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[j], B[j])
+    displacement, velocity_d, acceleration_d = (
+        matrix(data, where[AT.displacement], N + 1, M),
+        matrix(data, where[AT.velocity_d], N + 1, M),
+        matrix(data, where[AT.acceleration_d], N + 1, M),
+    )
+    curves(
+        scalars[NOW],
+        T_s,
+        task,
+        vector(whole, whole_where[WHOLE_AT.law], T),
+        matrix(data, where[AT.pace], T, 2),
+        matrix(data, where[AT.curve], M, 4),
+        x_d,
+        displacement,
+        velocity_d,
+        acceleration_d,
+    )
     turned = vector(data, where[AT.slope], 3)
     for t in range(T):
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
@@ -101,7 +119,7 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         v_was,
         tau_0,
         M_bar,
-        matrix(data, where[AT.limits], 6, n),
+        matrix(data, where[AT.limits], 8, n),
         vector(data, where[AT.approach], N),
         s[9],
         reaction,
@@ -120,9 +138,9 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         vector(data, where[AT.K_v], M),
         matrix(data, where[AT.on_velocity], N, M),
         matrix(data, where[AT.on_acceleration], N, M),
-        matrix(data, where[AT.displacement], N + 1, M),
-        matrix(data, where[AT.velocity_d], N + 1, M),
-        matrix(data, where[AT.acceleration_d], N + 1, M),
+        displacement,
+        velocity_d,
+        acceleration_d,
         m,
         matrix(data, where[AT.free], N, M),
     )

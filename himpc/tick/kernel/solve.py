@@ -12,14 +12,17 @@ from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.taken import Taken
 from himpc.tick.kernel.views import matrices, matrix, vector
 
-BUDGET = 6e6
-"""Multiplications that the changes of active rows may cost at one level: some milliseconds on a slow core. A
+BUDGET = 12e6
+"""Multiplications that the changes of active rows may cost in one tick: ten milliseconds on a slow core. A
 count, not a clock: the same seed gives the same run."""
+LEVEL_BUDGET = 6e6
+"""The most of them that one attempt at one level may take."""
 
 
 @entry(VECTOR, INDICES, INDICES, INDICES, WHOLE, NUMBER)
 def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, room: float) -> bool:
-    """Problem i of the cascade, those above it known; False if no optimum was found within BUDGET.
+    """Problem i of the cascade, those above it known; False if no optimum was found within what is left of
+    the tick's budget.
 
     room: N·m by which bounds give way where the levels above leave none.
     """
@@ -89,7 +92,8 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         vector(data, where[AT.slope], w),
         vector(data, where[AT.size], 2),
     )
-    data[where[AT.budget]] = BUDGET
+    granted = data[where[AT.budget]]
+    data[where[AT.budget]] = min(granted, LEVEL_BUDGET)
     kkt, held = solve_level(
         i,
         levels,
@@ -113,6 +117,7 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         vector(data, where[AT.budget], 1),
         room,
     )
+    data[where[AT.budget]] += max(granted - LEVEL_BUDGET, 0.0)
     if kkt == FAILED:
         return False
     data[where[AT.kkt] + i] = kkt

@@ -1,0 +1,39 @@
+"""References that are a few numbers: the kernel evaluates them by itself."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from himpc.references.curves import Circle, FigureEight, Sinusoid
+from himpc.references.hold import Hold
+from himpc.references.phase import Phase
+from himpc.references.preview import Array, Reference
+
+
+class Curve(NamedTuple):
+    """x_d = c + a cos φ + b sin φ + d sin 2φ.
+
+    Attributes:
+        centre: c, (m,); or a rotation matrix that is held.
+        swing: a, b and d, each (m,) or 0.
+        phase: time law φ(t); None: it stays at `centre`.
+    """
+
+    centre: Array
+    swing: tuple[Array | float, Array | float, Array | float] = (0.0, 0.0, 0.0)
+    phase: Phase | None = None
+
+
+def curve_of(reference: Reference) -> Curve | None:
+    """The numbers of a reference; None for one that only knows how to preview itself."""
+    match reference:
+        case Hold():
+            return Curve(reference.value)
+        case Circle():
+            return Curve(reference.centre, (reference.u, reference.w, 0.0), reference.phase)
+        case FigureEight():
+            return Curve(reference.centre, (0.0, reference.u, 0.5 * reference.w), reference.phase)
+        case Sinusoid():
+            return Curve(reference.offset, (0.0, reference.amplitude, 0.0), reference.phase)
+        case _:
+            return None

@@ -1,0 +1,38 @@
+"""All references at one control tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import final
+
+from himpc.references.preview import Preview, Reference
+
+
+@final
+class Outlook(Mapping[str, Preview]):
+    """The previews of all references at one tick, each sampled when somebody asks for it: a controller that
+    knows a reference's numbers needs no samples.
+
+    Attributes:
+        references: by the names of their tasks.
+        t: s, now.
+        T_s, N: period (s) and knots of the samples.
+    """
+
+    __slots__ = ("N", "T_s", "_found", "references", "t")
+
+    def __init__(self, references: Mapping[str, Reference], t: float, T_s: float, N: int) -> None:
+        self.references, self.t, self.T_s, self.N = references, t, T_s, N
+        self._found: dict[str, Preview] = {}
+
+    def __getitem__(self, name: str) -> Preview:
+        found = self._found.get(name)
+        if found is None:
+            found = self._found[name] = self.references[name].preview(self.t, self.T_s, self.N)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.references)
+
+    def __len__(self) -> int:
+        return len(self.references)

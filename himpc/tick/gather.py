@@ -1,0 +1,63 @@
+"""Where in an arena the numbers of a telemetry row stand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from himpc.tasks import Damping, FrameOrientation
+from himpc.tick.configure import Span, is_built_in
+from himpc.tick.kernel.arena import AT, Arena, Whole
+
+if TYPE_CHECKING:
+    from himpc.telemetry import Layout
+
+_LIMITS = ("tau_lower", "tau_upper", "v_limit", "", "", "", "q_lower", "q_upper")
+"""Fields that the rows of `limits` are; stops and decelerations are none."""
+
+
+def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> Whole | None:
+    """For every field that a plan and its references fill, where in `arena.data` it stands; NaN for the rest.
+
+    Args:
+        arena: of a controller.
+        layout: of the row.
+        spans: place, task and rows of every task.
+        levels: names of those that are solved.
+
+    Returns:
+        (size,), or None if the row has a task that the arena knows no reference of.
+    """
+    found = np.full(layout.size, arena.where[AT.nothing])
+    n, fields = len(layout.joints), layout.fields
+
+    def put(field: str, name: str, skipped: int = 0) -> None:
+        where = fields[field]
+        start = arena.where[getattr(AT, name)] + skipped
+        found[where] = np.arange(start, start + where.stop - where.start)
+
+    for name in ("delta_tau", "at_bound", "priority_leak", "tau_0"):
+        put(name, name)
+    put("tau_demand", "tau")
+    for place, field in enumerate(_LIMITS):
+        if field:
+            put(field, "limits", place * n)
+    known = {task.name: (place, task, span.start) for place, task, span in spans}
+    for info in layout.tasks:
+        place, task, first = known.get(info.name, (0, None, 0))
+        if task is None or isinstance(task, Damping) or not is_built_in(task):
+            return None
+        if isinstance(task, FrameOrientation):
+            put(f"x/{info.name}", "quaternion", 4 * place)
+            put(f"x_d/{info.name}", "quaternion_d", 4 * place)
+        else:
+            put(f"x/{info.name}", "value", first)
+            put(f"x_d/{info.name}", "x_d", first)
+        for field, name in (("error", "error"), ("v_d", "velocity_d"), ("a_d", "acceleration_d")):
+            put(f"{field}/{info.name}", name, first)
+    for place, level in enumerate(levels):
+        for field in ("cost", "kkt", "rung", "time_us", "leak", "active"):
+            put(f"{field}/{level}", field, place)
+    return found

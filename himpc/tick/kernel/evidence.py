@@ -1,0 +1,80 @@
+"""What is told of a tick: costs, leaks, which bounds bind, orientations as quaternions."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.compiled import piece
+from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.cascade import OWN_FIRST, OWN_LAST
+from himpc.tick.kernel.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
+from himpc.tick.kernel.kinematics import ORIENTATION
+
+
+@piece
+def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whole, knots: int) -> float:
+    """The value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
+    total = 0.0
+    for i in range(first, last):
+        for k in range(row_knots[i]):
+            total += e[k, i] * e[k, i]
+    for j in range(knots):
+        for a in range(U.shape[1]):
+            total += R[a] * U[j, a] * U[j, a]
+    return total
+
+
+@piece
+def leak_of(place: int, levels: Whole, effect: Array) -> float:
+    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect (r, N, m) is J M̄⁻¹ Δτ."""
+    most = 0.0
+    N = effect.shape[1]
+    for p in range(place):
+        for j in range(N):
+            for i in range(levels[p, OWN_FIRST], levels[p, OWN_LAST]):
+                most = max(most, abs(effect[place, j, i] - effect[p, j, i]))
+    return most
+
+
+@piece
+def bounds_met(
+    N: int, count: int, row: Whole, joint: Whole, multiplier: Array, stopping: Array, at_bound: Array
+) -> None:
+    """Adds the bits of the rows that hold a level's point to those of the joints, (n,) whole numbers.
+
+    Args:
+        N: knots; rows come in blocks of N: torque, velocity, position.
+        count, row, joint, multiplier: the active rows.
+        stopping: (2, n), see `bounds`.
+        at_bound: the result.
+    """
+    for p in range(count):
+        a, kind = joint[p], row[p] // N
+        bit = AT_TORQUE if kind == 0 else AT_VELOCITY if kind == 1 else AT_POSITION
+        if bit == AT_VELOCITY and stopping[1 if multiplier[p] > 0.0 else 0, a] > 0.0:
+            bit = AT_POSITION
+        at_bound[a] = float(int(at_bound[a]) | bit)
+
+
+@piece
+def quaternions(task: Whole, R: Array, out: Array) -> None:
+    """Unit quaternions x y z w, w ≥ 0, of rotations (T, 3, 3), for tasks about orientation."""
+    for t in range(len(task)):
+        if task[t, 0] == ORIENTATION:
+            quaternion(R[t], out[t])
+
+
+@piece
+def quaternion(R: Array, out: Array) -> None:
+    """x y z w of a rotation, w ≥ 0: its largest component comes from a root."""
+    xx, yy, zz = R[0, 0], R[1, 1], R[2, 2]
+    w, x, y, z = 1.0 + xx + yy + zz, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    if w < 1.0:
+        if xx >= yy and xx >= zz:
+            w, x, y, z = x, 1.0 + xx - yy - zz, R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]
+        elif yy >= zz:
+            w, x, y, z = y, R[0, 1] + R[1, 0], 1.0 + yy - xx - zz, R[1, 2] + R[2, 1]
+        else:
+            w, x, y, z = z, R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], 1.0 + zz - xx - yy
+    share = math.copysign(1.0 / math.sqrt(x * x + y * y + z * z + w * w), w)
+    out[0], out[1], out[2], out[3] = share * x, share * y, share * z, share * w

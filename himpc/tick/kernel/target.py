@@ -1,0 +1,143 @@
+"""Entry: the filter of a dragged target, see `references.target`."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.compiled import MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
+from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.kinematics import turned_away
+from himpc.tick.kernel.linear import dot
+
+_APPROACH = 6.0
+"""1/s: how fast the remaining distance closes near the raw target."""
+_RATE = 36.0
+"""1/s: how fast the filtered velocity follows the one wanted."""
+_STILL = 1e-9
+"""Below this distance and speed the filtered target snaps to rest: it must not drift for ever."""
+
+
+@piece
+def shorten(x: Array, cap: float, m: int) -> None:
+    """x, shortened to `cap` if it is longer."""
+    length = math.sqrt(dot(x, x, m))
+    if length > cap:
+        for a in range(m):
+            x[a] *= cap / length
+
+
+@piece
+def turn(w: Array, now: Array, then: Array) -> None:
+    """exp(w) R of a rotation R, row by row, by Rodrigues' formula."""
+    angle = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    half = math.sin(0.5 * angle)
+    first = math.sin(angle) / angle if angle > 1e-9 else 1.0
+    second = 2.0 * half * half / (angle * angle) if angle > 1e-9 else 0.5
+    for c in range(3):
+        x, y, z = now[c], now[3 + c], now[6 + c]
+        a, b, d = w[1] * z - w[2] * y, w[2] * x - w[0] * z, w[0] * y - w[1] * x
+        then[c] = x + first * a + second * (w[1] * d - w[2] * b)
+        then[3 + c] = y + first * b + second * (w[2] * a - w[0] * d)
+        then[6 + c] = z + first * d + second * (w[0] * b - w[1] * a)
+
+
+@piece
+def jerked(
+    velocity: Array,
+    acceleration: Array,
+    wanted: Array,
+    speed: float,
+    caps: Array,
+    T_s: float,
+    m: int,
+    change: Array,
+) -> None:
+    """How the acceleration changes in one period towards the one wanted, within the jerk cap.
+
+    Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
+    half of what a straight line would allow, since in a curve speed also grows by itself. If it is above
+    already, coming down has the first claim on the jerk.
+    """
+    budget = caps[2] * T_s
+    if speed == 0.0:
+        for a in range(m):
+            change[a] = wanted[a] - acceleration[a]
+        shorten(change, budget, m)
+        return
+    most = math.sqrt(caps[2] * max(caps[0] - speed, 0.0))
+    excess = max(dot(wanted, velocity, m) / speed - most, 0.0)
+    for a in range(m):
+        change[a] = wanted[a] - excess * (velocity[a] / speed) - acceleration[a]
+    if dot(acceleration, velocity, m) / speed <= most:
+        shorten(change, budget, m)
+        return
+    share = dot(change, velocity, m) / speed
+    along = max(share, -budget)
+    for a in range(m):
+        change[a] -= share * (velocity[a] / speed)
+    shorten(change, math.sqrt(max(budget * budget - along * along, 0.0)), m)
+    for a in range(m):
+        change[a] += along * (velocity[a] / speed)
+
+
+@piece
+def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: int, width: int) -> None:
+    """The sample after this one: one period under one acceleration within the caps."""
+    velocity, acceleration = now[width : width + m], now[width + m : width + 2 * m]
+    away, change, along = caps[3 : 3 + m], caps[3 + m : 3 + 2 * m], caps[3 + 2 * m : 3 + 3 * m]
+    rests = now[width + 3 * m] > 0.0
+    for a in range(m):
+        away[a] = 0.0 if rests or width > m else raw[a] - now[a]
+    if width > m and not rests:
+        turned_away(raw.reshape(3, 3), now[:9].reshape(3, 3), away)
+    distance, speed = math.sqrt(dot(away, away, m)), math.sqrt(dot(velocity, velocity, m))
+    if rests or (distance < _STILL and speed < 10.0 * _STILL):
+        then[:width] = raw
+        then[width:] = 0.0
+        then[width + 2 * m : width + 3 * m] = away
+        then[width + 3 * m] = 1.0
+        return
+    # Never faster than a stop with half the acceleration cap allows; linear close to the goal.
+    wanted = min(caps[0], _APPROACH * distance, math.sqrt(caps[1] * distance))
+    for a in range(m):
+        goal = away[a] * (wanted / distance) if distance > 0.0 else 0.0
+        along[a] = _RATE * (goal - velocity[a])
+    shorten(along, caps[1], m)
+    jerked(velocity, acceleration, along, speed, caps, T_s, m, change)
+    for a in range(m):
+        along[a] = velocity[a] + T_s * (acceleration[a] + change[a])
+    shorten(along, caps[0], m)
+    for a in range(m):
+        then[width + a] = along[a]
+        then[width + m + a] = (along[a] - velocity[a]) / T_s
+        then[width + 2 * m + a] = 0.5 * T_s * (velocity[a] + along[a])
+    then[width + 3 * m] = 0.0
+    step = then[width + 2 * m :]
+    if width > m:
+        turn(step, now, then)
+    else:
+        for a in range(m):
+            then[a] = now[a] + step[a]
+
+
+@entry(MATRIX, WHOLE, VECTOR, VECTOR, NUMBER, MATRICES)
+def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: Array) -> None:
+    """Rolls the filter forward with the raw target frozen, and gathers its preview.
+
+    Args:
+        samples: (…, w + 3m + 1) value, velocity, acceleration, way from the sample before, and whether it
+            rests at the raw target; a value has w = 9 numbers for a rotation, else m.
+        known: how many of them are there; more are made as far as `out` reaches.
+        raw: where the hand is, (w,).
+        caps: speed, acceleration and jerk; and room for 3m more numbers.
+        T_s: s.
+        out: (3, N+1, m) displacement, velocity and acceleration at t … t + N·T_s.
+    """
+    m, width = out.shape[2], raw.size
+    for j in range(known, out.shape[1]):
+        following(samples[j - 1], samples[j], raw, caps, T_s, m, width)
+    for j in range(out.shape[1]):
+        row = samples[j, width:]
+        for a in range(m):
+            out[0, j, a] = out[0, j - 1, a] + row[2 * m + a] if j else 0.0
+            out[1, j, a], out[2, j, a] = row[a], row[m + a]

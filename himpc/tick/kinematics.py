@@ -1,0 +1,81 @@
+"""The kernel's kinematics for controllers that have no horizon."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from himpc.controllers.forms import StackForm
+from himpc.references import Preview
+from himpc.tasks import Damping, FrameOrientation, Task
+from himpc.tick.configure import write_tasks
+from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.look import look
+from robots import Robot
+
+_NUDGES = 3
+"""The state itself, and one to each side of it."""
+
+
+class Seen(NamedTuple):
+    """Where the tasks are: J (m, n), J̇q̇ and x̃ (m,) of those that are solved for; x and x̃ of all by name."""
+
+    J: Array
+    drift: Array
+    error: Array
+    values: dict[str, Array]
+    errors: dict[str, Array]
+
+
+class Kinematics:
+    """The kinematics of a stack's tasks, all of which the kernel knows.
+
+    Args:
+        robot: gives the geometry.
+        form: the levels that are solved.
+        off: tasks that are measured only.
+    """
+
+    def __init__(self, robot: Robot, form: StackForm, off: list[Task]) -> None:
+        counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
+        self._solved = sum(form.sizes)
+        self._arena, self._spans = write_tasks(robot, (*form.tasks, *off), counts, _NUDGES, self._solved)
+        self._arena.f["M_bar"][:], self._arena.f["scalars"][:], self._arena.i["known"][0] = 1.0, 1.0, 1
+
+    def at(self, q: Array, v: Array, h: float, previews: Mapping[str, Preview]) -> Seen:
+        """The tasks at a state.
+
+        Args:
+            q, v: (n,).
+            h: s, how far along v the joints are moved to both sides to see J change.
+            previews: of every task; only where it is now counts.
+
+        Raises:
+            numpy.linalg.LinAlgError: something is not finite.
+        """
+        f = self._arena.f
+        f["q"][:], f["v"][:], f["path"][1] = q, v, q
+        f["path"][2], f["path"][3] = q + h * v, q - h * v
+        for place, task, span in self._spans:
+            if not isinstance(task, Damping):
+                value = previews[task.name].value
+                if value.ndim == 2:
+                    f["R_d"][place] = value
+                else:
+                    f["x_d"][span] = value
+        if not look(*self._arena.arguments):
+            raise np.linalg.LinAlgError("the kinematics are not finite")
+        J, ahead, behind = f["B"][:, : self._solved]
+        R, value, error = f["R_now"].copy(), f["value"].copy(), f["error"].copy()
+        return Seen(
+            J.copy(),
+            (ahead - behind) @ v / (2 * h),
+            error[: self._solved],
+            {
+                task.name: R[place] if isinstance(task, FrameOrientation) else value[span]
+                for place, task, span in self._spans
+            },
+            {task.name: error[span] for _, task, span in self._spans},
+        )
