@@ -6,7 +6,7 @@ Every episode is a scene and a controller by chance, of some hundred ticks. Betw
 into states that cannot be, readings of the torque sensor are nonsense, settings and targets change. Counts
 exceptions, numbers that are not finite, torques above the robot's own limit, and ticks that used more than
 20 ms of processor time; prints one line each with the episode's seed, which `--episode` walks again, and JSON
-at the end. Exit 1 if there was any.
+at the end or when it is interrupted. Exit 1 if there was any.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import json
 import sys
 import traceback
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import monotonic, thread_time
 
@@ -170,9 +171,9 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
         try:
             if rng.random() < eventful:
                 session.post(event(rng, session))
+            session.drain()
             started = thread_time()
             if rng.random() < wild:
-                session.drain()
                 q, v = state(rng, session)
                 reading = session.plant.tau * 10.0 ** rng.uniform(-1, 4)
                 if rng.random() < 0.1:
@@ -206,7 +207,7 @@ def main() -> int:
     given = parser.parse_args()
     tally, began = Tally(), monotonic()
     seeds = np.random.SeedSequence(given.seed)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), suppress(KeyboardInterrupt):
         if given.episode is not None:
             episode(given.episode, given.length, tally)
         while given.episode is None and tally.ticks < given.ticks:

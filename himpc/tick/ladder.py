@@ -39,10 +39,19 @@ def solve_levels(
         kinds: of the rows.
         damped: the increments of the damping level alone under torque rows.
     """
-    found = []
+    found: list[tuple[Rung, float]] = []
+    calm: list[Array | None] = []
+
+    def damped_once(rows: Rows) -> Array | None:
+        # All levels that come to this rung want the same.
+        if not calm:
+            calm.append(damped(rows))
+        return calm[0]
+
     for place in range(int(arena.i["sizes"][4])):
         started = perf_counter_ns()
-        rung = "solve" if solve(*arena.arguments, place, 0.0) else _climb_down(arena, place, kinds, damped)
+        solved = solve(*arena.arguments, place, 0.0)
+        rung = "solve" if solved else _climb_down(arena, place, kinds, damped_once)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = RUNGS.index(rung), time_us
         found.append((rung, time_us))
