@@ -12,6 +12,7 @@ at the end or when it is interrupted. Exit 1 if there was any.
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import sys
 import traceback
@@ -166,6 +167,8 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
     )
     session = TorqueSession(replace(scene, settings=settings))
     tally.episodes += 1
+    gc.collect()
+    gc.freeze()  # what the collector finds is no part of a step
     wild, eventful = rng.choice([0.0, 0.02, 0.3]), rng.choice([0.0, 0.01, 0.1])
     for tick in range(ticks):
         try:
