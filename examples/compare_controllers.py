@@ -6,24 +6,24 @@ limits, the priority leak, and the median time of a step.
 
 from __future__ import annotations
 
-from lessons import Job, perform_all
+from lessons import Job, RunSpec, perform_all
 
 CONTROLLERS = ("himpc", "hiqp", "weighted", "osf", "tdeosf", "hqp")
 
 
 def main(seconds: float = 8.0) -> None:
     """Prints what the module's docstring says."""
-    jobs = [Job("planar3-conflict", controller=name, duration=seconds) for name in CONTROLLERS]
+    jobs = [Job(RunSpec("planar3-conflict", controller=name, duration=seconds)) for name in CONTROLLERS]
     # On all cores; jobs that are timed run by themselves, so that they are.
     runs = perform_all(jobs)
     for job in jobs:
         found = runs[job]
         if not found.completed:
-            print(f"{job.controller}: lost control at {found.lost_at:.2f} s")
+            print(f"{job.spec.controller}: lost control at {found.lost_at:.2f} s")
             continue
         measure = "rmse_after_1s" if seconds > 1.0 else "rmse"
         print(
-            f"{job.controller}: RMS error {1e3 * found.error_of('position', 0, measure):.4f} mm in x, "
+            f"{job.spec.controller}: RMS error {1e3 * found.error_of('position', 0, measure):.4f} mm in x, "
             f"torque {found.figure('limits', 'torque', 'max_ratio'):.2f}, "
             f"velocity {found.figure('limits', 'velocity', 'max_ratio'):.2f} of the limit, "
             f"leak {found.figure('priority_leak_max'):.1e}, "

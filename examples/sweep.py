@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lessons import Job
+from lessons import RunSpec
 from lessons.experiments.sweep import best_cell, carry_on, draw_sweep, make_sweep, metrics
 from lessons.parallel import Spread, on_cores
 
 
 def main(seconds: float = 1.0, spread: Spread = on_cores) -> None:
     """Prints what the module's docstring says. spread: how the work is spread; see `lessons.parallel`."""
-    base = Job("iiwa14-circle", controller="himpc", duration=seconds)
+    base = RunSpec("iiwa14-circle", duration=seconds)
     sweep = make_sweep(base, ("plant.payload_kg=0:4:2", "horizon=2:6:2"))
     print(f"cells: {len(sweep.points)}")
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from himpc.configuration import Configuration
 from himpc.tasks import Damping, Task
 from himpc.tasks.axes import AXES, OnAxes
+from himpc.tasks.task import GAINS
 from robots import InputError, Robot
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, check_fields, check_numbers
 
 Array = NDArray[np.float64]
 Weight = float | tuple[float, ...]
@@ -47,7 +48,8 @@ class Level:
             raise InputError("a level needs at least one task: add one or remove the level")
         check_fields(self, f"level '{self.name}': ")
         for task in self.tasks:
-            check_fields(task, f"task '{task.name}': ")
+            for field in ("K_p", "K_v"):
+                check_numbers(f"{field} of task '{task.name}'", getattr(task, field), GAINS)
 
 
 Stack = tuple[Level, ...]

@@ -12,11 +12,13 @@ if TYPE_CHECKING:
     from lessons.recording.run import run
     from lessons.recording.summary import summary
     from lessons.scenes.catalog import load_scene, prepared, torque_scene
+    from lessons.scenes.run_spec import RunSpec
     from lessons.session.start import begin
 
 __all__ = [
     "Job",
     "Recording",
+    "RunSpec",
     "arrays",
     "begin",
     "chosen",
@@ -34,6 +36,7 @@ __getattr__ = lazily(
     {
         "Job": "experiments.jobs",
         "Recording": "recording.recording",
+        "RunSpec": "scenes.run_spec",
         "arrays": "recording.arrays",
         "begin": "session.start",
         "chosen": "experiments.tune",

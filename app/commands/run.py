@@ -12,7 +12,8 @@ from app.commands.progress import progress_bar
 from robots import InputError
 
 if TYPE_CHECKING:
-    from lessons.replay.state import State
+    from lessons.scenes.run_spec import RunSpec
+    from lessons.scenes.scene import Scene
 
 
 def run(
@@ -23,6 +24,7 @@ def run(
     duration: float | None = None,
     seed: int | None = None,
     state: str | None = None,
+    settings: bool = False,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
     json: str | None = None,
     npz: str | None = None,
@@ -39,32 +41,35 @@ def run(
         duration: simulated seconds; the scene's own by default.
         seed: seed of the run; 0, or the state's, by default.
         state: a state code, as the page shows it: its scene, robot, settings and seed.
+        settings: list what --set takes in this scene, and run nothing.
         set: change a setting, e.g. --set horizon=10 --set plant.payload_kg=2 --set levels.2.enabled=false.
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
-    from lessons.own.files import is_file
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
-    from lessons.scenes.catalog import prepared
 
-    files = (controller,) if controller is not None and is_file(controller) else ()
-    given = _given(scene, urdf, tip, state, files)
-    given = replace(given, seed=given.seed if seed is None else seed)
-    loaded = prepared(given.prepared(), controller, set)
-    with progress_bar(f"{given.scene} …", json is None) as progress:
-        recording = run(loaded, duration, given.seed, progress)
+    spec = _given(scene, urdf, tip, state)
+    if controller is not None:  # instead of the code's
+        told = (each for each in spec.set if not each.startswith("controller="))
+        spec = replace(spec, controller=controller, set=tuple(told))
+    spec = replace(spec.but(*set), duration=duration, seed=spec.seed if seed is None else seed)
+    loaded = spec.prepared()
+    if settings:
+        return _list(loaded, json)
+    with progress_bar(f"{spec.scene} …", json is None) as progress:
+        recording = run(loaded, None, spec.seed, progress)
     result = summary(recording)
     if npz is not None:
         how = {
-            "scene": given.scene,
-            "urdf": given.urdf,
-            "tip": given.tip,
+            "scene": spec.scene,
+            "urdf": spec.urdf,
+            "tip": spec.tip,
             "controller": result["controller"],
-            "seed": given.seed,
+            "seed": spec.seed,
             "duration": recording.duration,
-            "set": [*given.set, *set],
+            "set": list(spec.set),
         }
         _save(npz, arrays(recording, how))
     if json is not None:
@@ -74,19 +79,30 @@ def run(
     return 0
 
 
-def _given(
-    scene: str | None, urdf: str | None, tip: str | None, code: str | None, files: tuple[str, ...]
-) -> State:
-    """What to run: the scene that was named, or the state of a code."""
-    from lessons.replay.state import State, decode
+def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> RunSpec:
+    """What to run: the scene that was named, or what a code holds."""
+    from lessons.replay.state import decode
+    from lessons.scenes.run_spec import RunSpec
 
     if code is None:
         if scene is None:
             raise InputError("run needs a scene, e.g. himpc-lab run iiwa14-hold, or --state CODE")
-        return State(scene, urdf, tip, files=files)
+        return RunSpec(scene, urdf, tip)
     if (scene, urdf, tip) != (None, None, None):
         raise InputError("--state brings its own scene and robot: leave out the scene, --urdf and --tip")
-    return replace(decode(code), files=files)
+    return decode(code).run
+
+
+def _list(scene: Scene, json: str | None) -> int:
+    from lessons.settings.listing import lines
+
+    found = lines(scene.settings)
+    if json is not None:
+        write_json([vars(line) for line in found], json)
+        return 0
+    rows = [[line.path, line.now, line.allowed, line.unit, line.help] for line in found]
+    print_table(f"What --set takes in {scene.name}", ("path", "now", "allowed", "unit", "what it is"), rows)
+    return 0
 
 
 def _save(path: str, data: dict[str, Any]) -> None:

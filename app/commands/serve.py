@@ -60,7 +60,9 @@ def serve(
     elif state is not None:
         from lessons.replay.state import decode
 
-        choice = SceneChoice.of_state(replace(decode(state), files=own.controllers)).admitting(own)
+        found = decode(state)
+        found = replace(found, run=replace(found.run, files=own.controllers))
+        choice = SceneChoice.of_state(found).admitting(own)
     else:
         choice = own
     return serve_page(

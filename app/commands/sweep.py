@@ -43,13 +43,12 @@ def sweep(
         metric: what the map shows; by default the RMSE of level 1 after the first second.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
-    from lessons.experiments.jobs import Job
     from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
-    from lessons.own.resolve import scene_named
     from lessons.parallel import on_cluster, on_cores
+    from lessons.scenes.run_spec import RunSpec
 
-    chosen = controller or scene_named(scene).settings.controller
-    definition = make_sweep(Job(scene, chosen, tuple(set), duration, seed), over)
+    base = RunSpec(scene, controller=controller, set=tuple(set), duration=duration, seed=seed)
+    definition = make_sweep(base, over)
     choices = metrics(definition)
     shown = check_metric(metric or choices[0], choices)
     held = len(finished_cells(definition, out))

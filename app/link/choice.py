@@ -9,6 +9,7 @@ from app.link.exercise import Exercise
 from lessons.course import COURSE
 from lessons.own.files import is_file
 from lessons.scenes.names import ALL_SCENES
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import assignment
 from robots.errors import InputError, unknown_name
 
@@ -68,13 +69,27 @@ class SceneChoice:
         return cls(run.scene, run.urdf, set=run.set, exercise=exercise)
 
     @classmethod
+    def of_run(cls, run: RunSpec) -> SceneChoice:
+        """What a run begins with; a page has no script and no end."""
+        told = () if run.controller is None else (f"controller={run.controller}",)
+        return cls(run.scene, run.urdf, run.tip, set=(*told, *run.set), seed=run.seed)
+
+    @property
+    def run(self) -> RunSpec:
+        """What it loads, but for an uploaded robot. Raises InputError if a lesson is named that is none."""
+        if self.exercise is not None:
+            return replace(self.exercise.run, seed=self.seed, files=self.controllers)
+        return RunSpec(self.name, self.urdf, self.tip, set=self.set, seed=self.seed, files=self.controllers)
+
+    @classmethod
     def of_state(cls, state: State) -> SceneChoice:
         """What a state code holds. Raises InputError for what cannot be loaded."""
         if state.lesson is None:
-            return cls(state.scene, state.urdf, state.tip, set=state.set, seed=state.seed)
+            return cls.of_run(state.run)
         exercise = Exercise.at(state.lesson, state.step or 1)
         lesson = cls.of_lesson(exercise)
-        if (lesson.name, lesson.urdf, lesson.tip) != (state.scene, state.urdf, state.tip):
+        run = state.run
+        if (lesson.name, lesson.urdf, lesson.tip) != (run.scene, run.urdf, run.tip):
             raise InputError(
                 f"step {state.step or 1} of lesson '{state.lesson}' has another scene than the code: "
                 "it was made by another version; open the lesson itself"
@@ -83,9 +98,9 @@ class SceneChoice:
         from lessons.settings.assignments import differences
 
         mine = differences(
-            with_controllers(exercise.run.prepared(), state.files).settings, state.prepared().settings
+            with_controllers(exercise.run.prepared(), run.files).settings, run.prepared().settings
         )
-        return replace(lesson, seed=state.seed, mine=mine)
+        return replace(lesson, seed=run.seed, mine=mine)
 
     @property
     def known(self) -> bool:

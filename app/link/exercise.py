@@ -12,8 +12,9 @@ from lessons.own.files import is_file
 from robots import InputError
 
 if TYPE_CHECKING:
+    from lessons.scenes.run_spec import RunSpec
     from lessons.teaching.challenge import Challenge, Result
-    from lessons.teaching.lesson import Lesson, Run, Step
+    from lessons.teaching.lesson import Lesson, Step
     from lessons.teaching.measure import Signal
     from lessons.teaching.prediction import Grade
 
@@ -58,7 +59,7 @@ class Exercise:
         return parts[min(max(self.place, 0), len(parts) - 1)]
 
     @property
-    def run(self) -> Run:
+    def run(self) -> RunSpec:
         """What is run."""
         return self.whole.run_of(self.part)
 

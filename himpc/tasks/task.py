@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from robots import Robot
 
 Array = NDArray[np.float64]
-Gain = Annotated[float | tuple[float, ...], Range(0.0)]
+GAINS = Range(0.0)
+Gain = Annotated[float | tuple[float, ...], GAINS]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.own.resolve import scene_named
 from lessons.parallel import Failed, on_cores, one_by_one
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.recording.summary import summary
-from lessons.scenes.catalog import prepared
-from lessons.scenes.scene import Scene
+from lessons.scenes.run_spec import RunSpec
 
 Array = NDArray[np.float64]
 
@@ -42,41 +40,20 @@ _KEPT_PER_LEVEL = ("cost", "step")
 
 @dataclass(frozen=True)
 class Job:
-    """One run of one scene. A subclass may run something else: see `do`.
+    """One run. A subclass may run something else: see `do`.
 
     Attributes:
-        scene: name of the scene.
-        controller: name of the controller.
-        set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
-        duration: simulated seconds; None: the scene's own.
-        seed: seed of the run.
+        spec: what is run.
         timed: its step times are what it is run for: nothing else runs meanwhile.
     """
 
-    scene: str
-    controller: str = "himpc"
-    set: tuple[str, ...] = ()
-    duration: float | None = None
-    seed: int = 0
+    spec: RunSpec
     timed: bool = False
-
-    def prepared(self) -> Scene:
-        """The scene with controller and assignments. Raises InputError for what cannot be."""
-        return prepared(scene_named(self.scene), self.controller, self.set)
 
     def do(self) -> Run:
         """The run. Raises InputError for what cannot be."""
-        recording = run(self.prepared(), self.duration, self.seed)
+        recording = run(self.spec.prepared(), None, self.spec.seed)
         return Run(self, summary(recording), _arrays(recording))
-
-    @property
-    def words(self) -> str:
-        """The command that does this run."""
-        parts = [f"himpc-lab run {self.scene} --controller {self.controller}"]
-        parts += [f"--set {assignment}" for assignment in self.set]
-        parts += [f"--duration {self.duration:g}"] if self.duration is not None else []
-        parts += [f"--seed {self.seed}"] if self.seed else []
-        return " ".join(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +75,11 @@ class Run:
     def column(self, field: str, k: int = 0) -> Array:
         """One number of a field over time, (ticks,); no rows if the run failed."""
         return self.arrays[field][:, k] if field in self.arrays else np.empty(0)
+
+    @property
+    def controller(self) -> str:
+        """The controller that was asked for, or the scene's own."""
+        return self.job.spec.controller or str(self.summary.get("controller"))
 
     @property
     def t(self) -> Array:
@@ -180,6 +162,7 @@ def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = 
 
 def _work(job: Job) -> float:
     """A guess of a job's cost, to order jobs and to show progress."""
-    horizons = [float(each.partition("=")[2]) for each in job.set if each.startswith("horizon=")]
+    spec = job.spec
+    horizons = [float(each.partition("=")[2]) for each in spec.set if each.startswith("horizon=")]
     horizon = horizons[-1] if horizons else 5.0
-    return (job.duration or 8.0) * (1.0 + 0.1 * horizon) * (20.0 if job.controller == "nhimpc" else 1.0)
+    return (spec.duration or 8.0) * (1.0 + 0.1 * horizon) * (20.0 if spec.controller == "nhimpc" else 1.0)

@@ -27,8 +27,8 @@ def by_controller(runs: Sequence[Run], field: str, k: int, scale: float = 1.0) -
             field,
             k,
             scale,
-            label=name(run.job.controller),
-            colour=run.job.controller,
+            label=name(run.controller),
+            colour=run.controller,
             weight=2.4 if place == 0 and len(shown) > 1 else 1.0,
         )
         for place, run in enumerate(shown)

@@ -81,9 +81,9 @@ def _troubles(item: Item, quick: bool, results: Results) -> list[str]:
     for job in dict.fromkeys(item.jobs(quick)):
         run = results[job]
         if run.error is not None:
-            found.append(f"`{job.words}` could not be run: {run.error}")
+            found.append(f"`{job.spec.command_line()}` could not be run: {run.error}")
         elif run.lost_at is not None:
-            found.append(f"`{job.words}` lost control at {run.lost_at:.3f} s")
+            found.append(f"`{job.spec.command_line()}` lost control at {run.lost_at:.3f} s")
     return found
 
 

@@ -10,49 +10,49 @@ import numpy as np
 
 from lessons.events import Event, Reset
 from lessons.own.files import is_file
-from lessons.replay.state import State
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import differences, parse_assignment
 from lessons.settings.settings import Settings, settings_after
 
 Log = Sequence[tuple[float, Event]]
 
 
-def script(state: State, log: Log, duration: float) -> str:
+def script(run: RunSpec, log: Log, duration: float) -> str:
     """A stand-alone script that repeats a run to the last bit on the same machine.
 
     What was before the last reset is left out: the script begins there, with the settings that were in force.
 
     Args:
-        state: what the run started from, before anything in the log.
+        run: what it started from, before anything in the log.
         log: `Session.log`, (time in s, event) of every event that took effect.
         duration: s since the last reset, `Session.t`.
 
     Raises:
-        InputError: the state cannot be prepared, or its settings cannot be told as assignments.
+        InputError: it cannot be prepared, or its settings cannot be told as assignments.
     """
-    scene = state.prepared()
+    scene = run.prepared()
     resets = [place for place, (_, event) in enumerate(log) if isinstance(event, Reset)]
     start = resets[-1] + 1 if resets else 0
     settings = settings_after(scene.settings, (event for _, event in log[:start]))
-    assignments = differences(state.loaded().settings, settings)
+    assignments = differences(run.loaded().settings, settings)
     events = log[start:]
     own = next((each for each in assignments if each.startswith("controller=") and is_file(each)), None)
     assignments = tuple(each for each in assignments if each != own)
-    find = ", ".join(repr(each) for each in _arguments(state))
+    find = ", ".join(repr(each) for each in _arguments(run))
     parts = [
         _HEAD.format(
-            what=f"{state.scene} under {settings.controller}, {duration:g} s",
+            what=f"{run.scene} under {settings.controller}, {duration:g} s",
             when=" since the last reset" if resets else "",
             caution=_CAUTION if _measures_time(settings, events) else "",
         ),
         *_imports(events),
         _IMPORTS,
-        f"SCENE = {'scene_named' if is_file(state.scene) else 'load_scene'}({find})",
+        f"SCENE = {'scene_named' if is_file(run.scene) else 'load_scene'}({find})",
         f"CONTROLLER = {None if own is None else parse_assignment(own)[1]!r}",
         _tuple("SETTINGS", (repr(each) for each in assignments)),
         _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
         f"DURATION = {_literal(float(duration))}  # s",
-        f"SEED = {state.seed}",
+        f"SEED = {run.seed}",
         _TAIL,
     ]
     return "\n".join(parts)
@@ -88,10 +88,10 @@ if len(sys.argv) > 1:
 """
 
 
-def _arguments(state: State) -> tuple[str | None, ...]:
-    if state.tip is not None:
-        return (state.scene, state.urdf, state.tip)
-    return (state.scene,) if state.urdf is None else (state.scene, state.urdf)
+def _arguments(run: RunSpec) -> tuple[str | None, ...]:
+    if run.tip is not None:
+        return (run.scene, run.urdf, run.tip)
+    return (run.scene,) if run.urdf is None else (run.scene, run.urdf)
 
 
 def _measures_time(settings: Settings, events: Log) -> bool:

@@ -1,4 +1,4 @@
-"""A whole setting as data, as a short code to pass on, and as a command line."""
+"""A whole setting as data, and as a short code to pass on."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ import base64
 import binascii
 import json
 import re
-import shlex
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lessons.course import COURSE
 from lessons.own.files import fingerprint, is_file
-from lessons.own.resolve import scene_named, with_controllers
-from lessons.scenes.catalog import prepared
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
-from lessons.scenes.scene import Scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import assignment, differences, parse_assignment
 from lessons.settings.settings import Settings
 from robots import CATALOG, InputError
@@ -41,66 +38,33 @@ class State:
     """Everything that is set, and nothing that has happened.
 
     Attributes:
-        scene: its name.
-        urdf: for the scene "hold": name of a catalog robot, or path of a URDF file.
-        tip: end-effector frame, for the scene "hold".
-        set: what differs from the scene's own settings, assignments "PATH=VALUE" in order.
-        seed: of the run.
+        run: what differs from the scene's own settings is in its assignments; it has no events and lasts as
+            long as the scene.
         lesson: name of the lesson that is being taken.
         step: its place in the lesson, 1 being the first.
-        files: Python files that may be the controller; whoever started the program named them, no code does.
     """
 
-    scene: str
-    urdf: str | None = None
-    tip: str | None = None
-    set: tuple[str, ...] = ()
-    seed: int = 0
+    run: RunSpec
     lesson: str | None = None
     step: int | None = None
-    files: tuple[str, ...] = ()
-
-    def loaded(self) -> Scene:
-        """The scene as it is without the assignments. Raises InputError for one that cannot be loaded."""
-        return with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
-
-    def prepared(self) -> Scene:
-        """The scene with every assignment. Raises InputError, one sentence, for what cannot be."""
-        return prepared(self.loaded(), None, self.set)
 
 
 def state_of(
-    scene: str,
-    settings: Settings,
-    *,
-    urdf: str | None = None,
-    tip: str | None = None,
-    seed: int = 0,
-    lesson: str | None = None,
-    step: int | None = None,
+    run: RunSpec, settings: Settings, *, lesson: str | None = None, step: int | None = None
 ) -> State:
     """The state of a scene under settings reached from its own.
+
+    Args:
+        run: scene, robot and seed.
+        settings: as they are now.
+        lesson, step: see `State`.
 
     Raises:
         InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
     """
     files = tuple(filter(is_file, settings.controllers))
-    own = with_controllers(scene_named(scene, urdf, tip), files)
-    return State(scene, urdf, tip, differences(own.settings, settings), seed, lesson, step, files)
-
-
-def command_line(state: State) -> str:
-    """The line for a shell that runs the state headless."""
-    words = ["himpc-lab", "run", state.scene]
-    words += ["--urdf", state.urdf] if state.urdf is not None else []
-    words += ["--tip", state.tip] if state.tip is not None else []
-    assignments = list(state.set)
-    if assignments and assignments[0].startswith("controller="):
-        words += ["--controller", str(parse_assignment(assignments.pop(0))[1])]
-    words += ["--seed", str(state.seed)] if state.seed else []
-    for each in assignments:
-        words += ["--set", each]
-    return shlex.join(words)
+    own = RunSpec(run.scene, run.urdf, run.tip, seed=run.seed, files=files)
+    return State(replace(own, set=differences(own.loaded().settings, settings)), lesson, step)
 
 
 # ------------------------------------------------------------------ codes
@@ -112,21 +76,20 @@ def encode(state: State) -> str:
     Raises:
         InputError: the robot comes from a file, which a code cannot carry; or it would be too long.
     """
-    if state.urdf is not None and state.urdf not in CATALOG:
+    run = state.run
+    if run.urdf is not None and run.urdf not in CATALOG:
         raise InputError(
             "a code cannot carry a robot from a file: pass on the file and the command line instead"
         )
-    if is_file(state.scene):
+    if is_file(run.scene):
         raise InputError("a code cannot carry a scene from a file: pass on file and command line")
-    given = {
-        key: value for name, key in _KEYS.items() if (value := getattr(state, name)) not in (None, (), 0)
-    }
-    given["a"] = [_carried(each) for each in state.set]
-    if not given["a"]:
-        del given["a"]
+    told = run.set if run.controller is None else (assignment("controller", run.controller), *run.set)
+    told = tuple(map(_carried, told))
+    known = {**vars(run), "set": told, "lesson": state.lesson, "step": state.step}
+    given = {short: known[name] for name, short in _KEYS.items() if known[name] not in (None, (), 0)}
     text = json.dumps(given, ensure_ascii=False, separators=(",", ":")).encode()
     code = f"hl{VERSION}-" + base64.urlsafe_b64encode(zlib.compress(text, 9)).decode().rstrip("=")
-    if len(code) > MAX_CODE or len(text) > _MAX_TEXT or not _fits(state.set):
+    if len(code) > MAX_CODE or len(text) > _MAX_TEXT or not _fits(told):
         raise InputError("this setting is too long for a code: use the command line or the script instead")
     return code
 
@@ -202,15 +165,14 @@ def _checked(given: Any) -> State:
     lesson = _text(given, "l", "lesson")
     if lesson is not None and lesson not in COURSE:
         raise unknown_name("lesson", lesson, COURSE)
-    return State(
+    run = RunSpec(
         scene,
         urdf,
         _text(given, "t", "tip"),
-        tuple(assignments),
-        _whole(given, "n", "seed", _MAX_SEED) or 0,
-        lesson,
-        _whole(given, "p", "step", 100),
+        set=tuple(assignments),
+        seed=_whole(given, "n", "seed", _MAX_SEED) or 0,
     )
+    return State(run, lesson, _whole(given, "p", "step", 100))
 
 
 def _fits(assignments: tuple[str, ...] | list[str]) -> bool:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 from lessons.parallel import Failed, Spread, on_cores
 from lessons.recording.run import run
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
-from lessons.teaching.lesson import Lesson, Run, Step
+from lessons.teaching.lesson import Lesson, Step
 from lessons.teaching.measure import Measure
 from lessons.teaching.prediction import Choice, Prediction
 
@@ -57,15 +58,15 @@ class Verdict:
     fault: str = ""
 
 
-Outcomes = Mapping[Run, Outcome]
+Outcomes = Mapping[RunSpec, Outcome]
 
 
-def measured(piece: tuple[Run, tuple[Measure, ...]]) -> Outcome:
+def measured(piece: tuple[RunSpec, tuple[Measure, ...]]) -> Outcome:
     """Runs and measures. Raises InputError for what cannot be run."""
     what, measures = piece
     recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}
-    due = sum(t < recording.duration - 1e-9 for t, _ in what.events)
+    due = sum(t < recording.duration - 1e-9 for t, _ in what.events or ())
     return Outcome(values, max(0, due - len(recording.session.log)))
 
 
@@ -86,8 +87,8 @@ def check(
     """
     wanted = _wanted(lessons)
     # Long ones first: a core is not left idle at the end.
-    pieces = sorted(wanted.items(), key=lambda item: -item[0].duration)
-    outcomes: dict[Run, Outcome] = {}
+    pieces = sorted(wanted.items(), key=lambda item: -(item[0].duration or 0.0))
+    outcomes: dict[RunSpec, Outcome] = {}
     work = [(run, tuple(measures)) for run, measures in pieces]
     for place, outcome in spread(measured, work):
         run = work[place][0]
@@ -97,11 +98,11 @@ def check(
     return [verdict for lesson in lessons for verdict in judge(lesson, outcomes)]
 
 
-def _wanted(lessons: Sequence[Lesson]) -> dict[Run, dict[Measure, None]]:
+def _wanted(lessons: Sequence[Lesson]) -> dict[RunSpec, dict[Measure, None]]:
     """All runs with what is to be measured in them."""
-    wanted: dict[Run, dict[Measure, None]] = {}
+    wanted: dict[RunSpec, dict[Measure, None]] = {}
 
-    def want(run: Run, measures: Sequence[Measure]) -> None:
+    def want(run: RunSpec, measures: Sequence[Measure]) -> None:
         wanted.setdefault(run, {}).update(dict.fromkeys(measure.alone for measure in measures))
 
     for lesson in lessons:
@@ -151,7 +152,7 @@ def _script(lesson: str, where: str, outcome: Outcome) -> Verdict | None:
     return None
 
 
-def _value(measure: Measure, run: Run, step: Step, lesson: Lesson, outcomes: Outcomes) -> float:
+def _value(measure: Measure, run: RunSpec, step: Step, lesson: Lesson, outcomes: Outcomes) -> float:
     own = outcomes[run].values.get(measure.alone, math.nan)
     if not measure.over_ghost or step.ghost is None:
         return own

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from inspect import cleandoc
 
-from lessons.own.resolve import scene_named
-from lessons.scenes.catalog import prepared
-from lessons.scenes.scene import Scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control, Script
@@ -51,34 +49,6 @@ def card_of(docstring: str | None) -> Card:
             f"'Minutes: …' and 'You need: …'; this one is {docstring!r}"
         )
     return Card(found["title"], found["question"], int(found["minutes"]), " ".join(found["needs"].split()))
-
-
-@dataclass(frozen=True)
-class Run:
-    """A run as data: hashable, and sent to another process as it is.
-
-    Attributes:
-        scene: name of a scene.
-        set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
-        events: (time in s, event) in order.
-        duration: s.
-        urdf: the robot of the scene "hold".
-    """
-
-    scene: str
-    set: tuple[str, ...] = ()
-    events: Script = ()
-    duration: float = 2.0
-    urdf: str | None = None
-
-    def prepared(self) -> Scene:
-        """The scene with everything in place. Raises InputError for what cannot be."""
-        scene = prepared(scene_named(self.scene, self.urdf), None, self.set)
-        return replace(scene, events=self.events, duration=self.duration)
-
-    def but(self, *assignments: str) -> Run:
-        """The same run with further assignments."""
-        return replace(self, set=(*self.set, *assignments))
 
 
 @dataclass(frozen=True)
@@ -163,6 +133,12 @@ class Lesson:
     challenge: Challenge | None = None
     urdf: str | None = None
 
-    def run_of(self, step: Step | Challenge) -> Run:
+    def run_of(self, step: Step | Challenge) -> RunSpec:
         """What a step, or the start of the challenge, runs."""
-        return Run(self.scene, (*self.set, *step.set), step.events, step.duration, self.urdf)
+        return RunSpec(
+            self.scene,
+            self.urdf,
+            set=(*self.set, *step.set),
+            events=step.events,
+            duration=step.duration,
+        )

@@ -20,6 +20,7 @@ from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
 from lessons.replay.state import State, decode, encode, state_of
 from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.check import measured
 from lessons.teaching.control import chosen
@@ -185,7 +186,7 @@ def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
     assert challenge is not None
     run = lesson.run_of(challenge)
     solved = prepared(load_scene(run.scene, run.urdf), None, (*run.set, *challenge.solutions[0]))
-    code = encode(state_of(run.scene, solved.settings, urdf=run.urdf, seed=3, lesson="deadlines", step=last))
+    code = encode(state_of(replace(run, seed=3), solved.settings, lesson="deadlines", step=last))
     choice = SceneChoice.of_state(decode(code))
     assert choice.exercise == Exercise("deadlines", last - 1) and choice.seed == 3
     body = Body(choice)
@@ -205,8 +206,8 @@ def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
 @pytest.mark.parametrize(
     ("state", "says"),
     [
-        (State("planar3-circle", lesson="deadlines", step=99), "no step 99: choose one from 1 to"),
-        (State("iiwa14-hold", lesson="first-hold-then-reach", step=1), "another scene"),
+        (State(RunSpec("planar3-circle"), lesson="deadlines", step=99), "no step 99: choose one from 1 to"),
+        (State(RunSpec("iiwa14-hold"), lesson="first-hold-then-reach", step=1), "another scene"),
     ],
 )
 def test_a_code_of_a_step_that_is_not_there_is_refused(state: State, says: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from app.worker.simulation import Body
 from browsing.wire import Wire, eventually
 from lessons.events import Reset, Set
 from lessons.replay.script import script
-from lessons.replay.state import State, decode, encode, state_of
+from lessons.replay.state import decode, encode, state_of
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 HOLDS = "def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n"
@@ -126,13 +128,13 @@ def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(body:
 
 def test_own_code_is_known_by_its_content(body: Body, file: Path) -> None:
     """A code names the file and what is in it; it opens for whoever started with the same one."""
-    state = state_of("planar3-hold", body.session.settings_now)
+    state = state_of(RunSpec("planar3-hold"), body.session.settings_now)
     code = encode(state)
     with pytest.raises(InputError, match=r"add --controller mine\.py"):
-        decode(code).prepared()
-    found = State(**{**vars(decode(code)), "files": (str(file),)})
+        decode(code).run.prepared()
+    found = replace(decode(code).run, files=(str(file),))
     assert found.prepared().settings.controller == str(file)
-    text = script(State("planar3-hold", set=state.set, files=state.files), (), 0.1)
+    text = script(state.run, (), 0.1)
     assert f"CONTROLLER = {str(file)!r}" in text
     file.write_text(HOLDS + "# changed\n")
     with pytest.raises(InputError, match="its content is another"):

@@ -29,7 +29,7 @@ def test_a_code_brings_the_setting_back_and_a_script_repeats_the_run(page: Page,
     line, code = (row(page, label).locator("textarea") for label in ("Command line", "Code"))
     expect(line).to_have_value(f"himpc-lab run iiwa14-hold --set horizon={before + 2}")
     given = code.input_value()
-    assert decode(given).set == (f"horizon={before + 2}",)
+    assert decode(given).run.set == (f"horizon={before + 2}",)
 
     with page.expect_download() as download:
         press(page, "Script as .py")

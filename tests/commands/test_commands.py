@@ -15,7 +15,8 @@ import pytest
 
 from app.__main__ import main
 from lessons.experiments.jobs import TIMING_KEYS
-from lessons.replay.state import State, command_line, encode
+from lessons.replay.state import State, encode
+from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG
 
 ROOT = Path(__file__).parents[2]
@@ -228,9 +229,9 @@ def test_the_example_of_the_readme_runs() -> None:
 
 def test_a_state_code_runs_like_its_command_line(capfd: pytest.CaptureFixture[str]) -> None:
     """`run --state CODE` is the run that the code's command line names; more options go on top."""
-    state = State("planar3-hold", set=("controller=tdeosf", "plant.payload_kg=0.4"), seed=2)
+    state = State(RunSpec("planar3-hold", set=("controller=tdeosf", "plant.payload_kg=0.4"), seed=2))
     results = []
-    for given in (["run", "--state", encode(state)], shlex.split(command_line(state))[1:]):
+    for given in (["run", "--state", encode(state)], shlex.split(state.run.command_line())[1:]):
         assert main([*given, "--set", "T_s=0.002", "--duration", "0.05", "--json", "-"]) == 0
         result: dict[str, Any] = json.loads(capfd.readouterr().out)
         results.append({key: value for key, value in result.items() if key not in TIMING_KEYS})

@@ -7,9 +7,11 @@ from functools import cache
 
 import pytest
 
+from docs.settings import FILE, text
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.names import ALL_SCENES
 from lessons.settings.assignments import parse_assignment
+from lessons.settings.listing import lines
 from lessons.settings.presets import usual_settings
 from lessons.settings.settings import Settings
 from lessons.settings.torque_entries import TORQUE_ENTRIES
@@ -98,3 +100,15 @@ def test_a_level_is_read_by_its_name_wherever_it_stands() -> None:
     names = settings.value_at("order")
     turned = settings.changed("levels.position.Q", 7.0).changed("order", list(reversed(names)))
     assert read(turned) == 7.0 == turned.value_at("levels.position.Q")
+
+
+def test_the_reference_is_what_the_tables_say() -> None:
+    assert FILE.read_text() == text(), "python -m docs.settings writes it anew"
+
+
+def test_a_scene_lists_its_settings_with_what_is_allowed() -> None:
+    found = {line.path: line for line in lines(settings_of("planar3-hold"))}
+    assert found["horizon"].allowed == "a whole number from 1 to 60" and found["horizon"].now == "5"
+    assert found["plant.payload_kg"].unit == "kg" and "levels.1.Q" not in found
+    for path, line in found.items():
+        settings_of("planar3-hold").changed(*parse_assignment(f"{path}={line.now}"))

@@ -14,8 +14,8 @@ import pytest
 
 from lessons.events import Appear, Event, InsertTask, MoveLevel, MoveTarget, Push, Release, Reset, Set
 from lessons.replay.script import script
-from lessons.replay.state import State
 from lessons.scenes.catalog import prepared
+from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.torque import TorqueSession
@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 Events = Sequence[tuple[float, Event]]
 
 
-def live(state: State, events: Events, seconds: float) -> tuple[Any, dict[str, np.ndarray]]:
+def live(state: RunSpec, events: Events, seconds: float) -> tuple[Any, dict[str, np.ndarray]]:
     """A session driven as the page drives one: by its mailbox. Returns it and its rows since the reset."""
     scene = state.prepared()
     session: Any
@@ -109,13 +109,13 @@ MOBILE: Events = (
 @pytest.mark.parametrize(
     ("state", "events", "seconds"),
     [
-        (State("planar3-hold", set=("M_bar_scale=1.1",)), TORQUE, 0.5),
-        (State("ridgeback-ur10-drag", set=("plant.mode=servo",), seed=3), MOBILE, 4.0),
+        (RunSpec("planar3-hold", set=("M_bar_scale=1.1",)), TORQUE, 0.5),
+        (RunSpec("ridgeback-ur10-drag", set=("plant.mode=servo",), seed=3), MOBILE, 4.0),
     ],
     ids=["torque", "mobile"],
 )
 def test_a_script_repeats_the_run_to_the_last_bit(
-    state: State, events: Events, seconds: float, tmp_path: Path
+    state: RunSpec, events: Events, seconds: float, tmp_path: Path
 ) -> None:
     """Drags, pushes, level moves, settings and a reset on the way; the rows since the reset are equal."""
     session, rows = live(state, events, seconds)
@@ -132,7 +132,7 @@ def test_a_script_repeats_the_run_to_the_last_bit(
 
 def test_a_script_is_short_and_reads_like_one(tmp_path: Path) -> None:
     """An untouched run is thirty lines; a setting or a drag adds one each."""
-    state = State("planar3-hold", set=("horizon=7",))
+    state = RunSpec("planar3-hold", set=("horizon=7",))
     plain = script(state, (), 0.5)
     assert len(plain.splitlines()) <= 30
     assert "SETTINGS = (\n    'horizon=7',\n)" in plain
@@ -152,7 +152,7 @@ def test_settings_before_a_reset_become_settings_of_the_script() -> None:
         (0.0, Reset()),
         (0.1, Set("horizon", 3)),
     ]
-    text = script(State("planar3-hold"), log, 0.2)
+    text = script(RunSpec("planar3-hold"), log, 0.2)
     settings = text[text.index("SETTINGS") : text.index("EVENTS")]
     assert settings.count("'") == 4
     assert "'horizon=8'" in settings
@@ -164,12 +164,12 @@ def test_settings_before_a_reset_become_settings_of_the_script() -> None:
 
 def test_a_script_of_measured_deadlines_says_that_it_cannot_repeat() -> None:
     measured = [(0.1, Set("solve_ms_per_knot", 0.0)), (0.2, Set("deadline_ms", 1.0))]
-    assert "Measured computing times" in script(State("planar3-hold"), measured, 0.5)
-    assert "Measured computing times" not in script(State("planar3-hold"), measured[:1], 0.5)
+    assert "Measured computing times" in script(RunSpec("planar3-hold"), measured, 0.5)
+    assert "Measured computing times" not in script(RunSpec("planar3-hold"), measured[:1], 0.5)
 
 
 def test_a_robot_from_a_file_and_its_tip_are_named(tmp_path: Path) -> None:
-    state = State("hold", urdf="planar3", tip="link_2")
+    state = RunSpec("hold", urdf="planar3", tip="link_2")
     assert "load_scene('hold', 'planar3', 'link_2')" in script(state, (), 0.1)
     assert prepared(state.loaded(), None, ()).robot.tip == "link_2"
 

@@ -24,6 +24,7 @@ from lessons.papers.item import Check, Item, Row, Section, Table, at_least, at_m
 from lessons.papers.printed import printed
 from lessons.papers.reproduce import Report, as_data, reproduce, write
 from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 QUICK = (False, True)
@@ -37,7 +38,7 @@ def failed(jobs: Iterable[Job]) -> Results:
 @pytest.fixture(scope="module")
 def short() -> dict[str, Run]:
     """A second and a bit of RT1 for two controllers."""
-    jobs = {name: Job("planar3-circle", name, duration=1.2) for name in ("himpc", "osf")}
+    jobs = {name: Job(RunSpec("planar3-circle", controller=name, duration=1.2)) for name in ("himpc", "osf")}
     found = perform_all(jobs.values())
     return {name: found[job] for name, job in jobs.items()}
 
@@ -57,9 +58,9 @@ def test_the_papers_tables_and_figures_are_there() -> None:
 def test_every_job_can_be_set_up(name: str, quick: bool) -> None:
     """Scene, controller and every assignment exist, so that no item fails for a typo."""
     for job in ITEMS[name].jobs(quick):
-        scene = job.prepared()
-        assert scene.settings.controller == job.controller
-        assert {text.partition("=")[0] for text in job.set} <= set(scene.settings.paths())
+        scene = job.spec.prepared()
+        assert scene.settings.controller == job.spec.controller
+        assert {text.partition("=")[0] for text in job.spec.set} <= set(scene.settings.paths())
 
 
 @pytest.mark.parametrize("quick", QUICK)
@@ -81,7 +82,7 @@ def test_quick_runs_are_no_longer_than_the_others(name: str) -> None:
     """--quick is never more work."""
 
     def seconds(quick: bool) -> float:
-        return sum(job.duration or job.prepared().duration for job in set(ITEMS[name].jobs(quick)))
+        return sum(job.spec.duration or job.spec.prepared().duration for job in set(ITEMS[name].jobs(quick)))
 
     assert seconds(True) <= seconds(False)
 
@@ -173,7 +174,7 @@ def test_jobs_run_anywhere_give_the_same_numbers(short: dict[str, Run]) -> None:
 
 
 def test_a_job_that_cannot_be_done_is_a_run_with_a_sentence() -> None:
-    job = Job("planar3-circle", "himcp", duration=0.01)
+    job = Job(RunSpec("planar3-circle", controller="himcp", duration=0.01))
     run = perform_all([job])[job]
     assert run.error is not None
     assert "himpc" in run.error
@@ -194,15 +195,15 @@ def test_an_exact_nominal_model_has_no_error() -> None:
         f"nominal.{key}" for key in ("mass_scale=1", "inertia_scale=1", "armature=[0.05,0.05,0.03]")
     )
     bare = ("plant.friction=0", "plant.damping=0")
-    job = Job("planar3-circle", set=(*exact, *bare), duration=1.2)
-    wrong = Job("planar3-circle", set=bare, duration=1.2)
+    job = Job(RunSpec("planar3-circle", controller="himpc", set=(*exact, *bare), duration=1.2))
+    wrong = Job(RunSpec("planar3-circle", controller="himpc", set=bare, duration=1.2))
     found = perform_all([job, wrong])
     # What is left is the change of M and C within a tick.
     assert model_errors(found[job]).gamma < 0.01 * model_errors(found[wrong]).gamma
 
 
 def test_smoothness_is_the_rms_distance() -> None:
-    job = Job("planar3-circle")
+    job = Job(RunSpec("planar3-circle", controller="himpc"))
     one = Run(job, {}, {"t": np.zeros((4, 1)), "tau": np.zeros((4, 2))})
     other = Run(job, {}, {"t": np.zeros((3, 1)), "tau": np.array([[3.0, 4.0]] * 3)})
     assert smoothness(other, one) == 5.0
@@ -221,7 +222,10 @@ def test_the_decrease_of_the_value_function_is_measured() -> None:
 
 def test_weighing_the_torque_costs_accuracy_where_gravity_pulls() -> None:
     """Section IV-C: at rest ‖Δτ‖² has no bias whatever the weight, ‖τ‖² has, and the more the larger R."""
-    still = EffortJob("iiwa14-circle", duration=1.2, hold_deg=(0.0, 90.0, 0.0, 10.0, 0.0, 10.0, 0.0))
+    still = EffortJob(
+        RunSpec("iiwa14-circle", controller="himpc", duration=1.2),
+        hold_deg=(0.0, 90.0, 0.0, 10.0, 0.0, 10.0, 0.0),
+    )
     assert still.do().error_of("position") < 1e-9
     errors = [replace(still, effort="torque", R=R).do().error_of("position") for R in (1e-4, 1e-2)]
     assert 1e-6 < errors[0] < 0.1 * errors[1]
@@ -279,7 +283,7 @@ def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
 
 def test_items_share_their_runs(short: dict[str, Run]) -> None:
     """Two items that need the same job get the same run."""
-    job = replace(short["himpc"].job, duration=0.01)
+    job = Job(replace(short["himpc"].job.spec, duration=0.01))
     seen: list[Run] = []
 
     def report(results: Results, quick: bool) -> Section:

@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 from himpc.tasks import FramePosition
 from lessons.events import Appear, Event, MoveLevel, Set
 from lessons.recording.run import run
-from lessons.replay.state import MAX_CODE, State, command_line, decode, encode, state_of
+from lessons.replay.state import MAX_CODE, State, decode, encode, state_of
 from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.scenes.velocity_scene import VelocityScene
@@ -80,10 +81,12 @@ def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
         except InputError:
             continue
     seed = data.draw(st.integers(0, 2**40))
-    state = State(name, set=differences(scene.settings, reached), seed=seed, lesson="two-tasks", step=2)
+    state = State(
+        RunSpec(name, set=differences(scene.settings, reached), seed=seed), lesson="two-tasks", step=2
+    )
     assert decode(encode(state)) == state
-    assert prepared(scene, None, decode(encode(state)).set).settings == reached
-    words = shlex.split(command_line(state))
+    assert prepared(scene, None, decode(encode(state)).run.set).settings == reached
+    words = shlex.split(state.run.command_line())
     assert words[:3] == ["himpc-lab", "run", name]
     told = [after for before, after in pairwise(words) if before == "--set"]
     controller = words[words.index("--controller") + 1] if "--controller" in words else None
@@ -92,11 +95,13 @@ def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
 
 def test_a_code_says_only_what_differs() -> None:
     """The scene as it is gives a code of a few signs; a controller's own rate is not told."""
-    plain = state_of("iiwa14-hold", find("iiwa14-hold").settings)
-    assert plain.set == ()
+    plain = state_of(RunSpec("iiwa14-hold"), find("iiwa14-hold").settings)
+    assert plain.run.set == ()
     assert len(encode(plain)) < 50
     scene = find("ridgeback-ur10-square")
-    assert state_of(scene.name, scene.settings.changed("controller", "htidkc")).set == ("controller=htidkc",)
+    assert state_of(RunSpec(scene.name), scene.settings.changed("controller", "htidkc")).run.set == (
+        "controller=htidkc",
+    )
 
 
 @pytest.mark.parametrize(
@@ -114,15 +119,15 @@ def test_a_code_says_only_what_differs() -> None:
 )
 def test_a_run_from_a_code_is_equal_to_the_last_bit(name: str, changes: tuple[str, ...]) -> None:
     scene = prepared(find(name), None, changes)
-    state = state_of(name, scene.settings, seed=5)
+    state = state_of(RunSpec(name, seed=5), scene.settings)
     again = decode(encode(state))
-    recording, repeated = run(scene, 0.4, 5), run(again.prepared(), 0.4, again.seed)
+    recording, repeated = run(scene, 0.4, 5), run(again.run.prepared(), 0.4, again.run.seed)
     for field in ("t", "q", "v", "tau"):
         np.testing.assert_array_equal(recording[field], repeated[field])
     assert np.abs(np.diff(recording["q"], axis=0)).max() > 0
 
 
-GOOD = encode(State("planar3-hold", set=("horizon=7", "levels.position.Q=150.5")))
+GOOD = encode(State(RunSpec("planar3-hold", set=("horizon=7", "levels.position.Q=150.5"))))
 
 
 def test_a_code_that_was_cut_or_changed_never_becomes_another_state() -> None:
@@ -206,7 +211,7 @@ def test_bad_codes_are_refused_in_one_sentence(case: str) -> None:
 def test_settings_of_a_stranger_are_refused_when_prepared(assignment: str) -> None:
     """They are names and numbers that go the way of --set: one sentence, whatever they are."""
     with pytest.raises(InputError) as caught:
-        decode(packed({"s": "planar3-hold", "a": [assignment]})).prepared()
+        decode(packed({"s": "planar3-hold", "a": [assignment]})).run.prepared()
     assert "\n" not in str(caught.value)
 
 
@@ -222,7 +227,7 @@ def test_settings_of_a_stranger_are_refused_when_prepared(assignment: str) -> No
 )
 def test_a_mission_of_a_stranger_cannot_fill_the_memory(assignment: str) -> None:
     with pytest.raises(InputError):
-        decode(packed({"s": "ridgeback-ur10-delivery", "a": [assignment]})).prepared()
+        decode(packed({"s": "ridgeback-ur10-delivery", "a": [assignment]})).run.prepared()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,21 +237,23 @@ class OwnKind(FramePosition):
 
 def test_what_a_code_cannot_carry_is_said() -> None:
     with pytest.raises(InputError, match="from a file"):
-        encode(State("hold", urdf="/home/me/arm.urdf"))
+        encode(State(RunSpec("hold", urdf="/home/me/arm.urdf")))
     with pytest.raises(InputError, match="too long"):
-        encode(State("planar3-hold", set=tuple(f"M_bar.1={k}" for k in range(501))))
+        encode(State(RunSpec("planar3-hold", set=tuple(f"M_bar.1={k}" for k in range(501)))))
     hold = find("planar3-hold")
     assert isinstance(hold, TorqueScene)
     first, *others = hold.settings.levels
     own = replace(first, tasks=(OwnKind(name="position"),))
     other = replace(hold.settings, levels=(own, *others))
     with pytest.raises(InputError, match="cannot be told"):
-        state_of("planar3-hold", other)
+        state_of(RunSpec("planar3-hold"), other)
 
 
 def test_the_command_line_is_quoted_for_a_shell() -> None:
-    state = State("hold", urdf="my robot.urdf", tip="tool", set=("controller=hqp", "Q=[1,2,3]"), seed=3)
-    assert command_line(state) == (
+    state = State(
+        RunSpec("hold", urdf="my robot.urdf", tip="tool", set=("controller=hqp", "Q=[1,2,3]"), seed=3)
+    )
+    assert state.run.command_line() == (
         "himpc-lab run hold --urdf 'my robot.urdf' --tip tool --controller hqp --seed 3 --set 'Q=[1,2,3]'"
     )
 
@@ -260,9 +267,9 @@ def test_priorities_of_now_are_part_of_a_state() -> None:
     assert session.settings_now == scene.settings
     session.post(MoveLevel("base", 0))
     session.tick()
-    state = state_of(scene.name, session.settings_now)
-    assert state.set == ("order=base,ee",)
-    again = VelocitySession(prepared(scene, None, decode(encode(state)).set))  # pyright: ignore[reportArgumentType]
+    state = state_of(RunSpec(scene.name), session.settings_now)
+    assert state.run.set == ("order=base,ee",)
+    again = VelocitySession(prepared(scene, None, decode(encode(state)).run.set))  # pyright: ignore[reportArgumentType]
     again.tick()
     assert [active.task.role for active in again.progress.window] == ["base", "ee"]
     assert again.settings_now == again.settings
@@ -272,6 +279,6 @@ def test_priorities_of_now_are_part_of_a_state() -> None:
 
 def test_a_code_of_before_may_name_a_route_that_is_gone() -> None:
     """What was structured is compiled now; the torques are the same."""
-    state = decode(encode(State("planar3-hold", set=("route=structured",))))
-    found = state.prepared().settings
+    state = decode(encode(State(RunSpec("planar3-hold", set=("route=structured",)))))
+    found = state.run.prepared().settings
     assert isinstance(found, TorqueSettings) and found.route == "compiled"

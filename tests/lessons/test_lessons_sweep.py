@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lessons.experiments.jobs import Job
 from lessons.experiments.sweep import (
     Cell,
     best_cell,
@@ -26,9 +25,10 @@ from lessons.experiments.sweep import (
 )
 from lessons.parallel import Failed, cores, on_cluster, on_cores, one_by_one
 from lessons.plots.heat import draw_map
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
-SHORT = Job("planar3-circle", duration=0.02)
+SHORT = RunSpec("planar3-circle", duration=0.02)
 OVER = ("M_bar_scale=0.5:2:2", "horizon=1:3:3")
 
 
@@ -77,9 +77,9 @@ def test_a_wrong_range_is_one_sentence(over: tuple[str, ...], says: str) -> None
 
 def test_cells_run_what_their_place_says() -> None:
     """The last axis runs fastest, and each cell's job carries its values on top of the base."""
-    sweep = make_sweep(Job("planar3-circle", set=("Q=100",)), OVER)
+    sweep = make_sweep(RunSpec("planar3-circle", set=("Q=100",)), OVER)
     assert sweep.points == [(m, n) for m in (0.5, 2.0) for n in (1, 2, 3)]
-    assert sweep.job(4).set == ("Q=100", "M_bar_scale=2.0", "horizon=2")
+    assert sweep.run(4).set == ("Q=100", "M_bar_scale=2.0", "horizon=2")
 
 
 class Stop(Exception):
@@ -140,7 +140,7 @@ def test_another_sweep_in_the_same_folder_is_refused(tmp_path: Path) -> None:
     held = (tmp_path / "cells.jsonl").read_bytes()
     for other in (
         make_sweep(SHORT, ("M_bar_scale=1:3:2",)),
-        make_sweep(Job("planar3-circle", "hiqp", duration=0.02), ("M_bar_scale=1:2:2",)),
+        make_sweep(RunSpec("planar3-circle", controller="hiqp", duration=0.02), ("M_bar_scale=1:2:2",)),
     ):
         with pytest.raises(InputError, match=r"another sweep \((over|controller) differ"):
             carry_on(other, tmp_path, one_by_one)
@@ -193,7 +193,7 @@ def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
 def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
     """M̄ far too large loses control, a failing run says why; both are in the file, neither has a value."""
     unbounded = ("plant.saturate=false", "limits.torque=false", "limits.velocity=false")
-    sweep = make_sweep(Job("planar3-circle", set=unbounded, duration=0.3), ("M_bar_scale=1:200:2",))
+    sweep = make_sweep(RunSpec("planar3-circle", set=unbounded, duration=0.3), ("M_bar_scale=1:200:2",))
 
     def one_failing(
         function: Callable[[Any], Any], items: Sequence[Any]
@@ -215,7 +215,7 @@ def test_metrics_are_the_numbers_of_a_run() -> None:
     """Level 1 is the default; coordinates are combined; unknown ones name the nearest."""
     names = metrics(make_sweep(SHORT, OVER))
     assert names[0] == "tasks.position.rmse"
-    assert metrics(make_sweep(Job("planar3-circle"), OVER))[0] == "tasks.position.rmse_after_1s"
+    assert metrics(make_sweep(RunSpec("planar3-circle"), OVER))[0] == "tasks.position.rmse_after_1s"
     assert {"limits.torque.max_ratio", "average_cost.2", "solver.unsolved"} <= set(names)
     with pytest.raises(InputError, match=r"limits\.torque\.max_ratio"):
         check_metric("limits.torqe.max_ratio", names)

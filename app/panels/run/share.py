@@ -11,7 +11,7 @@ from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import Told
 from lessons.replay.script import script
-from lessons.replay.state import State, command_line, decode, encode, state_of
+from lessons.replay.state import decode, encode, state_of
 from robots import InputError
 
 
@@ -61,15 +61,12 @@ class SharePanel:
         choice = _from_a_name(told.choice)
         exercise = choice.exercise
         state = state_of(
-            choice.name,
+            choice.run,
             told.settings,
-            urdf=choice.urdf,
-            tip=choice.tip,
-            seed=choice.seed,
             lesson=None if exercise is None else exercise.lesson,
             step=None if exercise is None else exercise.place + 1,
         )
-        self._line.value = command_line(state)
+        self._line.value = state.run.command_line()
         self._line.visible = True
         self._code.visible = False
         self._code.value = encode(state)
@@ -77,8 +74,7 @@ class SharePanel:
 
     def _save(self, client: viser.ClientHandle, told: Told) -> None:
         choice = _from_a_name(told.choice)
-        start = State(choice.name, choice.urdf, choice.tip, choice.set, choice.seed, files=choice.controllers)
-        text = script(start, told.log, told.t)
+        text = script(choice.run, told.log, told.t)
         client.send_file_download(f"{choice.name}.py", text.encode(), save_immediately=True)
 
 

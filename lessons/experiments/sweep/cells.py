@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lessons.experiments.jobs import TIMING_KEYS, Job
+from lessons.experiments.jobs import TIMING_KEYS
 from lessons.experiments.sweep.grid import Sweep
 from lessons.recording.run import run
 from lessons.recording.summary import summary
+from lessons.scenes.run_spec import RunSpec
 from robots.errors import unknown_name
 
 
@@ -44,8 +45,7 @@ def metrics(sweep: Sweep) -> list[str]:
     recording = run(scene, scene.settings.T_s, sweep.base.seed)
     found = dict(_numbers(_without_timing(summary(recording))))
     names = [name for name in found if not name.endswith(_NO_METRIC)]
-    seconds = scene.duration if sweep.base.duration is None else sweep.base.duration
-    measure = "rmse_after_1s" if seconds > 1.0 else "rmse"
+    measure = "rmse_after_1s" if scene.duration > 1.0 else "rmse"
     first = min(summary(recording)["tasks"], key=lambda task: task["level"])["name"]
     default = f"tasks.{first}.{measure}"
     return [default, *(name for name in names if name != default)]
@@ -83,9 +83,9 @@ def _without_timing(data: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in data.items() if key not in TIMING_KEYS}
 
 
-def perform_cell(job: Job) -> dict[str, Any]:
+def perform_cell(spec: RunSpec) -> dict[str, Any]:
     """The summary of a run, without its timing. Raises InputError for what cannot be."""
-    return _without_timing(summary(run(job.prepared(), job.duration, job.seed)))
+    return _without_timing(summary(run(spec.prepared(), None, spec.seed)))
 
 
 def best_cell(cells: Sequence[Cell], metric: str) -> Cell | None:

@@ -72,7 +72,7 @@ def carry_on(
     missing = [index for index in range(total) if index not in cells]
     if progress is not None:
         progress(len(cells), total)
-    work = spread(perform_cell, [sweep.job(index) for index in missing])
+    work = spread(perform_cell, [sweep.run(index) for index in missing])
     with (folder / "cells.jsonl").open("a") as file, closing(work) as outcomes:
         for place, outcome in outcomes:
             if isinstance(outcome, Failed):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from lessons.experiments.jobs import Job
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.settings import Settings
 from lessons.settings.values import WHOLE
 from robots import InputError
@@ -32,9 +32,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is swept: every combination of the axes' values on top of a job."""
+    """What is swept: every combination of the axes' values on top of a run."""
 
-    base: Job
+    base: RunSpec
     axes: tuple[Axis, ...]
 
     @cached_property
@@ -42,17 +42,17 @@ class Sweep:
         """Values per axis of every cell, the last axis running fastest."""
         return list(itertools.product(*(axis.values for axis in self.axes)))
 
-    def job(self, cell: int) -> Job:
+    def run(self, cell: int) -> RunSpec:
         """The run of a cell."""
         at = zip(self.axes, self.points[cell], strict=True)
-        return replace(self.base, set=(*self.base.set, *(f"{axis.path}={value!r}" for axis, value in at)))
+        return self.base.but(*(f"{axis.path}={value!r}" for axis, value in at))
 
     def as_data(self) -> dict[str, Any]:
         """As JSON-ready data; two sweeps with equal data have equal cells."""
         base = self.base
         return {
             "scene": base.scene,
-            "controller": base.controller,
+            "controller": base.controller or base.prepared().settings.controller,
             "set": list(base.set),
             "duration": base.duration,
             "seed": base.seed,
@@ -60,7 +60,7 @@ class Sweep:
         }
 
 
-def make_sweep(base: Job, over: Sequence[str]) -> Sweep:
+def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
     """A sweep from "PATH=lo:hi:n" texts.
 
     Values go in equal steps, or in equal ratios if hi ≥ 10 lo > 0 and fractions are allowed there;

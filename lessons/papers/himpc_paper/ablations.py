@@ -17,6 +17,7 @@ from lessons.papers.item import Check, Item, Row, Section, Table
 from lessons.papers.printed import printed
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
+from lessons.scenes.run_spec import RunSpec
 
 _FAINTEST = 1e-3
 """mm: errors below are drawn here, since a logarithmic axis has no zero."""
@@ -43,7 +44,10 @@ _SHORTER = {False: (20, 10, 5, 2, 1), True: (20, 5, 1)}
 
 def _shorter(knots: int, timed: bool) -> Job:
     extra = () if knots == _N else tuple(f"levels.{level}.horizon={knots}" for level in (2, 3))
-    return Job(RT4, set=(f"horizon={_N}", *extra), duration=0.3 if timed else 2.5, timed=timed)
+    return Job(
+        RunSpec(RT4, controller="himpc", set=(f"horizon={_N}", *extra), duration=0.3 if timed else 2.5),
+        timed=timed,
+    )
 
 
 def _remark_8(results: Results, quick: bool) -> Section:
@@ -86,11 +90,11 @@ _SCENES = {False: (RT1, RT4_DATA_SHEET), True: (RT1,)}
 
 
 def _period_job(scene: str, ms: float) -> Job:
-    return Job(scene, set=() if ms == 1.0 else (f"T_s={ms * 1e-3:g}",))
+    return Job(RunSpec(scene, controller="himpc", set=() if ms == 1.0 else (f"T_s={ms * 1e-3:g}",)))
 
 
 def _lag_job(scene: str, ms: float) -> Job:
-    return Job(scene, set=() if ms == 0.0 else (f"plant.torque_lag_ms={ms:g}",))
+    return Job(RunSpec(scene, controller="himpc", set=() if ms == 0.0 else (f"plant.torque_lag_ms={ms:g}",)))
 
 
 def _over(
@@ -162,7 +166,10 @@ _FINE = 1.0
 
 def _effort_job(effort: str, R: float, reference: str) -> EffortJob:
     return EffortJob(
-        RT4_DATA_SHEET, duration=2.0, effort=_EFFORTS[effort], R=R, hold_deg=_REFERENCES[reference]
+        RunSpec(RT4_DATA_SHEET, controller="himpc", duration=2.0),
+        effort=_EFFORTS[effort],
+        R=R,
+        hold_deg=_REFERENCES[reference],
     )
 
 

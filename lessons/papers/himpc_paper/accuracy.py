@@ -15,6 +15,7 @@ from lessons.papers.item import Item, Section, Table, between
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
 from lessons.scenes.catalog import prepared, torque_scene
+from lessons.scenes.run_spec import RunSpec
 from robots import NominalModel
 
 Array = NDArray[np.float64]
@@ -23,17 +24,19 @@ PERIODS = (0.5, 1.0, 2.0, 4.0)
 """Sampling periods T_s, ms."""
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Factors on M̄."""
-_RT4 = Job("iiwa14-circle", set=("nominal.mass_scale=0.8", "nominal.inertia_scale=0.8"))
+_RT4 = Job(
+    RunSpec("iiwa14-circle", controller="himpc", set=("nominal.mass_scale=0.8", "nominal.inertia_scale=0.8"))
+)
 _EVERY = 4
 """Ticks from one evaluated tick to the next: neighbours say the same."""
 
 
 def _at_period(ms: float) -> Job:
-    return Job(RT1, set=() if ms == 1.0 else (f"T_s={ms * 1e-3:g}",))
+    return Job(RunSpec(RT1, controller="himpc", set=() if ms == 1.0 else (f"T_s={ms * 1e-3:g}",)))
 
 
 def _at_scale(scale: float) -> Job:
-    return Job(RT1, set=() if scale == 1.0 else (f"M_bar_scale={scale:g}",))
+    return Job(RunSpec(RT1, controller="himpc", set=() if scale == 1.0 else (f"M_bar_scale={scale:g}",)))
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ def model_errors(run: Run) -> ModelErrors:
     """
     if not run.completed:
         return ModelErrors(math.nan, math.nan, math.nan, math.nan)
-    scene = prepared(torque_scene(run.job.scene), run.job.controller, run.job.set)
+    scene = prepared(torque_scene(run.job.spec.scene), run.controller, run.job.spec.set)
     settings, robot = scene.settings, scene.robot
     M_bar = np.array(settings.M_bar) * settings.M_bar_scale
     nominal = NominalModel(robot, settings.nominal)

@@ -42,7 +42,7 @@ class EffortJob(Job):
 
     def do(self) -> Run:
         """The run; see `Job.do`."""
-        scene = prepared(torque_scene(self.scene), self.controller, self.set)
+        scene = prepared(torque_scene(self.spec.scene), self.spec.controller, self.spec.set)
         robot, T_s = scene.robot, scene.settings.T_s
         form = stack_form(robot, scene.settings.levels, replace(scene.settings.for_controller(), horizon=1))
         gain = np.concatenate([level.C[0, :, 0] for level in form.levels])
@@ -54,7 +54,7 @@ class EffortJob(Job):
         references = scene.references(robot, scene.settings.levels)
         start = Configuration(robot, data, q_0, np.zeros(robot.n))
         values = {task.name: task.value(start) for task in form.tasks}
-        ticks = round((scene.duration if self.duration is None else self.duration) / T_s)
+        ticks = round((scene.duration if self.spec.duration is None else self.spec.duration) / T_s)
         errors: list[Array] = []
         before = np.zeros(sum(form.sizes))
         for k in range(ticks):
@@ -81,7 +81,7 @@ class EffortJob(Job):
     def words(self) -> str:
         """The run in words: no command does it alone."""
         what = "still" if self.hold_deg else "moving"
-        return f"{self.scene}, {what}, R = {self.R:g} on the {self.effort}"
+        return f"{self.spec.scene}, {what}, R = {self.R:g} on the {self.effort}"
 
 
 def _residual(

@@ -118,11 +118,11 @@ def _fig_8(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(("himpc", "tdeosf", "hiqp")))
     costs = [tuple(run.figure("average_cost", level) for level in (0, 1)) for run in runs]
     series = tuple(
-        (name(run.job.controller), run.job.controller, cost) for run, cost in zip(runs, costs, strict=True)
+        (name(run.controller), run.controller, cost) for run, cost in zip(runs, costs, strict=True)
     )
     bars = Bars("average cost $C_i$", ("level 1", "level 2"), series)
     rows = tuple(
-        (name(run.job.controller), *(number(value) for value in cost), trouble(run))
+        (name(run.controller), *(number(value) for value in cost), trouble(run))
         for run, cost in zip(runs, costs, strict=True)
     )
     own, tdeosf, hiqp = costs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lessons.experiments.jobs import Job
+from lessons.scenes.run_spec import RunSpec
 
 RT4, RT4_DATA_SHEET = "iiwa14-circle-paper", "iiwa14-circle"
 SOURCE = "HIMPC (T-RO 2024), section VI"
@@ -25,4 +26,4 @@ OPEN = (
 
 def rt4(controller: str = "himpc", *assignments: str, seconds: float | None = None) -> Job:
     """RT4 as the paper most likely ran it, 4 s."""
-    return Job(RT4, controller, assignments, seconds)
+    return Job(RunSpec(RT4, controller=controller, set=assignments, duration=seconds))

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from lessons.experiments.jobs import Job, Run
+from lessons.scenes.run_spec import RunSpec
 
 RT1, RT2, RT3 = "planar3-circle", "planar3-conflict", "planar3-singular"
 COMPARED = ("osf", "tdeosf", "hqp", "himpc")
@@ -20,17 +21,17 @@ COORDINATES = (("x", "position", 0, "m"), ("y", "position", 1, "m"), ("q1", "q1"
 
 def rt1(controller: str, *assignments: str) -> Job:
     """RT1, 8 s."""
-    return Job(RT1, controller, assignments)
+    return Job(RunSpec(RT1, controller=controller, set=assignments))
 
 
 def rt2(controller: str, *assignments: str) -> Job:
     """RT2, 8 s."""
-    return Job(RT2, controller, assignments)
+    return Job(RunSpec(RT2, controller=controller, set=assignments))
 
 
 def rt3(controller: str) -> Job:
     """RT3, 16 s."""
-    return Job(RT3, controller)
+    return Job(RunSpec(RT3, controller=controller))
 
 
 def level_1(run: Run) -> float:

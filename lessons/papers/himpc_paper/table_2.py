@@ -55,7 +55,7 @@ def _table_2(results: Results, quick: bool) -> Section:
             for c in ("himpc", "tdeosf")
         ),
         *(
-            between(f"{name(run.job.controller)}: RMSE of q₁ (deg)", run.error_of("q1"), 1e-3, 0.05)
+            between(f"{name(run.controller)}: RMSE of q₁ (deg)", run.error_of("q1"), 1e-3, 0.05)
             for run in (himpc, tdeosf)
         ),
         *(

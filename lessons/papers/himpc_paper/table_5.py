@@ -9,6 +9,7 @@ from lessons.papers.himpc_paper.iiwa import COORDINATES, DISTURBED, OPEN, RT4, R
 from lessons.papers.item import Check, Item, Row, Section, Table, between
 from lessons.papers.printed import printed
 from lessons.papers.words import gain_rows, number, trouble
+from lessons.scenes.run_spec import RunSpec
 
 _SCENES = {False: (RT4, RT4_DATA_SHEET), True: (RT4,)}
 _READINGS = {
@@ -33,7 +34,11 @@ _OTHERS = {
 
 
 def _table_5_jobs(quick: bool) -> tuple[Job, ...]:
-    disturbed = (Job(scene, "himpc", extra) for scene in _SCENES[quick] for extra in _READINGS.values())
+    disturbed = (
+        Job(RunSpec(scene, controller="himpc", set=extra))
+        for scene in _SCENES[quick]
+        for extra in _READINGS.values()
+    )
     return (*disturbed, *(rt4("himpc", *extra) for extra in _OTHERS.values()))
 
 
@@ -122,7 +127,7 @@ def _others(results: Results) -> Table:
 def _late(results: Results, scene: str) -> Table:
     rows = []
     for reading, extra in _READINGS.items():
-        run = results[Job(scene, "himpc", extra)]
+        run = results[Job(RunSpec(scene, controller="himpc", set=extra))]
         errors = (run.error_of(task, k) for _, task, k, _ in COORDINATES)
         rows.append((reading, *map(number, errors), trouble(run)))
     columns = ("plant", *(f"{label} ({unit})" for label, _, _, unit in COORDINATES), "")
@@ -142,7 +147,10 @@ def _changes(results: Results, quick: bool) -> Table:
 
 
 def _change(results: Results, scene: str, extra: tuple[str, ...]) -> list[float]:
-    nominal, disturbed = results[Job(scene)], results[Job(scene, "himpc", extra)]
+    nominal, disturbed = (
+        results[Job(RunSpec(scene, controller="himpc"))],
+        results[Job(RunSpec(scene, controller="himpc", set=extra))],
+    )
     return [disturbed.error_of("position", k) / nominal.error_of("position", k) for k in range(3)]
 
 

@@ -12,11 +12,14 @@ from lessons.papers.item import Item, Row, Section, Table, between
 from lessons.papers.printed import printed
 from lessons.papers.words import number, trouble
 from lessons.plots.style import name
+from lessons.scenes.run_spec import RunSpec
 
 
 def timed(controller: str, N: int, quick: bool) -> Job:
     """RT4 for step times: alone on the machine, half a second."""
-    return Job(RT4, controller, (f"horizon={N}",), 0.2 if quick else 0.5, timed=True)
+    return Job(
+        RunSpec(RT4, controller=controller, set=(f"horizon={N}",), duration=0.2 if quick else 0.5), timed=True
+    )
 
 
 def step_seconds(run: Run) -> dict[str, float]:
@@ -67,7 +70,7 @@ def _table_7(results: Results, quick: bool) -> Section:
         ("controller", "mean", "largest"),
         tuple(
             (
-                name(run.job.controller),
+                name(run.controller),
                 *(number(run.figure("solver", "iterations", kind)) for kind in ("mean", "max")),
             )
             for run in runs

@@ -9,10 +9,11 @@ from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.item import Check, Item, Section
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
+from lessons.scenes.run_spec import RunSpec
 
 Array = NDArray[np.float64]
 
-_JOB = Job("iiwa14-circle", duration=1.5)
+_JOB = Job(RunSpec("iiwa14-circle", controller="himpc", duration=1.5))
 """From rest, while the reference starts with a velocity: V_N begins far above where it settles."""
 _LEVELS = ("position", "orientation", "q1")
 _SETTLED_AFTER = 1.0

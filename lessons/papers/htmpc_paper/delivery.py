@@ -12,6 +12,7 @@ from lessons.papers.item import Check, Item, Row, Section, Table, at_most, betwe
 from lessons.papers.printed import printed
 from lessons.papers.words import number
 from lessons.plots.panels import Curve, Panel, Picture
+from lessons.scenes.run_spec import RunSpec
 
 ARCHITECTURES = ("hierarchical", "single_task")
 
@@ -23,7 +24,13 @@ def _layouts(quick: bool) -> list[tuple[int, ...]]:
 
 def _job(seats: tuple[int, ...], architecture: str) -> Job:
     listed = ",".join(map(str, seats))
-    return Job("ridgeback-ur10-delivery", "htmpc", set=(f"architecture={architecture}", f"seats=[{listed}]"))
+    return Job(
+        RunSpec(
+            "ridgeback-ur10-delivery",
+            controller="htmpc",
+            set=(f"architecture={architecture}", f"seats=[{listed}]"),
+        )
+    )
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, Run
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.missions import random_peaks
 
 Array = NDArray[np.float64]
@@ -27,12 +28,14 @@ def peaks(quick: bool) -> list[tuple[float, float]]:
 
 def square(controller: str, peak: tuple[float, float], *assignments: str) -> Job:
     """One square wave."""
-    return Job(SQUARE, controller, (f"peak=[{peak[0]:.9f},{peak[1]:.9f}]", *assignments))
+    return Job(
+        RunSpec(SQUARE, controller=controller, set=(f"peak=[{peak[0]:.9f},{peak[1]:.9f}]", *assignments))
+    )
 
 
 def example(controller: str, *assignments: str) -> Job:
     """The square wave with the scene's own peak; the paper does not print the coordinates of its example."""
-    return Job(SQUARE, controller, assignments)
+    return Job(RunSpec(SQUARE, controller=controller, set=assignments))
 
 
 def part(runs: Sequence[Run], place: int, key: str = "normalised_base_error") -> Array:

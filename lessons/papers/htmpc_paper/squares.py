@@ -75,9 +75,9 @@ def _fig_3(results: Results, quick: bool) -> Section:
 
 def _fig_4(results: Results, quick: bool) -> Section:
     runs = {words: results[example(controller)] for controller, words in METHODS.items()}
-    base = tuple(Curve(run.t, normalised(run), words, run.job.controller) for words, run in runs.items())
+    base = tuple(Curve(run.t, normalised(run), words, run.controller) for words, run in runs.items())
     hand = tuple(
-        Curve(run.t, 1e3 * np.linalg.norm(run["error/ee"], axis=1), words, run.job.controller)
+        Curve(run.t, 1e3 * np.linalg.norm(run["error/ee"], axis=1), words, run.controller)
         for words, run in runs.items()
         if len(run.t)
     )
@@ -183,7 +183,7 @@ def _line(words: str, runs: list[Run], errors: tuple[Array, Array], authors: flo
 
 def collinear(job: Job) -> bool:
     """Whether peak, valley (the origin) and the EE's home lie on a line, as in the paper's Fig. 7."""
-    peak = np.array(job.set[0].partition("=")[2].strip("[]").split(","), float)
+    peak = np.array(job.spec.set[0].partition("=")[2].strip("[]").split(","), float)
     a, b = peak - EE_HOME, -EE_HOME
     sine = abs(a[0] * b[1] - a[1] * b[0]) / (np.linalg.norm(a) * np.linalg.norm(b))
     return bool(sine < math.sin(COLLINEAR))

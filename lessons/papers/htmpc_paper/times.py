@@ -9,13 +9,16 @@ from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, example
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.printed import printed
 from lessons.papers.words import trouble
+from lessons.scenes.run_spec import RunSpec
 
 _WHY = "another machine and another solver (the paper: CasADi and Gurobi)"
 
 
 def _cases() -> dict[str, Job]:
     found: dict[str, Job] = {words: replace(example(c), timed=True) for c, words in METHODS.items()}
-    found["HTMPC with obstacles"] = Job("ridgeback-ur10-cluttered", "htmpc", duration=8.0, timed=True)
+    found["HTMPC with obstacles"] = Job(
+        RunSpec("ridgeback-ur10-cluttered", controller="htmpc", duration=8.0), timed=True
+    )
     return found
 
 

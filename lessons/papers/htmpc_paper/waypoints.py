@@ -7,6 +7,7 @@ from lessons.papers.htmpc_paper.runs import SOURCE
 from lessons.papers.item import Item, Section, Table
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Curve, Panel, Picture
+from lessons.scenes.run_spec import RunSpec
 
 HEIGHTS = (0.5, 0.8, 1.2)
 
@@ -14,9 +15,10 @@ HEIGHTS = (0.5, 0.8, 1.2)
 def _cases() -> dict[str, Job]:
     scene = "ridgeback-ur10-waypoints"
     found: dict[str, Job] = {
-        f"HT, h = {height} m": Job(scene, "htmpc", set=(f"height={height}",)) for height in HEIGHTS
+        f"HT, h = {height} m": Job(RunSpec(scene, controller="htmpc", set=(f"height={height}",)))
+        for height in HEIGHTS
     }
-    found["ST, h = 0.8 m"] = Job(scene, "htmpc", set=("architecture=single_task",))
+    found["ST, h = 0.8 m"] = Job(RunSpec(scene, controller="htmpc", set=("architecture=single_task",)))
     return found
 
 

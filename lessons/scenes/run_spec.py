@@ -1,0 +1,73 @@
+"""A run as data: what the command line, a lesson, a job, a state code and a page all stand on."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
+
+if TYPE_CHECKING:
+    from lessons.events import Event
+    from lessons.scenes.scene import Scene
+
+
+@final
+@dataclass(frozen=True)
+class RunSpec:
+    """A run: hashable, and sent to another process as it is.
+
+    Attributes:
+        scene: name of a scene, or the path of a file that makes one.
+        urdf: for the scene "hold": name of a catalog robot, or path of a URDF file.
+        tip: end-effector frame, for the scene "hold".
+        controller: name or path of a file; None: the scene's own, or the one that `set` names.
+        set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
+        events: (time in s, event) in order; None: the scene's own.
+        duration: simulated seconds; None: the scene's own.
+        seed: seed of the run.
+        files: Python files that may be the controller; whoever started the program named them.
+    """
+
+    scene: str
+    urdf: str | None = None
+    tip: str | None = None
+    controller: str | None = None
+    set: tuple[str, ...] = ()
+    events: tuple[tuple[float, Event], ...] | None = None
+    duration: float | None = None
+    seed: int = 0
+    files: tuple[str, ...] = ()
+
+    def loaded(self) -> Scene:
+        """The scene without controller and assignments. Raises InputError if it cannot be loaded."""
+        from lessons.own.resolve import scene_named, with_controllers
+
+        return with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
+
+    def prepared(self) -> Scene:
+        """The scene with everything in place but the seed. Raises InputError, one sentence, for what cannot
+        be."""
+        from lessons.scenes.catalog import prepared
+
+        scene = prepared(self.loaded(), self.controller, self.set)
+        if self.events is not None:
+            scene = replace(scene, events=self.events)
+        return scene if self.duration is None else replace(scene, duration=self.duration)
+
+    def but(self, *assignments: str) -> RunSpec:
+        """The same run with further assignments."""
+        return replace(self, set=(*self.set, *assignments))
+
+    def command_line(self) -> str:
+        """The line for a shell that does it; events cannot be told there."""
+        controller, assignments = self.controller, list(self.set)
+        if controller is None and assignments and assignments[0].startswith("controller="):
+            controller = assignments.pop(0).partition("=")[2]
+        words = ["himpc-lab", "run", self.scene]
+        for name, value in (("urdf", self.urdf), ("tip", self.tip), ("controller", controller)):
+            words += [f"--{name}", value] if value is not None else []
+        words += ["--duration", f"{self.duration:g}"] if self.duration is not None else []
+        words += ["--seed", str(self.seed)] if self.seed else []
+        for each in assignments:
+            words += ["--set", each]
+        return shlex.join(words)

@@ -1,0 +1,64 @@
+"""What can be set, as a list for people: the table of settings with what is allowed and what is now."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lessons.settings.assignments import assignment
+from lessons.settings.settings import Settings
+
+_BY_PLACE = re.compile(r"levels\.\d+\.\w+")
+
+
+@dataclass(frozen=True)
+class Line:
+    """One setting, all of it text.
+
+    Attributes:
+        path: as of `--set`; in a list of several scenes with "*" for a name.
+        now: its value, as typed.
+        allowed: what it may be.
+        unit: of the value.
+        help: what it is.
+    """
+
+    path: str
+    now: str
+    allowed: str
+    unit: str
+    help: str
+
+
+def lines(settings: Settings) -> list[Line]:
+    """Every setting of a scene in the order of the page. Levels, which are also known by their place, come by
+    their names."""
+    paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
+    order = [entry.path for entry in settings.entries]
+    told = {path: _pattern(settings, path) for path in paths}
+    paths.sort(key=lambda path: order.index(told[path]) if told[path] in order else len(order))
+    return [_line(settings, path, path) for path in paths]
+
+
+def reference(scenes: Sequence[Settings]) -> list[Line]:
+    """Every setting that any of some scenes of a kind has, names written as "*"; `now` is the first one's."""
+    found: dict[str, Line] = {}
+    for settings in scenes:
+        for path in settings.paths():
+            pattern = _pattern(settings, path)
+            if pattern not in found and not _BY_PLACE.fullmatch(path):
+                found[pattern] = _line(settings, path, pattern)
+    order = [entry.path for settings in scenes for entry in settings.entries]
+    return sorted(found.values(), key=lambda line: order.index(line.path))
+
+
+def _pattern(settings: Settings, path: str) -> str:
+    return next((entry.path for entry in settings.entries if entry.at(path)), path)
+
+
+def _line(settings: Settings, path: str, shown: str) -> Line:
+    entry, place = settings.entry(path), settings.place(path)
+    now = assignment(path, place.read(settings)).partition("=")[2]
+    words = entry.label if not entry.help else entry.help
+    return Line(shown, now, str(place.form), entry.unit, words)

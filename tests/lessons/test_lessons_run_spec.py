@@ -1,0 +1,45 @@
+"""A run as data: one type for the command line, lessons, jobs, codes and the page."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from app.link.choice import SceneChoice
+from lessons.events import Push
+from lessons.scenes.run_spec import RunSpec
+from robots import InputError
+
+
+def test_everything_is_in_place_and_the_run_can_be_a_key() -> None:
+    events = ((0.1, Push("link_3", (0.1, 0.0, 0.0))),)
+    spec = RunSpec("planar3-circle", controller="hqp", set=("horizon=7",), events=events, duration=0.5)
+    spec = spec.but("plant.payload_kg=1")
+    scene = spec.prepared()
+    assert scene.settings.controller == "hqp" and scene.settings.horizon == 7
+    assert scene.settings.plant.payload_kg == 1.0 and scene.duration == 0.5 and scene.events == spec.events
+    assert {spec: 1}[spec.but()] == 1 and spec.but("Q=3") != spec
+    own = RunSpec("planar3-circle").prepared()
+    assert own.duration == 8.0 and own.settings.controller == "himpc"
+
+
+def test_the_command_line_says_all_but_the_script() -> None:
+    spec = RunSpec("hold", "my arm.urdf", "tool", "osf", ("Q=[1,2]",), duration=2.5, seed=4)
+    assert shlex.split(spec.command_line()) == [
+        "himpc-lab", "run", "hold", "--urdf", "my arm.urdf", "--tip", "tool", "--controller", "osf",
+        "--duration", "2.5", "--seed", "4", "--set", "Q=[1,2]",
+    ]  # fmt: skip
+    assert RunSpec("planar3-hold", set=("controller=osf",)).command_line().endswith("--controller osf")
+
+
+def test_what_cannot_be_run_is_one_sentence() -> None:
+    for spec in (RunSpec("planar3-hlod"), RunSpec("planar3-hold", controller="htmpc")):
+        with pytest.raises(InputError, match="planar3-hold"):
+            spec.prepared()
+
+
+def test_a_page_begins_with_the_controller_of_a_run() -> None:
+    spec = RunSpec("planar3-hold", controller="osf", set=("horizon=3",), seed=2)
+    choice = SceneChoice.of_run(spec)
+    assert choice.scene().settings == spec.prepared().settings and choice.run.seed == 2
