@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from lessons.papers.item import Row
 from lessons.papers.topics import Topic, topics
 from lessons.papers.words import number
-from lessons.replay.state import command_line, encode
+from lessons.replay.state import encode
 
 Found = Sequence[tuple[str, Row]]
 """(name of the item, row)."""
@@ -67,7 +67,13 @@ def _section(topic: Topic, rows: Found) -> str:
         f"**See it.** {_flat(topic.look)}",
     ]
     if topic.state is not None:
-        lines += ["", "```sh", command_line(topic.state), f"himpc-lab --state {encode(topic.state)}", "```"]
+        lines += [
+            "",
+            "```sh",
+            topic.state.run.command_line(),
+            f"himpc-lab --state {encode(topic.state)}",
+            "```",
+        ]
     return "\n".join((*lines, ""))
 
 

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from lessons.replay.state import State
+from lessons.scenes.run_spec import RunSpec
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Topic:
     @property
     def state(self) -> State | None:
         """The setting that shows it."""
-        return State(self.scene, set=self.set) if self.scene else None
+        return State(RunSpec(self.scene, set=self.set)) if self.scene else None
 
 
 @cache

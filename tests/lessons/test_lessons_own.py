@@ -15,6 +15,7 @@ from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.catalog import load_scene, prepared, torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 from robots import InputError
 
@@ -190,7 +191,7 @@ def test_own_files_are_run_only_where_the_command_line_says_so(file) -> None:
     with pytest.raises(InputError, match="scene"):
         load_scene(path)
     with pytest.raises(InputError):
-        decode(encode(state_of("planar3-hold", scene.settings)) + "x")
+        decode(encode(state_of(RunSpec("planar3-hold"), scene.settings)) + "x")
 
 
 def test_own_controller_does_not_fit_a_velocity_scene(file) -> None:

@@ -183,7 +183,7 @@ def test_every_disagreement_is_explained_and_can_be_seen() -> None:
     for topic in topics().values():
         assert topic.title and topic.evidence and topic.cause and topic.look
         if topic.state is not None:
-            topic.state.prepared()
+            topic.state.run.prepared()
 
 
 def test_every_topic_is_needed() -> None:

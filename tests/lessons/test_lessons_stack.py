@@ -15,8 +15,9 @@ from lessons.events import MoveTarget, Reset, Set
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.replay.script import script
-from lessons.replay.state import State, decode, encode, state_of
+from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.catalog import prepared, torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import differences, with_assignments
 from lessons.settings.torque import TorqueSettings
@@ -78,8 +79,8 @@ def test_a_told_stack_is_the_same_to_the_last_bit() -> None:
     settings = settings.changed("controller", "hqp").changed("plant.payload_kg", 1.5)
     told = differences(START, settings)
     assert with_assignments(START, told) == settings
-    state = state_of("iiwa14-hold", settings)
-    opened = decode(encode(state)).prepared().settings
+    state = state_of(RunSpec("iiwa14-hold"), settings)
+    opened = decode(encode(state)).run.prepared().settings
     assert opened == settings
 
 
@@ -287,7 +288,7 @@ def test_a_run_with_changes_is_repeated_by_its_script(tmp_path: Any) -> None:
         if tick % 5 == 0 and tick // 5 < len(CHANGES):
             session.post(CHANGES[tick // 5])
         rows.append(session.tick()[session.layout.fields["tau"]].copy())
-    text = script(State("iiwa14-hold"), session.log, session.t)
+    text = script(RunSpec("iiwa14-hold"), session.log, session.t)
     space: dict[str, Any] = {"__name__": "script"}
     exec(compile(text.split("\nprint(")[0], "script", "exec"), space)
     np.testing.assert_array_equal(space["recording"]["tau"], np.array(rows))
