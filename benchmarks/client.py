@@ -30,7 +30,8 @@ from websockets.sync.connection import Connection
 from app.panels.widgets.in_view import ASLEEP, AWAKE, LABEL
 from browsing.wire import camera, messages_of, pack
 
-_PATIENCE = 60.0  # s for a robot to appear
+PATIENCE = 60.0
+"""s for a robot to appear."""
 _TAB = "Joints"  # the one with the most curves
 
 
@@ -106,7 +107,7 @@ class Viewer:
     def visit(self) -> bool:
         """Comes, waits until a robot moved or its plots did, and leaves."""
         self.second = Second()
-        end = time.monotonic() + _PATIENCE
+        end = time.monotonic() + PATIENCE
         with self.connect() as page:
             while time.monotonic() < end:
                 self.hear(page, 0.2)

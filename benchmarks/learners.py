@@ -25,6 +25,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
+from benchmarks.client import PATIENCE
 
 SETTLE = 5.0  # s
 LONG = 180.0  # s
@@ -77,7 +78,7 @@ class Viewers:
         heard = len(self.said)
         self._process.stdin.write(f"{times}\n")
         self._process.stdin.flush()
-        assert wait_until(lambda: bool(_came(self.said[heard:])), LONG + 5 * times, 0.1), "no answer"
+        assert wait_until(lambda: bool(_came(self.said[heard:])), LONG + PATIENCE * times, 0.1), "no answer"
         return _came(self.said[heard:])[0]
 
     def __enter__(self) -> Viewers:

@@ -76,7 +76,7 @@ def main() -> int:
             while not all(simulated(each) > KEPT for each in learners):
                 time.sleep(EVERY)
             filled = len(samples)
-            samples += watched(options.minutes - fill, viewers.pid)
+            samples += watched(options.minutes - fill, viewers.pid, fill)
             cost = reconnected(viewers, options.reconnects)
     finally:
         server.close()
@@ -116,11 +116,13 @@ def rested(client: int) -> float:
     return median(found)
 
 
-def watched(minutes: float, client: int) -> list[Sample]:
-    """Samples over so many minutes."""
+def watched(minutes: float, client: int, after: float = 0.0) -> list[Sample]:
+    """Samples over so many minutes; after: the minute at which they begin."""
     began, found = time.monotonic(), list[Sample]()
     while (minute := (time.monotonic() - began) / 60) < minutes:
-        found.append(sample(minute, client))
+        found.append(sample(after + minute, client))
+        if len(found) % 12 == 1:  # now and then: an hour is long, and what comes last may fail
+            print(json.dumps(asdict(found[-1])), file=sys.stderr, flush=True)
         time.sleep(EVERY)
     return found
 
