@@ -117,9 +117,9 @@ def rested(client: int) -> float:
 
 
 def watched(minutes: float, client: int, after: float = 0.0) -> list[Sample]:
-    """Samples over so many minutes; after: the minute at which they begin."""
+    """Samples over so many minutes, and enough to judge them; after: the minute at which they begin."""
     began, found = time.monotonic(), list[Sample]()
-    while (minute := (time.monotonic() - began) / 60) < minutes:
+    while (minute := (time.monotonic() - began) / 60) < minutes or len(found) < 2 * NEAR:
         found.append(sample(after + minute, client))
         if len(found) % 12 == 1:  # now and then: an hour is long, and what comes last may fail
             print(json.dumps(asdict(found[-1])), file=sys.stderr, flush=True)

@@ -7,6 +7,8 @@ import pinocchio as pin
 
 from robots import Robot
 
+_WXYZ = [0, 1, 2, 6, 3, 4, 5]
+
 
 class LinkPoses:
     """Of joints 1 … n and the tip: (n + 1, 7), position, m, and quaternion wxyz."""
@@ -29,5 +31,4 @@ class LinkPoses:
 
 
 def _pose(placement: pin.SE3) -> np.ndarray:
-    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-    return np.array([*placement.translation, w, x, y, z])
+    return pin.SE3ToXYZQUAT(placement)[_WXYZ]

@@ -1,0 +1,52 @@
+"""A simulation that runs keeps nothing of its ticks: neither Python's objects nor its libraries' memory."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+
+import pytest
+
+from app.link.choice import SceneChoice
+from app.link.wire import packed
+from app.worker.simulation import Body
+
+TICKS = 1000
+
+
+class Allocated(ctypes.Structure):
+    """`mallinfo2` of glibc: ten numbers, of which we want two."""
+
+    _fields_ = [(name, ctypes.c_size_t) for name in (*"abcd", "mapped", *"fg", "used", *"ij")]
+
+
+def allocated() -> int:
+    """Bytes that this process holds of the system's allocator."""
+    gc.collect()
+    library = ctypes.CDLL(None)
+    if not hasattr(library, "mallinfo2"):
+        pytest.skip("only glibc tells what is allocated")
+    library.mallinfo2.restype = Allocated
+    found = library.mallinfo2()
+    return found.used + found.mapped
+
+
+@pytest.mark.parametrize("scene", ["iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag"])
+def test_ticks_keep_nothing(scene: str) -> None:
+    """80 bytes a tick are 5 MB a minute."""
+    body = Body(SceneChoice(scene))
+
+    def run() -> None:
+        for _ in range(TICKS // 20):
+            body.tick(20)
+            body.write_poses()
+            packed(body.status())
+
+    try:
+        for _ in range(2):  # what is remembered of the last seconds is full then
+            run()
+        before = allocated()
+        run()
+        assert allocated() - before < 8 * TICKS
+    finally:
+        body.close()
