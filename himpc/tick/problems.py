@@ -10,9 +10,9 @@ from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, LevelSolution
 from himpc.limits.rows import Rows
 from himpc.tick.kernel.arena import Arena, Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
-from himpc.tick.kernel.solve import BUDGET, solve
+from himpc.tick.kernel.solve import solve
 from himpc.tick.ladder import solve_levels
-from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
+from himpc.tick.tables import LevelTable, budget_of, sizes, write_effects, write_levels
 
 
 def solve_problems(
@@ -48,7 +48,7 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
     write_levels(arena, tables)
     f["L"][:], f["lower"][:], f["upper"][:] = rows.L, rows.lower, rows.upper
     f["M_bar"][:], f["scalars"][:] = 1.0, 1.0
-    f["limits"][0], f["limits"][1], f["budget"][:] = -np.inf, np.inf, BUDGET
+    f["limits"][0], f["limits"][1], f["budget"][:] = -np.inf, np.inf, budget_of(arena)
     return arena
 
 

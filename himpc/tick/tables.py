@@ -10,10 +10,13 @@ import numpy as np
 
 from himpc.qp import KKT_TOLERANCE
 from himpc.tick.kernel.arena import Arena, Array
+from himpc.tick.kernel.solve import BUDGET
 
 if TYPE_CHECKING:
     from himpc.controllers.forms import LevelForm
 
+_ROUNDS = 24_000
+"""Changes of active rows in a tick; the longest run is some milliseconds."""
 _ACCURACY = 1e-8
 """N·m: how far a point may be from the optimum, since H ≥ ρ."""
 
@@ -42,6 +45,13 @@ class LevelTable:
     def of(cls, level: LevelForm) -> LevelTable:
         """A level of a strict hierarchy."""
         return cls(level.rows, level.knots, level.R, level.rows, level.knots, level.R)
+
+
+def budget_of(arena: Arena) -> float:
+    """Multiplications that a tick may spend on changes of active rows: BUDGET, but no more than _ROUNDS need,
+    since a round takes its time however small the problem is."""
+    N, n = arena.f["U"].shape[1:]
+    return min(BUDGET, _ROUNDS * (N * n * n + 4.0 * arena.f["lower"].size))
 
 
 def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:

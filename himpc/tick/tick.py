@@ -24,10 +24,9 @@ from himpc.tick.given import GivenRows
 from himpc.tick.kernel.arena import NOW, Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
-from himpc.tick.kernel.solve import BUDGET
 from himpc.tick.ladder import solve_levels
 from himpc.tick.problems import press, solutions
-from himpc.tick.tables import LevelTable, write_effects
+from himpc.tick.tables import LevelTable, budget_of, write_effects
 from robots import Robot
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ class CompiledTick:
         self._led = [each for each in self._given.spans if not isinstance(each[1], Damping)]
         self._read: dict[int, Reference | Preview | None] = {}
         self._gathered: tuple[Layout, Array | None] | None = None
-        self._ticks = 0
+        self._ticks, self._budget = 0, budget_of(self.arena)
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
@@ -158,7 +157,7 @@ class CompiledTick:
         arena = self.arena
         rungs: list[tuple[Rung, float]] = []
         change, iterations = math.inf, 0
-        arena.f["budget"][:] = BUDGET
+        arena.f["budget"][:] = self._budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
                 # J_i(q_{k+j|k}): the knots of this tick's own prediction take the place of the last one's.

@@ -21,6 +21,7 @@ from himpc.limits.rows import least_slack
 from himpc.references import Outlook
 from himpc.tick import ladder, problems
 from himpc.tick.kernel.solve import BUDGET
+from himpc.tick.tables import budget_of
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 
@@ -236,6 +237,18 @@ def test_a_qp_takes_no_more_iterations_than_it_may(monkeypatch: pytest.MonkeyPat
     assert sum(used) <= limit + len(used)
     assert qp.solve_qp(np.eye(k), f, A, np.full(2 * k, -width), np.full(2 * k, width)).solved
     assert not found.solved or sum(used) > limit
+
+
+def test_a_cycle_at_a_small_problem_ends_early() -> None:
+    """At N = 1 a planar arm thrown about does not go round and round until a large problem's budget is spent
+    (44 ms once; seen in `benchmarks.fuzz`)."""
+    scene = torque_scene("planar3-singular")
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=1)))
+    session.tick()
+    kernel = getattr(session.controller, "kernel")  # noqa: B009  (other controllers have none)
+    rounds = budget_of(kernel.arena) / (3 * 3 + 4.0 * kernel.arena.f["lower"].size)
+    assert rounds <= 24_000
+    assert budget_of(kernel.arena) < 0.1 * BUDGET
 
 
 @pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
