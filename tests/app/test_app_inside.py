@@ -148,6 +148,7 @@ def test_nobody_asks_while_nobody_looks(sheet: Page, drawing: PageServer) -> Non
 
 def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
     sheet.get_by_text("The Hessian of one level").click()
+    sheet.locator(f'[data-chart="{HESSIAN}"]').scroll_into_view_if_needed()
     assert eventually(sheet, lambda: sheet.get_by_text("H = GᵀQG + R of level").is_visible())
     learner = learner_of(drawing)
     assert eventually(sheet, lambda: learner.status is not None and learner.status.inside is not None
@@ -167,6 +168,7 @@ def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
         return min(found, default=float("nan"))
 
     tab(sheet, "Control")
+    sheet.locator(f'[data-chart="{SPECTRUM}"]').scroll_into_view_if_needed()
     assert eventually(sheet, lambda: farthest() == farthest())
     before = farthest()
     set_number(sheet, "M̄ scale", 2.0)

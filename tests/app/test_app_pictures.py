@@ -44,7 +44,7 @@ def parsed(markup: str) -> etree._Element:
 
 
 def drawn(plane: Plane, half: float) -> etree._Element:
-    return parsed(plane_svg.markup(plane, half, {"reach": LEVELS[0], "pose": LEVELS[1]}, JOINTS))
+    return parsed("".join(plane_svg.parts(plane, half, {"reach": LEVELS[0], "pose": LEVELS[1]}, JOINTS)))
 
 
 def test_points_stand_where_their_numbers_say(plane: Plane) -> None:

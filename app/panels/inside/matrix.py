@@ -44,7 +44,7 @@ class MatrixPanel:
     def draw(self, inside: Inside | None) -> None:
         """Paints what was told."""
         if inside is not None and inside.matrix is not None and self._picture.in_view:
-            self._picture.paint(markup(inside.matrix, self._names))
+            self._picture.paint([markup(inside.matrix, self._names)])
 
     def write(self, inside: Inside | None) -> None:
         """Names the bounds."""

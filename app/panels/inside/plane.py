@@ -12,7 +12,7 @@ from app.client.wish import Send
 from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import block, esc, figure, swatch
 from app.link.inside import Inside, Watch
-from app.panels.inside.plane_svg import CONTOURED, SIZE, half_width, markup
+from app.panels.inside.plane_svg import CONTOURED, SIZE, half_width, parts
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.picture import Picture
 from lessons.events import Set
@@ -97,7 +97,7 @@ class PlanePanel:
             return
         self._half = half_width(plane, self._half)
         names = [self._robot.joint_names[joint] for joint in plane.joints]
-        self._picture.paint(markup(plane, self._half, self._colours, names))
+        self._picture.paint(parts(plane, self._half, self._colours, names))
 
     def write(self, inside: Inside | None, settings: TorqueSettings) -> None:
         """Says what is what, and how well geometry and solver agree."""
@@ -111,25 +111,25 @@ class PlanePanel:
             self._words.content = words
 
     def _legend(self, plane: Plane, several: bool) -> str:
-        parts = []
+        lines = []
         for place, level in enumerate(plane.levels[:CONTOURED]):
             left = (
                 ("a point", "a line", "all")[level.leaves.span.shape[1]]
                 if level.leaves.at is not None
                 else "–"
             )
-            parts.append(
+            lines.append(
                 f"{swatch(self._colours.get(level.name, BOUND))}<b>{place + 1} {esc(level.name)}</b>: "
                 f"contours of its cost; the disc is its optimum; (33) leaves {left}"
             )
-        parts.append(
+        lines.append(
             f'<span style="color:{css(BAD)}">▭</span> the box of bounds; what is red cannot be asked for'
         )
-        parts.append(f'<span style="color:{css(GHOST)}">◆</span> one weighted cost of all; no priorities')
+        lines.append(f'<span style="color:{css(GHOST)}">◆</span> one weighted cost of all; no priorities')
         if plane.osf is not None:
             outside = "outside the box" if not plane.box.inside(plane.osf) else "in the box this time"
-            parts.append(f'<span style="color:{css(BAD)}">▲</span> OSF asks for this: {outside}')
-        parts.append(f"Geometry and solver agree to <b>{figure(max(plane.apart, 1e-16), 'N·m')}</b>.")
+            lines.append(f'<span style="color:{css(BAD)}">▲</span> OSF asks for this: {outside}')
+        lines.append(f"Geometry and solver agree to <b>{figure(max(plane.apart, 1e-16), 'N·m')}</b>.")
         if several:
-            parts.append("Later knots are held where the solution has them.")
-        return block("<br>".join(parts))
+            lines.append("Later knots are held where the solution has them.")
+        return block("<br>".join(lines))

@@ -71,8 +71,9 @@ def _bounded(value: float, half: float) -> float:
     return min(max(value, -50.0 * half), 50.0 * half)
 
 
-def markup(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequence[str]) -> str:
-    """joints: names of the two, of the axis to the right and of the one upwards."""
+def parts(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequence[str]) -> list[str]:
+    """What changes at different times, from back to front. joints: names of the two, of the axis to the right
+    and of the one upwards."""
     paper = _Paper(half)
     clip = f'<clipPath id="plane"><rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}"/></clipPath>'
     inner = [_box(plane, paper)]
@@ -80,11 +81,13 @@ def markup(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequen
         inner.append(_contours(level, place, paper, colours))
     for place, level in enumerate(plane.levels[: max(len(plane.levels) - 1, 1)]):
         inner.append(_left(level, plane, place, paper, colours))
-    return (
-        f"<defs>{clip}</defs>{_axes(paper, joints)}"
-        f'<g clip-path="url(#plane)">{"".join(inner)}</g>{_sides(plane, paper)}'
-        f"{_points(plane, paper, colours)}"
-    )
+    clipped = [f'<g clip-path="url(#plane)">{each}</g>' for each in inner]
+    return [
+        f"<defs>{clip}</defs>{_axes(paper, joints)}",
+        *clipped,
+        _sides(plane, paper),
+        *_points(plane, paper, colours),
+    ]
 
 
 # -------------------------------------------------------------------- pieces
@@ -204,7 +207,7 @@ def _line(ends: Sequence[np.ndarray] | np.ndarray, paper: _Paper) -> str:
     return f"M{x:.1f} {y:.1f}L{to_x:.1f} {to_y:.1f}"
 
 
-def _points(plane: Plane, paper: _Paper, colours: Mapping[str, RGB]) -> str:
+def _points(plane: Plane, paper: _Paper, colours: Mapping[str, RGB]) -> list[str]:
     parts = []
     if plane.osf is not None:
         parts.append(_mark("osf", plane.osf, "OSF", css(BAD), "M0 -6L6 5H-6Z", paper, (0, -10)))
@@ -236,7 +239,7 @@ def _points(plane: Plane, paper: _Paper, colours: Mapping[str, RGB]) -> str:
             len(parts) - place,
             _mark(f"optimum-{place + 1}", level.solved, str(place + 1), colour, disc, paper, shift),
         )
-    return "".join(parts)
+    return parts
 
 
 def _mark(

@@ -34,7 +34,7 @@ class SpectrumPicture:
     def draw(self, inside: Inside | None) -> None:
         """Paints what was told."""
         if inside is not None and inside.spectrum is not None and self.in_view:
-            self._picture.paint(markup(inside.spectrum))
+            self._picture.paint([markup(inside.spectrum)])
 
 
 def markup(values: np.ndarray | Sequence[float]) -> str:

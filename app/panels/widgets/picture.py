@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 import viser
 
@@ -15,9 +16,13 @@ _AGAIN = 20
 
 # The panel may be folded or in a tab behind: then there is nothing to paint into.
 _PAINT = """
-window.__himpcLabPaint = (title, markup) => {
-  for (const each of document.querySelectorAll("[data-chart]"))
-    if (each.dataset.chart === title) each.querySelector(".live").innerHTML = markup;
+window.__himpcLabPaint = (title, count, changes) => {
+  for (const each of document.querySelectorAll("[data-chart]")) {
+    if (each.dataset.chart !== title) continue;
+    const live = each.querySelector(".live");
+    if (live.querySelectorAll(":scope > g").length !== count) live.innerHTML = "<g></g>".repeat(count);
+    for (const [place, markup] of changes) live.children[place].innerHTML = markup;
+  }
 };
 """
 
@@ -40,7 +45,7 @@ class Picture:
             'style="display:block;max-width:42em;margin:auto" font-size="11" font-family="inherit" '
             f'fill="currentColor"><g class="live">{words}</g></svg></div>'
         )
-        self._painted = ""
+        self._painted: list[str] = []
         self._looks = 0
 
     @property
@@ -48,16 +53,23 @@ class Picture:
         """Whether the browser has told that it shows it."""
         return self._in_view.told and self._in_view.sees(self.title)
 
-    def paint(self, markup: str) -> None:
-        """SVG elements, instead of those that were there; nothing is sent where nothing changed."""
-        self._looks += 1
-        if not self.in_view or (markup == self._painted and self._looks % _AGAIN):
+    def paint(self, parts: Sequence[str]) -> None:
+        """SVG elements, one piece over the other, instead of those that were there; only pieces that changed
+        are sent."""
+        if not self.in_view:
+            self._painted = []
             return
-        self._painted = markup
-        call = f"window.__himpcLabPaint?.({json.dumps(self.title)}, {json.dumps(markup)})"
+        self._looks += 1
+        if self._looks % _AGAIN == 0 or len(parts) != len(self._painted):
+            self._painted = [""] * len(parts)
+        changes = [[k, part] for k, part in enumerate(parts) if part != self._painted[k]]
+        if not changes:
+            return
+        self._painted = list(parts)
+        call = f"window.__himpcLabPaint?.({json.dumps(self.title)}, {len(parts)}, {_script(changes)})"
         private.run_script(self._client, call)
 
-    def show(self, on: bool) -> None:
-        """Whether it takes any room."""
-        if self._handle.visible != on:
-            self._handle.visible = on
+
+def _script(value: object) -> str:
+    """As JavaScript."""
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
