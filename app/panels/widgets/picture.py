@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 
 import viser
@@ -11,8 +12,9 @@ from app.adapter import private
 from app.html.text import esc
 from app.panels.widgets.in_view import InView
 
-_AGAIN = 20
-"""Looks after which a picture that did not change is painted once more: a tab that was closed forgot it."""
+_EVERY = 0.15  # s between two paintings: a picture in full motion is some kilobytes a second
+_AGAIN = 15
+"""Paintings after which all of a picture is painted once more: a tab that was closed forgot it."""
 
 # The panel may be folded or in a tab behind: then there is nothing to paint into.
 _PAINT = """
@@ -47,6 +49,7 @@ class Picture:
         )
         self._painted: list[str] = []
         self._looks = 0
+        self._next = 0.0
 
     @property
     def in_view(self) -> bool:
@@ -59,6 +62,10 @@ class Picture:
         if not self.in_view:
             self._painted = []
             return
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + _EVERY
         self._looks += 1
         if self._looks % _AGAIN == 0 or len(parts) != len(self._painted):
             self._painted = [""] * len(parts)
