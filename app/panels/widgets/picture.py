@@ -54,16 +54,16 @@ class Picture:
     @property
     def in_view(self) -> bool:
         """Whether the browser has told that it shows it."""
-        return self._in_view.told and self._in_view.sees(self.title)
+        seen = self._in_view.told and self._in_view.sees(self.title)
+        if not seen:
+            self._painted = []  # whoever looks again gets all of it
+        return seen
 
     def paint(self, parts: Sequence[str]) -> None:
         """SVG elements, one piece over the other, instead of those that were there; only pieces that changed
         are sent."""
-        if not self.in_view:
-            self._painted = []
-            return
         now = time.monotonic()
-        if now < self._next:
+        if not self.in_view or now < self._next:
             return
         self._next = now + _EVERY
         self._looks += 1
