@@ -59,7 +59,9 @@ class Stage:
         by_path: bool,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
+        phone: bool,
     ) -> None:
+        """phone: a panel at the side is not shown there, so that plots go among the other tabs."""
         self._client, self._learner, self._ready = client, learner, ready
         self._theme = theme
         self._colours = level_colours([task.level for task in in_order(ready)])
@@ -81,7 +83,7 @@ class Stage:
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: Ghost | None = None
-        self._build_panels(client.gui, scenes, choose, by_path, loop, notebook)
+        self._build_panels(client.gui, scenes, choose, by_path, loop, notebook, phone)
         self._build_scene(client.scene, dark)
 
     # ---------------------------------------------------------------- building
@@ -94,14 +96,17 @@ class Stage:
         by_path: bool,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
+        phone: bool,
     ) -> None:
         gui.add_html(PHONE)
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
         self._time_line = TimeLine(gui, self._learner, loop)
         exercise = self._learner.choice_of(self._ready).exercise
         self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
-        tabs, plots = gui.add_tab_group(), gui.add_panel()
-        self._face.open_plots(plots)
+        tabs = gui.add_tab_group()
+        plots = tabs if phone else gui.add_panel()
+        if not phone:
+            self._face.open_plots(plots)
         self._course.add_first_tabs(tabs, plots)
         self._face.add_tabs(gui, tabs)
         self._course.add_last_tab(tabs)
@@ -119,8 +124,9 @@ class Stage:
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):
             self._binding = BindingPanel(gui, self._colours)
-        plots.dock_left()
-        plots.set_width(400)
+        if isinstance(plots, viser.PanelHandle):
+            plots.dock_left()
+            plots.set_width(400)
 
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)

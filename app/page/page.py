@@ -203,6 +203,7 @@ class Page:
                 self._by_path,
                 self._event_loop,
                 self._notebook,
+                self._phone,
             )
             add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
             seen = (replace(ready.choice, exercise=None, set=()), ready.robot.name)

@@ -60,11 +60,11 @@ class Face(Protocol):
         """The kind's tabs, the first one first."""
         ...
 
-    def open_plots(self, plots: viser.PanelHandle) -> None:
+    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         """The tab of the panel on the left that comes before the lesson's, if any does."""
         ...
 
-    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         """The kind's tabs of the panel on the left."""
         ...
 

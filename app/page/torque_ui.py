@@ -37,6 +37,7 @@ class TorqueFace:
 
     def __init__(self, context: Context) -> None:
         self._context = context
+        self._inside_tab: viser.GuiTabHandle | None = None
 
     # ---------------------------------------------------------------- building
 
@@ -57,12 +58,12 @@ class TorqueFace:
         self._start.on_theme = context.theme
         self._start.on_recall = self._recall
 
-    def open_plots(self, plots: viser.PanelHandle) -> None:
+    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         # A QP of one knot is small enough to be looked at first.
-        first = self._context.settings.horizon == 1
-        self._inside_tab = plots.add_tab("Inside") if first else None
+        if self._context.settings.horizon == 1:
+            self._inside_tab = plots.add_tab("Inside")
 
-    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         context = self._context
         with plots.add_tab("Errors"):
             self._level_plots = LevelPlots(

@@ -73,10 +73,10 @@ class VelocityFace:
         self._begin.on_obstacle = self._add_obstacle
         self._begin.on_clear = self._clear_ball
 
-    def open_plots(self, plots: viser.PanelHandle) -> None:
+    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         pass
 
-    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle) -> None:
+    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         with plots.add_tab("Errors"):
             self._plots = TrackingPlots(
                 gui, self._context.in_view, self._context.ready, self._context.colours

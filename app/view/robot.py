@@ -77,11 +77,13 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     pin.framesForwardKinematics(robot.model, data, robot.home)
     joints = np.array([data.oMi[j].translation for j in range(1, robot.model.njoints)])
     tip = data.oMf[robot.frame_id(robot.tip)].translation
+    ends = [frame.translation for frame in data.oMf]
     points = np.vstack([np.zeros(3), joints, tip])
     length = float(np.sum(np.linalg.norm(np.diff(points[1:], axis=0), axis=1)))
     reach = max(0.4, length)
     planar = float(np.ptp(points[:, 2])) < 0.05 * reach
-    return points, np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5]), reach
+    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5])
+    return np.vstack([points, ends]), direction, reach
 
 
 def aim(camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray) -> None:

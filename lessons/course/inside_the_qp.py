@@ -49,7 +49,7 @@ LINE = Step(
         "The wrist goes 10 cm aside, and both joints want to stay. In the end the joints are off by …",
         (
             Option("nothing: three joints are enough for all", high=1.0),
-            Option("ten to twenty degrees, and the wrist is on its target", 10.0, 20.0),
+            Option("10° to 20°, and the wrist is on its target", 10.0, 20.0),
             Option("half of that: the wrist and the joints share the loss", 5.0, 10.0),
         ),
         Measure(JOINTS, "last"),

@@ -72,7 +72,7 @@ def test_what_is_far_off_is_an_arrow_with_its_numbers(plane: Plane) -> None:
 
 def test_the_picture_holds_still_while_points_breathe(plane: Plane) -> None:
     half = plane_svg.half_width(plane, None)
-    assert plane_svg.half_width(plane, 2.0 * half) == 2.0 * half
+    assert plane_svg.half_width(plane, 1.5 * half) == 1.5 * half
     assert plane_svg.half_width(plane, 10.0 * half) == half
     assert plane_svg.half_width(plane, 0.1 * half) == half
 

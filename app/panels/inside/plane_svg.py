@@ -21,7 +21,7 @@ _FAR = 6.0
 _SMALLEST = 0.12  # N·m: half the width of the closest look
 _NEAR = 8.0
 """Sides of the box that are farther off than so many times the points are left out of the picture."""
-_LOOSE = 0.3
+_LOOSE = 0.55
 """A picture that could be smaller by this factor becomes so: not at every breath of a point."""
 _RINGS = (1.0, 2.0, 3.0)
 CONTOURED = 2

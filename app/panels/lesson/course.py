@@ -39,16 +39,19 @@ class Course:
         if exercise is None:
             add_invitation(gui, notebook, choose)
 
-    def add_first_tabs(self, tabs: viser.GuiTabGroupHandle, plots: viser.PanelHandle) -> None:
+    def add_first_tabs(
+        self, tabs: viser.GuiTabGroupHandle, plots: viser.PanelHandle | viser.GuiTabGroupHandle
+    ) -> None:
         """The step that is on, and its curves among the plots."""
         gui, exercise = self._gui, self._exercise
         if exercise is None:
             return
+        lesson = tabs.add_tab("Lesson")
         with plots.add_tab("This step"):
             pictures = gui.add_html("")
         self._panel = LessonPanel(
             gui,
-            tabs.add_tab("Lesson"),
+            lesson,
             pictures,
             exercise,
             self._learner,
