@@ -153,7 +153,7 @@ def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
     learner = learner_of(drawing)
     assert eventually(sheet, lambda: learner.status is not None and learner.status.inside is not None
                       and learner.status.inside.matrix is not None)  # fmt: skip
-    assert eventually(sheet, lambda: sheet.locator(f'[data-chart="{HESSIAN}"] path').count() > 3)
+    expect(sheet.locator(f'[data-chart="{HESSIAN}"]').get_by_text("joint by joint")).to_be_visible()
     sheet.get_by_text("The Hessian of one level").click()
 
 
