@@ -20,6 +20,7 @@ from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import full
+from app.view.follow import FollowBase
 from app.view.goals import Goals
 from app.view.obstacles import Obstacles
 from app.view.robot import RobotView, camera_for, look_at
@@ -101,6 +102,7 @@ class VelocityFace:
             task.name: Trails(scene, [], context.colours[task.level], f"_{task.name}", scale=1)
             for task in self._points
         }
+        self._along = FollowBase(context.client.camera)
         self._circle: ReachCircle | None = None
         if self._base:
             first = len(self._base)
@@ -154,6 +156,8 @@ class VelocityFace:
     def follow(self, moment: Moment) -> None:
         tip = moment.poses[-1]
         self._frames.actual(tip)
+        if self._base:
+            self._along.follow(moment.poses[len(self._base) - 1, :3], bool(self._begin.along.value))
         mission = moment.status.mission
         carries = mission is not None and bool(mission.people) and not mission.done
         self._carried.follow(tip[:3], carries)

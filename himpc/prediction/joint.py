@@ -67,11 +67,3 @@ def predict_positions(state: JointState, U: Array, M_bar: Array, T_s: float) -> 
     moved = np.matmul(_lags(len(U), T_s)[1], U / M_bar, out=q[1:])
     moved += state.free_position(len(U), T_s)
     return q
-
-
-def predict_velocities(state: JointState, U: Array, M_bar: Array, T_s: float) -> Array:
-    """q̇ at knots 0 … N under the increments, (N+1, n), by (18); arguments as in `predict_positions`."""
-    v = np.empty((len(U) + 1, state.q.size))
-    v[0] = state.v
-    v[1:] = state.free_velocity(len(U), T_s) + _lags(len(U), T_s)[0] @ (U / M_bar)
-    return v

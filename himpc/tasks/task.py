@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -21,7 +22,7 @@ Gain = Annotated[float | tuple[float, ...], GAINS]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class Task(ABC):
     """What a hierarchy level asks for: coordinates, Jacobian and gains, nothing else.
 
     The closed loop aimed at is (4) of the HIMPC paper: x̃'' + K_v x̃' + K_p x̃ = 0 with x̃ = x − x_d.
@@ -38,21 +39,21 @@ class Task:
 
     unit: ClassVar[Literal["m", "rad"]] = "m"
 
+    @abstractmethod
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
         """Names of the m coordinates, in the order of the error's components."""
-        raise NotImplementedError
 
+    @abstractmethod
     def value(self, configuration: Configuration) -> Array:
         """x_i of (2) at the measured state: (m,) coordinates, or a rotation matrix (3, 3)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def error(self, value: Array, desired: Array) -> Array:
         """x̃ = x − x_d, shape (m,), in the task's unit."""
-        raise NotImplementedError
 
+    @abstractmethod
     def jacobian(self, configuration: Configuration) -> Array:
         """J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
-        raise NotImplementedError
 
     def target(self, configuration: Configuration) -> Array:
         """x_d at which the error is zero now: where a draggable target starts."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
@@ -25,7 +26,7 @@ the last one nothing plans for the arm: folded against its limits it may not get
 
 
 @dataclass(frozen=True)
-class MissionOptions:
+class MissionOptions(ABC):
     """The choices of a scene; each field is a path of its own (`--set peak=[-2,1]`)."""
 
     parts: ClassVar[tuple[str, ...]] = ()
@@ -36,9 +37,9 @@ class MissionOptions:
         """Length of each part, s."""
         return 0.0
 
+    @abstractmethod
     def mission(self, home: Home) -> Mission:
         """The tasks. Args: home: where each role's point is at the start, (m,) m."""
-        raise NotImplementedError
 
     @property
     def L(self) -> int:

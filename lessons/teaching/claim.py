@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from lessons.teaching.measure import Measure, Rows
+from lessons.teaching.measure import Measure
 
 Relation = Literal["at most", "at least"]
 _SIGNS: dict[Relation, str] = {"at most": "≤", "at least": "≥"}
@@ -35,11 +35,6 @@ class Claim:
     def holds(self, value: float) -> bool:
         """Whether a measured value fulfils the claim; NaN does not."""
         return value <= self.bound if self.relation == "at most" else value >= self.bound
-
-    def judge(self, rows: Rows, ghost: Rows | None = None) -> bool | None:
-        """Whether the claim holds in a run so far; None as long as there is nothing to measure."""
-        value = self.measure.value(rows, ghost)
-        return None if value != value else self.holds(value)
 
     @property
     def condition(self) -> str:

@@ -225,12 +225,12 @@ def test_the_check_judges_challenges() -> None:
 
 
 def test_claims_are_judged_on_a_run_half_done() -> None:
-    """None before the window begins; then true or false; NaN is never true."""
+    """Nothing to measure before the window begins; then true or false; NaN is never true."""
     rows = {"t": np.arange(10.0)[:, None] / 10, "error/position": np.arange(10.0)[:, None] * 1e-3}
     late = Claim("…", Measure(HAND, after=0.5), "at most", 7.0)
-    assert late.judge({name: field[:4] for name, field in rows.items()}) is None
-    assert late.judge({name: field[:8] for name, field in rows.items()}) is True
-    assert late.judge(rows) is False
+    assert math.isnan(late.measure.value({name: field[:4] for name, field in rows.items()}))
+    assert late.holds(late.measure.value({name: field[:8] for name, field in rows.items()}))
+    assert not late.holds(late.measure.value(rows))
     assert not late.holds(math.nan)
 
 

@@ -47,6 +47,9 @@ class BeginPanel:
             self.trace = gui.add_checkbox("Trace of the hand and the base", True)
             self.prediction = gui.add_checkbox("Predicted paths", True)
             self.reach = gui.add_checkbox("Reach of the arm", True, visible=drives)
+            self.along = gui.add_checkbox(
+                "Camera follows the base", False, visible=drives, hint="Turn and zoom as before"
+            )
             self.arrows = gui.add_checkbox("Arrows of obstacles", True)
             self.frames = gui.add_checkbox("Target and actual frames", True)
         self.dark = gui.add_checkbox("Dark theme", dark)
