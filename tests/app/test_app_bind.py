@@ -162,7 +162,7 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
         far = far.changed(path, value)
     loop = viser_server.get_event_loop()
     bindings: Bindings[TorqueSettings] = Bindings(lambda _: None, loop)
-    ControllerPanel(viser_server.gui, bindings, far, scene.robot)
+    ControllerPanel(MagicMock(gui=viser_server.gui), MagicMock(), bindings, far, scene.robot)
     values = {handle.value for handle in viser_server.gui._gui_input_handle_from_uuid.values()}
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
 
@@ -178,7 +178,8 @@ def test_menus_offer_every_word_a_setting_may_hold(
     assert len(words) > 1
     for word in words:
         viser_server.gui.reset()
-        ControllerPanel(viser_server.gui, bindings, scene.settings.changed(path, word), scene.robot)
+        changed = scene.settings.changed(path, word)
+        ControllerPanel(MagicMock(gui=viser_server.gui), MagicMock(), bindings, changed, scene.robot)
         handles = viser_server.gui._gui_input_handle_from_uuid.values()
         menus = [each for each in handles if isinstance(each, viser.GuiDropdownHandle)]
         assert any(menu.options == words and menu.value == word for menu in menus)
