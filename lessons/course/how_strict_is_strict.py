@@ -144,6 +144,7 @@ SUM = Step(
     The quadratic program walks off blindly, the line search cuts the step to a fortieth. The rows of
     (12) have the full Jacobian there. The paper finds the same, (12) "permitting larger step
     sizes", and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
+    (With the paper's own weights, `formulation=paper`, we find the hand worse off under (12).)
     """,
     prediction=Choice(
         "(11) forbids less than (12). With it, the base's mean error over the 8 s is …",

@@ -82,8 +82,8 @@ SQUARE = Step(
     do="Go to 4 ms. Then try M̄ instead: how much of it buys the same?",
     why=r"""
     $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
-    the error only doubles. Faster is not better when sensors are coarse. $\bar M$ enters once: it
-    trades noise against accuracy one for one.
+    the error grows by little more than half. Faster is not better when sensors are coarse. $\bar M$
+    enters once: it trades noise against accuracy one for one.
     """,
     prediction=Value(
         "T_s twice as long: the torque changes become how many times as large?",
@@ -100,6 +100,14 @@ SQUARE = Step(
             0.4,
             fails_with=("T_s=0.001",),
             because="then it is the ghost",
+        ),
+        Claim(
+            "The largest error of the hand grows by less than three quarters.",
+            Measure(HAND, over_ghost=True),
+            "at most",
+            1.75,
+            fails_with=("T_s=0.01",),
+            because="ten times the period is too slow for the circle",
         ),
         Claim(
             "The hand still stays within half a millimetre.",

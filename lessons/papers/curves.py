@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Run
 from lessons.plots.panels import Curve, Panel
 from lessons.plots.style import name
+
+Array = NDArray[np.float64]
 
 
 def curve(run: Run, field: str, k: int = 0, scale: float = 1.0, **how: object) -> Curve:
@@ -35,6 +38,24 @@ def by_controller(runs: Sequence[Run], field: str, k: int, scale: float = 1.0) -
     )
 
 
+BAND = 0.05
+"""s: of each such window a band shows the least and the largest value."""
+
+
+def banded(panel: Panel) -> Panel:
+    """The panel with each curve as the band between its least and largest value in windows of BAND: what
+    chatters would otherwise be a block of ink."""
+    return replace(panel, curves=tuple(_band(each) for each in panel.curves))
+
+
+def _band(curve: Curve) -> Curve:
+    if len(curve.x) < 2:
+        return curve
+    starts = np.unique(np.searchsorted(curve.x, np.arange(curve.x[0], curve.x[-1], BAND)))
+    low, high = np.minimum.reduceat(curve.y, starts), np.maximum.reduceat(curve.y, starts)
+    return replace(curve, x=curve.x[starts] + BAND / 2, y=low, y_to=high, style="band")
+
+
 def excerpt(panel: Panel, start: float, end: float) -> Panel:
     """A short piece of a panel's time axis, held values shown as steps."""
     curves = []
@@ -49,6 +70,39 @@ def error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, float
     return tuple(
         Panel(label, by_controller(runs, f"error/{task}", k, scale)) for task, k, label, scale in tasks
     )
+
+
+FAINTEST = 1e-3
+"""Of a coordinate's unit: where a logarithmic axis of errors ends."""
+
+
+def log_error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, float]]) -> tuple[Panel, ...]:
+    """The same as sizes on logarithmic axes, as the largest in windows of BAND: small errors are seen too.
+    Of controllers that coincide the earlier is broad."""
+    panels = []
+    for panel in error_panels(runs, tasks):
+        curves = tuple(
+            replace(_largest(each), weight=2.6 if place < len(panel.curves) / 2 else 1.0)
+            for place, each in enumerate(panel.curves)
+        )
+        label = "size of " + panel.y_label
+        panels.append(Panel(label, curves, log_y=True, y_range=(FAINTEST, 10.0)))
+    return tuple(panels)
+
+
+def _largest(curve: Curve) -> Curve:
+    band = _band(replace(curve, y=np.abs(curve.y)))
+    return band if band.y_to is None else replace(band, y=band.y_to, y_to=None, style="line")
+
+
+def spans(t: Array, inside: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+    """The intervals of time in which something holds; gaps of less than BAND are closed."""
+    times = t[inside]
+    if not times.size:
+        return ()
+    cuts = np.flatnonzero(np.diff(times) > BAND)
+    starts, ends = np.r_[times[0], times[cuts + 1]], np.r_[times[cuts], times[-1]]
+    return tuple(zip(starts.tolist(), ends.tolist(), strict=True))
 
 
 PLANAR_ERRORS = (
@@ -79,6 +133,11 @@ def joint_panels(
             size = scale * float(known.column(bound, k)[0])
             bounds = (-size, size) if np.isfinite(size) else ()
         panels.append(
-            Panel(f"${symbol}_{k + 1}$ ({unit})", by_controller(runs, field, k, scale), bounds=bounds)
+            Panel(
+                f"${symbol}_{k + 1}$ ({unit})",
+                by_controller(runs, field, k, scale),
+                bounds=bounds,
+                bound_label="bound",
+            )
         )
     return tuple(panels)

@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from lessons.plots.panels import Bars, Curve, Panel, Picture
-from lessons.plots.style import BOUND, RC, colour
+from lessons.plots.style import BOUND, RC, REFERENCE, colour
 from lessons.plots.ticks import label_values
 
 WIDTH = 7.2
@@ -63,8 +63,7 @@ def _height(picture: Picture, row: int) -> float:
 def _draw_panel(axes: Axes, panel: Panel) -> None:
     for curve in panel.curves:
         _draw_curve(axes, curve)
-    for bound in panel.bounds:
-        axes.axhline(bound, color=BOUND, linewidth=1.2, linestyle=(0, (4, 1.5, 1, 1.5)), zorder=1)
+    _draw_lines(axes, panel)
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
     if panel.log_x and _positive(curve.x for curve in panel.curves):
         axes.set_xscale("log")
@@ -94,6 +93,22 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         axes.margins(x=0.01)
 
 
+def _draw_lines(axes: Axes, panel: Panel) -> None:
+    """Bounds, marked instants, shaded intervals and notes; the first of each kind is named."""
+    dotted = (0, (4, 1.5, 1, 1.5))
+    for place, bound in enumerate(panel.bounds):
+        label = panel.bound_label if place == 0 else ""
+        axes.axhline(bound, color=BOUND, linewidth=1.2, linestyle=dotted, zorder=1, label=label)
+    for place, mark in enumerate(panel.marks):
+        label = panel.mark_label if place == 0 else ""
+        axes.axvline(mark, color=REFERENCE, linewidth=0.9, linestyle=":", zorder=1, label=label)
+    for place, (start, end) in enumerate(panel.spans):
+        label = panel.span_label if place == 0 else ""
+        axes.axvspan(start, end, color=BOUND, alpha=0.25, linewidth=0, zorder=0, label=label)
+    for x, y, text in panel.notes:
+        axes.annotate(text, (x, y), (3, 3), textcoords="offset points", fontsize=7, zorder=4)
+
+
 def _positive(values: Iterable[np.ndarray]) -> bool:
     """Whether a logarithmic axis would have anything to show."""
     return any(bool((each[np.isfinite(each)] > 0).any()) for each in values)
@@ -104,6 +119,11 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
     if curve.style == "dots":
         axes.plot(
             curve.x, curve.y, ".", color=shade, label=curve.label, markersize=3 * curve.weight, zorder=3
+        )
+        return
+    if curve.y_to is not None:
+        axes.fill_between(
+            curve.x, curve.y, curve.y_to, color=shade, alpha=0.45, linewidth=0.4, label=curve.label, zorder=3
         )
         return
     axes.plot(

@@ -18,8 +18,9 @@ class Curve:
         x, y: (k,) each.
         label: name in the legend; "" for none.
         colour: a controller's name, "reference", or a place "0", "1", … in the sequence of colours.
-        style: "line", "dashed", "dots" or "steps".
+        style: "line", "dashed", "dots", "steps" or "band" (filled from y to `y_to`).
         weight: line width relative to an ordinary curve.
+        y_to: (k,) the other edge of a band.
     """
 
     x: Array
@@ -28,6 +29,7 @@ class Curve:
     colour: str = "0"
     style: str = "line"
     weight: float = 1.0
+    y_to: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,12 @@ class Panel:
         y_label, x_label: with units.
         curves: drawn in order.
         bounds: horizontal bounds: constants, drawn grey.
+        bound_label: what they are, for the legend; "" for nothing.
+        marks: instants on the x axis, drawn as upright lines.
+        mark_label: what they are, for the legend.
+        spans: intervals on the x axis, shaded.
+        span_label: what they are, for the legend.
+        notes: (x, y, text) beside points.
         title: above the panel.
         log_x, log_y: logarithmic axes.
         equal: one metre is as long in x as in y.
@@ -49,6 +57,12 @@ class Panel:
     curves: tuple[Curve, ...]
     x_label: str = "time (s)"
     bounds: tuple[float, ...] = ()
+    bound_label: str = ""
+    marks: tuple[float, ...] = ()
+    mark_label: str = ""
+    spans: tuple[tuple[float, float], ...] = ()
+    span_label: str = ""
+    notes: tuple[tuple[float, float, str], ...] = ()
     title: str = ""
     log_x: bool = False
     log_y: bool = False

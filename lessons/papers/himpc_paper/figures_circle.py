@@ -7,7 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from lessons.experiments.jobs import Job, Results, Run
-from lessons.papers.curves import PLANAR_ERRORS, curve, error_panels, excerpt, joint_panels
+from lessons.papers.curves import (
+    PLANAR_ERRORS,
+    banded,
+    curve,
+    error_panels,
+    excerpt,
+    joint_panels,
+    log_error_panels,
+)
 from lessons.papers.himpc_paper.planar import COMPARED, ENCODER, SOURCE, roughness, rt1, rt2, rt3
 from lessons.papers.item import Item, Row, Section, Table
 from lessons.papers.printed import printed
@@ -83,8 +91,11 @@ def _fig_9(results: Results, quick: bool) -> Section:
 
 def _fig_4(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(COMPARED))
-    caption = "Tracking errors on RT1 with the paper's encoder."
-    return _picture("himpc-fig-4", caption, error_panels(runs, PLANAR_ERRORS))
+    caption = (
+        "Size of the tracking errors on RT1 with the paper's encoder, the largest in every 50 ms. OSF and "
+        "HQP coincide, and so do TDEOSF and HIMPC."
+    )
+    return _picture("himpc-fig-4", caption, log_error_panels(runs, PLANAR_ERRORS))
 
 
 def _fig_5(results: Results, quick: bool) -> Section:
@@ -96,9 +107,12 @@ def _fig_5(results: Results, quick: bool) -> Section:
 def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Section:
     runs = _runs(results, encoder_runs(controllers))
     first, second = (name(controller) for controller in controllers)
-    caption = f"Torques of {first} and {second} on RT1 with the paper's encoder; right: 50 ms of them."
+    caption = (
+        f"Torques of {first} and {second} on RT1 with the paper's encoder: between which values in every "
+        "50 ms, where the two all but coincide; right: 50 ms of them."
+    )
     whole = joint_panels(runs, "tau", r"\tau", "N·m")
-    panels = tuple(each for panel in whole for each in (panel, excerpt(panel, 2.5, 2.55)))
+    panels = tuple(each for panel in whole for each in (banded(panel), excerpt(panel, 2.5, 2.55)))
     picture = Picture(f"himpc-fig-{number}", caption, panels, 2)
     says = printed("himpc_text")[f"smoother_than_{controllers[0]}"]
     row = Row(
@@ -120,7 +134,13 @@ def _fig_8(results: Results, quick: bool) -> Section:
     series = tuple(
         (name(run.controller), run.controller, cost) for run, cost in zip(runs, costs, strict=True)
     )
-    bars = Bars("average cost $C_i$", ("level 1", "level 2"), series)
+    groups = ("level 1", "level 2")
+    bars = Bars("$C_i$ (m²/s⁴, rad²/s⁴)", groups, series)
+    apart = tuple(
+        (label, key, tuple(100.0 * (c / h - 1.0) for c, h in zip(cost, costs[0], strict=True)))
+        for label, key, cost in series[1:]
+    )
+    beside = Bars("over HIMPC's (%)", groups, apart)
     rows = tuple(
         (name(run.controller), *(number(value) for value in cost), trouble(run))
         for run, cost in zip(runs, costs, strict=True)
@@ -159,7 +179,7 @@ def _fig_8(results: Results, quick: bool) -> Section:
         ),
         rows=compared,
         tables=(Table("Average cost (41)", ("controller", "level 1", "level 2", ""), rows),),
-        pictures=(Picture("himpc-fig-8", "Average cost (41) on RT1, paper's encoder.", (bars,)),),
+        pictures=(Picture("himpc-fig-8", "Average cost (41) on RT1, paper's encoder.", (bars, beside), 2),),
     )
 
 

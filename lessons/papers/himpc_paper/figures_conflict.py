@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -41,16 +42,19 @@ def _fig_10(results: Results, quick: bool) -> Section:
 
 def _fig_11(results: Results, quick: bool) -> Section:
     panels, growth = [], {}
-    for controller in ("hqp", "himpc"):
+    for controller, size, words in (("hqp", 12.0, "±12 mm"), ("himpc", 1.2, "±1.2 mm: ten times enlarged")):
         circle, conflict = results[rt1(controller)], results[rt2(controller)]
         for k, axis in enumerate("xy"):
-            curves = tuple(
-                curve(run, "error/position", k, 1e3, label=label, colour=colour)
-                for run, label, colour in ((conflict, "RT2", "1"), (circle, "RT1", "0"))
+            curves = (
+                curve(
+                    conflict, "error/position", k, 1e3, label=f"{name(controller)}, RT2", colour=controller
+                ),
+                curve(circle, "error/position", k, 1e3, label="RT1", colour="reference", style="dashed"),
             )
-            panels.append(Panel(f"$e_{axis}$ (mm)", curves, title=name(controller) if k == 0 else ""))
+            title = f"{name(controller)}, {words}" if k == 0 else ""
+            panels.append(Panel(f"$e_{axis}$ (mm)", curves, title=title, y_range=(-size, size)))
         growth[controller] = level_1(conflict) / level_1(circle)
-    caption = "Level-1 errors with and without conflict."
+    caption = "Level-1 errors with (RT2) and without (RT1) conflict. HIMPC's axes are enlarged tenfold."
     return Section(
         rows=_growth_rows(results, growth),
         pictures=(Picture("himpc-fig-11", caption, (panels[0], panels[2], panels[1], panels[3]), 2),),
@@ -116,6 +120,13 @@ def skeleton(robot: Robot, q: Array) -> Array:
     return np.array([*joints, data.oMf[robot.frame_id(robot.tip)].translation])
 
 
+def _time_beside(tip: Array, path: Array, t: float) -> tuple[float, float, str]:
+    """When the tip was there, written outside the path."""
+    outward = tip[:2] - path.mean(axis=0)
+    x, y = tip[:2] + 0.045 * outward / (np.linalg.norm(outward) or 1.0) - (0.03, 0.015)
+    return float(x), float(y), f"{t:.1f} s"
+
+
 def _fig_14(results: Results, quick: bool) -> Section:
     run = results[rt3("himpc")]
     panels = []
@@ -137,7 +148,9 @@ def _fig_14(results: Results, quick: bool) -> Section:
             span = slice(chosen[0], chosen[-1] + 1)
             x_d = run["x_d/position"][span]
             path = Curve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
-            panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title))
+            # The last pose is the first of the other panel, or where that began.
+            notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
+            panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
     caption = f"HIMPC on RT3 in {POSES} poses; straight, thus singular, in the 1st, 10th and 19th (thick)."
     return _picture("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)
 
@@ -145,7 +158,11 @@ def _fig_14(results: Results, quick: bool) -> Section:
 def _fig_15(results: Results, quick: bool) -> Section:
     run = results[rt3("himpc")]
     whole = [run.error_of("position", k, "rmse") for k in (0, 1)]
-    found = _picture("himpc-fig-15", "Tracking errors of HIMPC on RT3.", error_panels([run], PLANAR_ERRORS))
+    panels = tuple(
+        replace(panel, marks=(0.0, 8.0, 16.0), mark_label="straight, thus singular")
+        for panel in error_panels([run], PLANAR_ERRORS)
+    )
+    found = _picture("himpc-fig-15", "Tracking errors of HIMPC on RT3.", panels)
     return Section(
         rows=tuple(
             Row(

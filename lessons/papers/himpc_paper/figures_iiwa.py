@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from himpc.telemetry import AT_POSITION
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.curves import by_controller, curve, excerpt
+from lessons.papers.curves import banded, by_controller, curve, excerpt, spans
 from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
 from lessons.papers.himpc_paper.table_6 import horizon_job, horizons
 from lessons.papers.himpc_paper.table_7 import step_seconds, timed
@@ -22,6 +23,8 @@ DEG = 180 / np.pi
 
 def _fig_17(results: Results, quick: bool) -> Section:
     run = results[rt4()]
+    bits = np.nan_to_num(run["at_bound"]).astype(int)
+    active = spans(run.t, (bits & AT_POSITION != 0).any(axis=1)) if len(run.t) else ()
     panels = tuple(
         Panel(
             label,
@@ -29,14 +32,17 @@ def _fig_17(results: Results, quick: bool) -> Section:
                 curve(run, f"error/{task}", k, scale, label=axis, colour=str(colour + k))
                 for k, axis in enumerate(axes)
             ),
+            spans=active,
+            span_label="a joint at its position limit",
         )
         for task, label, axes, scale, colour in (
-            ("position", "level 1 (mm)", ("x", "y", "z"), 1e3, 0),
-            ("orientation", "level 2 (deg)", ("$o_X$", "$o_Y$", "$o_Z$"), DEG, 3),
-            ("q1", "level 3 (deg)", ("$q_1$",), DEG, 6),
+            ("position", "error of level 1 (mm)", ("x", "y", "z"), 1e3, 0),
+            ("orientation", "error of level 2 (deg)", ("$o_X$", "$o_Y$", "$o_Z$"), DEG, 3),
+            ("q1", "error of level 3 (deg)", ("$q_1$",), DEG, 6),
         )
     )
-    return Section(pictures=(Picture("himpc-fig-17", "Tracking errors of HIMPC on RT4, N = 5.", panels),))
+    caption = "Tracking errors of HIMPC on RT4, N = 5. Shaded: a position limit is active."
+    return Section(pictures=(Picture("himpc-fig-17", caption, panels),))
 
 
 def _fig_18_jobs(quick: bool) -> tuple[Job, ...]:
@@ -110,7 +116,10 @@ def _fig_21(results: Results, quick: bool) -> Section:
         curve(benchmark, "tau", 0, label="1e-5° (benchmark)", colour="0"),
     )
     whole = Panel(r"$\tau_1$ (N·m)", curves)
-    panels = (whole, replace(excerpt(whole, 1.0, 1.05), title="50 ms of it"))
+    panels = (
+        replace(banded(whole), title="between which values in every 50 ms"),
+        replace(excerpt(whole, 1.0, 1.05), title="50 ms of it"),
+    )
     caption = f"Torque of joint 1 with encoders of 5e-3°: S = {number(smoothness(coarse, benchmark))} N·m."
     return Section(pictures=(Picture("himpc-fig-21", caption, panels, 2),))
 

@@ -56,7 +56,11 @@ def _section(results: Results, quick: bool) -> Section:
             y_range=(0.0, 2.0),
         ),
     )
-    caption = "Value functions of the three levels from rest on RT4, and level 1's from tick to tick."
+    caption = (
+        "Value functions of the three levels from rest on RT4, and level 1's from tick to tick. Level 3 "
+        "climbs: joint 1 may not turn as fast as asked, so its error grows, and (39) promises nothing for "
+        "lower levels."
+    )
     return Section(
         notes=(
             "V_N(k) is the optimal cost of each level, from the telemetry. Level 1 must decrease as long as "
@@ -81,7 +85,7 @@ def _value(run: Run, level: str, place: int) -> Curve:
 ITEMS = (
     Item(
         "himpc-value",
-        "The value function decreases",
+        "The value function of level 1 decreases",
         "HIMPC (T-RO 2024), section IV-B, (37) to (39)",
         lambda quick: (_JOB,),
         _section,

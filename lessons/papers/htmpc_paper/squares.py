@@ -81,7 +81,10 @@ def _fig_4(results: Results, quick: bool) -> Section:
         for words, run in runs.items()
         if len(run.t)
     )
-    panels = (Panel("base error (1)", base, bounds=(0.05,)), Panel("EE error (mm)", hand))
+    panels = (
+        Panel("base error (1)", base, bounds=(0.05,), bound_label="5 %", log_y=True, y_range=(1e-3, 1.5)),
+        Panel("EE error (mm)", hand, log_y=True, y_range=(1e-3, 10.0)),
+    )
     rows = tuple(
         Row(f"{words}: mean EE error", "mm", None, hand_mm(run)[0], "the paper shows curves only")
         for words, run in runs.items()
@@ -196,7 +199,7 @@ def _strip(title: str, values: dict[str, Array]) -> Panel:
             curves.append(_violin(place, each))
         curves.append(Curve(np.full(len(each), float(place)), each, "", str(place), "dots"))
         curves.append(Curve(np.array([place - 0.2, place + 0.2]), np.full(2, each.mean()), "", str(place)))
-    return Panel("base error (1)", tuple(curves), "", title=title, x_names=tuple(values))
+    return Panel("base error (1)", tuple(curves), "method", title=title, x_names=tuple(values))
 
 
 def _violin(place: int, values: Array) -> Curve:

@@ -101,7 +101,17 @@ def _fig_5(results: Results, quick: bool) -> Section:
         for place, (e, d) in enumerate((e, d) for e in EQUATIONS for d in DELTAS):
             run = results[_job(f, e, d)]
             curves.append(Curve(run.t, normalised(run), f"{EQUATIONS[e]}, {d} δ", str(place)))
-        panels.append(Panel("base error (1)", tuple(curves), title=f"formulation {words}", bounds=(0.05,)))
+        panels.append(
+            Panel(
+                "base error (1)",
+                tuple(curves),
+                title=f"formulation {words}",
+                bounds=(0.05,),
+                bound_label="5 %",
+                log_y=True,
+                y_range=(1e-3, 1.5),
+            )
+        )
     caption = "Base error over its value at the start of each part, with the 5 % bound of the paper's Fig. 5."
     return Section(
         checks=_base_checks(results), pictures=(Picture("htmpc-fig-5", caption, tuple(panels), 2),)

@@ -1,0 +1,170 @@
+"""What the lessons derive, recomputed: the numbers and equations in their texts that no run can judge.
+
+The predictions (14), (15), (18), (28) with c_l are held against the printed matrices in
+`test_himpc_prediction`, (31) to (35) in `test_himpc_cascade`, (8) to (13) of HTMPC in `test_htmpc_equations`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from himpc.limits import Limits, in_force
+from himpc.limits.limits import POSITION_MARGIN
+from himpc.limits.rows import REACTION
+from himpc.limits.viability import viability_bounds
+from himpc.prediction.task import residual_model
+from lessons.course import load_lesson
+from lessons.scenes.catalog import torque_scene
+from robots import Plant, convergence_gauge, load_robot
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def iiwa() -> tuple[Array, Array]:
+    """M at the start of `iiwa14-hold`, (7, 7), and the diagonal of its M̄."""
+    scene = torque_scene("iiwa14-hold")
+    plant = Plant(scene.robot, scene.settings.plant)
+    plant.reset(scene.q_0)
+    return plant.mass_matrix(), np.array(scene.settings.M_bar)
+
+
+# -------------------------------------------------------------------------------- time-delay estimation
+
+
+def test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar(iiwa: tuple[Array, Array]) -> None:
+    """(8), (12): with H_q from a millisecond ago and Δτ = M̄(wanted − q̈₀), (I − M⁻¹M̄)(q̈₀ − wanted) is left."""
+    rng = np.random.default_rng(0)
+    M, M_bar = iiwa[0], np.diag(iiwa[1])
+    forces, tau_0, wanted = rng.normal(size=(3, len(M)))
+    before = np.linalg.solve(M, tau_0 - forces)
+    after = np.linalg.solve(M, tau_0 + M_bar @ (wanted - before) - forces)
+    expected = (np.eye(len(M)) - np.linalg.solve(M, M_bar)) @ (before - wanted)
+    np.testing.assert_allclose(after - wanted, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("scale", "radius"), [(1.0, 0.985), (6.0, 0.91), (7.0, 1.21)])
+def test_the_gauge_of_no_model_needed(iiwa: tuple[Array, Array], scale: float, radius: float) -> None:
+    """Near 1 it may mean slow (an eigenvalue near +1) or nearly unstable (near −1)."""
+    assert convergence_gauge(iiwa[0], scale * iiwa[1])[1] == pytest.approx(radius, abs=0.01)
+
+
+def test_at_six_times_M_bar_both_ends_of_the_spectrum_are_alike(iiwa: tuple[Array, Array]) -> None:
+    left = 1.0 - np.linalg.eigvals(np.linalg.solve(iiwa[0], np.diag(6.0 * iiwa[1]))).real
+    assert left.max() == pytest.approx(0.91, abs=0.01)
+    assert left.min() == pytest.approx(-0.89, abs=0.02)
+
+
+def test_a_norm_below_1_is_enough_and_not_necessary(iiwa: tuple[Array, Array]) -> None:
+    """At 4 M̄ the norm of Remark 4 is 1.21: one step may grow, many steps vanish."""
+    norm, radius = convergence_gauge(iiwa[0], 4.0 * iiwa[1])
+    assert norm == pytest.approx(1.21, abs=0.02) and radius < 0.95
+    left = np.eye(7) - np.linalg.solve(iiwa[0], np.diag(4.0 * iiwa[1]))
+    assert np.linalg.norm(np.linalg.matrix_power(left, 200)) < 1e-3
+
+
+def test_remark_4_as_printed_is_for_a_diagonal_M(iiwa: tuple[Array, Array]) -> None:
+    """1 − M̄ᵢ/λᵢ(M) are the eigenvalues of I − M⁻¹M̄ if M is diagonal, and otherwise not."""
+    M, M_bar = iiwa
+
+    def printed(M: Array) -> Array:
+        return np.sort(np.asarray(1.0 - np.sort(M_bar) / np.sort(np.linalg.eigvalsh(M)), float))
+
+    def true(M: Array) -> Array:
+        return np.sort(np.asarray(1.0 - np.linalg.eigvals(np.linalg.solve(M, np.diag(M_bar))).real, float))
+
+    diagonal = np.diag(np.sort(np.diag(M))[np.argsort(np.argsort(M_bar))])
+    np.testing.assert_allclose(true(diagonal), printed(diagonal), atol=1e-9)
+    assert np.abs(true(M) - printed(M)).max() > 0.05
+
+
+# -------------------------------------------------------------------------------- stopping
+
+
+def bound_at(degrees: float, reaction: float, margin: float) -> float:
+    """deg/s allowed so far before joint 2's limit on the planar arm."""
+    robot = load_robot("planar3")
+    q = robot.q_upper - math.radians(degrees)
+    force = in_force(robot, Limits(velocity=False))
+    found = viability_bounds(
+        q, robot.q_lower + margin, robot.q_upper - margin, force.v_limit, robot.a_max, reaction
+    )
+    return math.degrees(found[1, 1])
+
+
+def test_the_speeds_of_stopping_takes_distance() -> None:
+    """5° before the limit: 106°/s for an exact model, 13.5°/s for ours; and the text prints what runs."""
+    reaction = 1e-3 + REACTION / Limits().velocity_approach
+    assert bound_at(5.0, 1e-3, 0.0) == pytest.approx(105.9, abs=0.1)
+    assert bound_at(5.0, reaction, POSITION_MARGIN) == pytest.approx(13.5, abs=0.1)
+    step = load_lesson("stopping-takes-distance").steps[2]
+    assert reaction == pytest.approx(0.33, abs=0.005) and "0.33" in step.text
+    assert math.degrees(POSITION_MARGIN) == pytest.approx(0.4, abs=0.005) and "0.4°" in step.text
+    assert "106°/s" in step.why and "13.5°/s" in step.why
+
+
+@pytest.mark.parametrize("reaction", [1e-3, 0.1, 0.334])
+@pytest.mark.parametrize("room", [0.01, 0.1, 1.0])
+def test_from_the_viable_speed_the_joint_stops_at_the_limit(reaction: float, room: float) -> None:
+    """v·t + v²/2a = q_s − q is what the printed root solves."""
+    one, a = np.ones(1), 20.0
+    v = viability_bounds(0.0 * one, -one, room * one, np.inf * one, a * one, reaction)[1, 0]
+    assert v * reaction + v**2 / (2 * a) == pytest.approx(room, rel=1e-9)
+
+
+# -------------------------------------------------------------------------------- tasks
+
+
+def test_at_rest_the_residual_is_K_P_times_the_error() -> None:
+    """(28): what a weighted sum weighs is 200 m/s² for a metre and 50 rad/s² for a radian."""
+    model = residual_model(np.array([200.0, 50.0]), np.array([10.0, 5.0]), 5, 1e-3)
+    still = np.zeros((5, 2))
+    e = model.free(np.ones(2), np.zeros(2), np.zeros(2), still, still, still)
+    np.testing.assert_allclose(e, np.tile([200.0, 50.0], (5, 1)))
+
+
+def test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand() -> None:
+    """J_{2|1} = J₂P₁ of *When tasks fight* vanishes at q₃ = 0 and nowhere near 90°."""
+    robot = load_robot("planar3")
+    plant = Plant(robot)
+
+    def projected(q_3: float) -> float:
+        plant.reset(np.radians([-40.0, 100.0, q_3]))
+        J = plant.jacobian(robot.tip)[:2]
+        return float(np.linalg.norm((np.eye(3) - np.linalg.pinv(J) @ J)[0]))
+
+    assert projected(0.0) < 1e-9
+    assert projected(-90.0) > 0.3
+    assert projected(-10.0) < projected(-20.0) < projected(-45.0)
+
+
+def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
+    """*One task under MPC*: Q‖J M̄⁻¹Δτ‖² and R‖Δτ‖² are alike for R of the order of 10⁵."""
+    scene = torque_scene("planar3-hold")
+    robot = scene.robot
+    plant = Plant(robot)
+    plant.reset(scene.q_0)
+    G = plant.jacobian(robot.tip)[:2] / np.array(scene.settings.M_bar)
+    largest = 200.0 * np.linalg.norm(G, 2) ** 2
+    assert 3e4 < largest < 3e5
+
+
+def test_one_digit_of_a_coarse_encoder_is_almost_3_newton_metres() -> None:
+    """*Sensors are coarse*: M̄ δ/T_s²."""
+    M_bar = float(torque_scene("planar3-circle").settings.M_bar[0])
+    assert M_bar * math.radians(0.005) / 1e-6 == pytest.approx(2.9, abs=0.05)
+
+
+def test_texts_that_name_a_step_time_name_the_readmes() -> None:
+    """*How far ahead* and *Deadlines* quote what `benchmarks/` measured and the README prints."""
+    text = load_lesson("how-far-ahead").steps[0].text
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"0\.\d\d", text)
+    assert quoted == ["0.07", "0.19", "0.31"]
+    assert all(each in readme for each in quoted)
