@@ -6,6 +6,7 @@ from lessons.papers.himpc_paper import (
     figures_circle,
     figures_conflict,
     figures_iiwa,
+    limits,
     table_2,
     table_3,
     table_5,
@@ -28,4 +29,5 @@ ITEMS = (
     *accuracy.ITEMS,
     *value.ITEMS,
     *ablations.ITEMS,
+    *limits.ITEMS,
 )

@@ -1,0 +1,128 @@
+"""What our departures from the limits (32d) and (32e) as printed are worth, on several plants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lessons.experiments.jobs import Job, Results, Run
+from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
+from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
+from lessons.papers.words import number, trouble
+from lessons.plots.panels import Bars, Picture
+
+MODES = {
+    "as printed": ("limits.position=paper", "limits.velocity_approach=0"),
+    "barrier": ("limits.position=paper", "limits.velocity_approach=15"),
+    "barrier and margin": ("limits.position=viability", "limits.velocity_approach=15"),
+}
+"""Rows as printed; velocity bounds approached at 15 1/s; besides, position limits as the speed from which one
+can stop, 7 mrad before the limit and with a third of a second of reaction."""
+PLANTS = {
+    "nominal": (),
+    "payload 1 kg": ("plant.payload_kg=1",),
+    "payload 2 kg": ("plant.payload_kg=2",),
+    "encoder 0.5e-3°": ("plant.encoder_resolution_deg=0.0005",),
+    "friction 0.3 N·m": ("plant.friction=0.3",),
+}
+
+
+def _job(mode: str, plant: str) -> Job:
+    return Job(RT4_DATA_SHEET, "himpc", (*MODES[mode], *PLANTS[plant]))
+
+
+def _jobs(quick: bool) -> tuple[Job, ...]:
+    plants = ("nominal", "payload 1 kg") if quick else tuple(PLANTS)
+    return tuple(_job(mode, plant) for plant in plants for mode in MODES)
+
+
+_KINDS = ("position", "velocity")
+
+
+def _over(run: Run, kind: str) -> float:
+    """The largest |value| over its limit; 1 is the limit."""
+    return run.figure("limits", kind, "max_ratio")
+
+
+def _level_1_mm(run: Run) -> float:
+    return 1e3 * max(run.error_of("position", k) for k in range(3))
+
+
+def _section(results: Results, quick: bool) -> Section:
+    plants = [plant for plant in PLANTS if _job("as printed", plant) in results]
+    cases = [(plant, mode, results[_job(mode, plant)]) for plant in plants for mode in MODES]
+    rows = [
+        Row(f"{plant}, {mode}: largest {kind} over its limit", "1", None, _over(run, kind), _WHY, band=0.25)
+        for plant, mode, run in cases
+        for kind in _KINDS
+    ]
+    lines = tuple(
+        (
+            plant,
+            mode,
+            *(number(_over(run, kind)) for kind in _KINDS),
+            number(_level_1_mm(run)),
+            number(run.figure("solver", "unsolved")),
+            trouble(run),
+        )
+        for plant, mode, run in cases
+    )
+    columns = (
+        "plant",
+        "limits",
+        "position / limit",
+        "speed / limit",
+        "level 1, worst axis (mm)",
+        "QPs without a solution",
+        "",
+    )
+    own = [run for _, mode, run in cases if mode == "barrier and margin"]
+    checks: tuple[Check, ...] = tuple(
+        check
+        for plant, run in zip(plants, own, strict=True)
+        for check in (
+            at_most(f"{plant}, barrier and margin: position over its limit", _over(run, "position"), 1.0),
+            at_most(
+                f"{plant}, barrier and margin: QPs without a solution", run.figure("solver", "unsolved"), 0
+            ),
+        )
+    )
+    printed = results[_job("as printed", "nominal")]
+    checks += (between("nominal, as printed: speed over its limit", _over(printed, "velocity"), 1.05, 2.0),)
+    return Section(
+        notes=(
+            "RT4 from rest under the data sheet's limits: joint 1 cannot turn as fast as asked, and joints "
+            "come near the ends of their ranges. As printed, speeds are overrun and a few QPs have no "
+            "solution. A barrier on speed alone makes it worse: a slow joint cannot obey a position row that "
+            "wants it to turn back within 5 ms. With position limits that one can stop before, position is "
+            "kept and every QP has a solution; speed is kept to 1 %, but for 2 kg that nobody told of: with "
+            "them from the start on none of the three keeps level 1. The constants are settings.",
+        ),
+        rows=tuple(rows),
+        tables=(Table("Violations, errors and QPs without a solution", columns, lines),),
+        checks=checks,
+        pictures=(_picture(results, plants),),
+    )
+
+
+_WHY = "the paper prints no number; its Fig. 13 shows slight violations of speed"
+
+
+def _picture(results: Results, plants: list[str]) -> Picture:
+    def bars(label: str, value: Callable[[Run], float]) -> Bars:
+        series = tuple(
+            (mode, str(place), tuple(value(results[_job(mode, plant)]) for plant in plants))
+            for place, mode in enumerate(MODES)
+        )
+        return Bars(label, tuple(plant.replace(" ", "\n", 1) for plant in plants), series)
+
+    panels = (
+        bars("speed over its limit (%)", lambda run: 100.0 * (_over(run, "velocity") - 1.0)),
+        bars("position over its limit (%)", lambda run: 100.0 * (_over(run, "position") - 1.0)),
+        bars("QPs without a solution", lambda run: run.figure("solver", "unsolved")),
+        bars("level 1, worst axis (mm)", _level_1_mm),
+    )
+    caption = "Limits as printed, with a barrier on speed, and with position limits one can stop before."
+    return Picture("himpc-limits", caption, panels, 2)
+
+
+ITEMS = (Item("himpc-limits", "What keeps a limit", "HIMPC (T-RO 2024), (32d), (32e)", _jobs, _section),)
