@@ -2,13 +2,15 @@
 
 python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, headless,
 here and in a checkout of COMMIT, and compares the results of `himpc-lab run --json`, timing keys apart.
-Exit code 1 if any differs.
+--tolerance T lets numbers differ by that share of the larger one (and by 1e-9), and the route and what it
+leaves as residuals altogether. Exit code 1 if any differs.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import subprocess
 import sys
 import tempfile
@@ -18,8 +20,10 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 TIMING = ("step_ms", "real_time_factor", "late_ticks")
 """Keys that differ from run to run."""
-NEW: tuple[str, ...] = ()
+NEW: tuple[str, ...] = ("levels",)
 """Keys that COMMIT may not have had."""
+_HOW = {"route", "max_kkt_residual"}
+"""Keys of a result that tell how it was found."""
 
 _RUNS = """
 import json, sys
@@ -40,6 +44,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("commit")
     parser.add_argument("--seconds", type=float, default=0.5)
+    parser.add_argument("--tolerance", type=float, default=0.0)
     given = parser.parse_args()
     names = _names()
     with tempfile.TemporaryDirectory() as folder:
@@ -55,7 +60,7 @@ def main() -> int:
                 subprocess.run(command, cwd=tree, env=_environment(tree), check=True)
         finally:
             subprocess.run(["git", "worktree", "remove", "--force", before], cwd=ROOT, check=True)
-        different = sum(_differs(name, then, now) for name in names)
+        different = sum(_differs(name, then, now, given.tolerance) for name in names)
     print(f"{len(names)} runs compared, {different} differ")
     return 1 if different else 0
 
@@ -75,13 +80,27 @@ def _environment(tree: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(tree)}
 
 
-def _differs(name: str, then: Path, now: Path) -> bool:
+def _differs(name: str, then: Path, now: Path, tolerance: float) -> bool:
     file = name.replace("/", "+") + ".json"
     before, after = (_plain(json.loads((folder / file).read_text())) for folder in (then, now))
-    for key in sorted(before.keys() | after.keys() - set(NEW)):
-        if before.get(key) != after.get(key):
-            print(f"{name}: {key} was {before.get(key)} and is {after.get(key)}")
-    return any(before.get(key) != after.get(key) for key in before.keys() | after.keys() - set(NEW))
+    keys = sorted(before.keys() | after.keys() - set(NEW))
+    different = [key for key in keys if not _same(before.get(key), after.get(key), tolerance)]
+    for key in different:
+        print(f"{name}: {key} was {before.get(key)} and is {after.get(key)}")
+    return bool(different)
+
+
+def _same(before: Any, after: Any, tolerance: float) -> bool:
+    """Equal, numbers up to the tolerance; before and after: parts of a JSON object."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        keys = before.keys() - (_HOW if tolerance > 0 else set())
+        return before.keys() == after.keys() and all(_same(before[k], after[k], tolerance) for k in keys)
+    if isinstance(before, list) and isinstance(after, list):
+        pairs = zip(before, after, strict=False)
+        return len(before) == len(after) and all(_same(b, a, tolerance) for b, a in pairs)
+    if isinstance(before, float) and isinstance(after, float) and tolerance > 0:
+        return math.isclose(before, after, rel_tol=tolerance, abs_tol=1e-9)
+    return bool(before == after)
 
 
 def _plain(result: dict[str, Any]) -> dict[str, Any]:

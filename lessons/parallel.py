@@ -110,6 +110,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
     try:
         from distributed import Client
         from distributed import as_completed as as_they_end
+        from distributed.scheduler import KilledWorker
     except ImportError:
         raise InputError(
             '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
@@ -131,12 +132,21 @@ def on_cluster(address: str) -> Iterator[Spread]:
     ) -> Generator[tuple[int, U | Failed], None, None]:
         # pure=False: two equal items are two pieces of work. A lost worker is no failure: the scheduler gives
         # its work to another one, up to its `allowed-failures` (3) times.
+        orphans: list[int] = []
         futures = [client.submit(_guarded, function, item, pure=False) for item in items]
         places = {future.key: place for place, future in enumerate(futures)}
         try:
             for future in as_they_end(futures):
                 error = future.exception()
-                yield places[future.key], future.result() if error is None else Failed(_sentence(error))
+                if isinstance(error, KilledWorker):
+                    orphans.append(places[future.key])
+                else:
+                    yield places[future.key], future.result() if error is None else Failed(_sentence(error))
+            # A dying worker takes along what waited there: one at a time, the culprit shows.
+            for place in sorted(orphans):
+                futures.append(client.submit(_guarded, function, items[place], pure=False))
+                error = futures[-1].exception()
+                yield place, futures[-1].result() if error is None else Failed(_sentence(error))
         finally:
             client.cancel(futures)
 

@@ -24,15 +24,19 @@ _STEP = 1e-3  # s, at which servos work
 class VelocityPlantSettings:
     """The truth about a velocity-controlled plant. All defaults: ideal kinematics, no noise.
 
-    mode: "ideal": the velocity moves linearly from its present value to the command within each step, so a
-        sampled double integrator is met exactly; "servo": MuJoCo's mechanics under joint velocity servos
-        τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
-    bandwidth: 1/s of the servos. lag_ms: time constant of a first-order lag between command and servo.
-    delay_ms: the command acts this much later.
-    position_noise, velocity_noise: standard deviation of white Gaussian noise on the measured q (rad, m) and
-        v (rad/s, m/s).
-    payload_kg, friction, damping: of the mechanics, "servo" only, as in `PlantSettings`; the servo does not
-        know of friction and damping. saturate: clip at the torque limits.
+    Attributes:
+        mode: "ideal": the velocity moves linearly from its present value to the command within each step, so
+            a sampled double integrator is met exactly; "servo": MuJoCo's mechanics under velocity servos
+            τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
+        bandwidth: 1/s, of the servos.
+        lag_ms: time constant of a first-order lag between command and servo.
+        delay_ms: the command acts this much later.
+        position_noise: standard deviation of white Gaussian noise on the measured q, rad (m).
+        velocity_noise: the same on the measured v, rad/s (m/s).
+        payload_kg: of the mechanics, "servo" only, as in `PlantSettings`.
+        friction: likewise; the servo does not know of it.
+        damping: likewise.
+        saturate: clip at the torque limits.
 
     Raises InputError, naming the field, for values that cannot be.
     """

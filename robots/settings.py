@@ -19,21 +19,25 @@ PerJoint = float | tuple[float, ...]
 class PlantSettings:
     """The truth about the plant, which no controller sees. All defaults: the nominal robot.
 
-    payload_kg: kg, a point mass at the robot's tip frame.
-    friction: N·m, Coulomb friction per joint (one number or one per joint; N for prismatic joints). MuJoCo
-        models it as a soft constraint, so a stuck joint creeps (about 1e-5 rad/s).
-    damping: N·m·s/rad, viscous friction. armature: kg·m², reflected rotor inertia, added to M_ii.
-    mass_scale: factor on the mass of the body each joint moves. inertia_scale: factor on its rotational
-        inertia about its centre of mass, which stays. Both by the same factor: a body of another density.
-        The payload is not scaled.
-    diagonal_scale: factor on the diagonal entries of M(q) in the dynamics, whatever q, off-diagonal entries,
-        C and g left as they are: the literal reading of the HIMPC paper's Table V. No mechanism behaves like
-        this: energy is not kept, and below 1 M(q) may lose definiteness (the run then flies apart).
-    encoder_resolution_deg: degrees; with a value above 0 the measured position of revolute joints is
-        rounded to multiples of it and the measured velocity is their backward difference.
-    torque_lag_ms: time constant of a first-order lag of the motors. delay_ms: the command acts this much
-        later (to the nearest internal step).
-    saturate: clip the command at the robot's torque limits. gravity: switch it off for a weightless plant.
+    Attributes:
+        payload_kg: kg, a point mass at the robot's tip frame.
+        friction: N·m, Coulomb friction per joint (one number or one per joint; N for prismatic joints).
+            MuJoCo models it as a soft constraint, so a stuck joint creeps (about 1e-5 rad/s).
+        damping: N·m·s/rad, viscous friction.
+        armature: kg·m², reflected rotor inertia, added to M_ii.
+        mass_scale: factor on the mass of the body each joint moves.
+        inertia_scale: factor on its rotational inertia about its centre of mass, which stays. Both by the
+            same factor: a body of another density. The payload is not scaled.
+        diagonal_scale: factor on the diagonal entries of M(q) in the dynamics, whatever q, off-diagonal
+            entries, C and g left as they are: the literal reading of the HIMPC paper's Table V. No mechanism
+            behaves like this: energy is not kept, and below 1 M(q) may lose definiteness (the run then flies
+            apart).
+        encoder_resolution_deg: degrees; with a value above 0 the measured position of revolute joints is
+            rounded to multiples of it and the measured velocity is their backward difference.
+        torque_lag_ms: time constant of a first-order lag of the motors.
+        delay_ms: the command acts this much later (to the nearest internal step).
+        saturate: clip the command at the robot's torque limits.
+        gravity: switch it off for a weightless plant.
 
     Raises InputError, naming the field, for values that are not finite, negative or absurdly large.
     """

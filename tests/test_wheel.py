@@ -1,0 +1,123 @@
+"""What `pip install` brings: a built wheel in an environment of its own, run far away from the checkout."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("robots", "himpc", "lessons", "app")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built from the files that are under version control, as from a fresh clone."""
+    folder = tmp_path_factory.mktemp("wheel")
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
+    for name in filter(None, listed.stdout.split("\0")):
+        if name.split("/")[0] in (*PACKAGES, "pyproject.toml", "README.md", "LICENSE"):
+            copy = folder / "source" / name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes((ROOT / name).read_bytes())
+    told = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "-q",
+        "--no-deps",
+        "--no-build-isolation",
+        "-w",
+        str(folder),
+    ]
+    done = subprocess.run([*told, str(folder / "source")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (found,) = folder.glob("*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`himpc-lab` of an environment that holds the wheel; what it depends on is taken from here."""
+    home = tmp_path_factory.mktemp("venv")
+    venv.create(home, with_pip=False, symlinks=True)
+    with zipfile.ZipFile(wheel) as archive:
+        script = next(name for name in archive.namelist() if name.endswith("entry_points.txt"))
+        assert "himpc-lab = app.__main__:main" in archive.read(script).decode()
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(home / "bin" / "python"),
+        "install",
+        "-q",
+        "--no-deps",
+    ]
+    done = subprocess.run([*pip, "--no-index", str(wheel)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    here = Path(sysconfig.get_path("purelib"))
+    (there,) = home.glob("lib/python*/site-packages")
+    # The checkout is installed here in place, by a finder of its own: it must not be found.
+    (there / "dependencies.pth").write_text(f"{here}\n{here / 'cmeel.prefix' / there.relative_to(home)}\n")
+    _take_compiled_code_along(there)
+    return home / "bin" / "himpc-lab"
+
+
+def _take_compiled_code_along(there: Path) -> None:
+    """A new place has no compiled code, and compiling it for a minute is no part of this test. Numba knows a
+    source by its time and size."""
+    for kept in ROOT.glob("himpc/**/__pycache__/*.nb[ic]"):
+        (there / kept.relative_to(ROOT).parent).mkdir(exist_ok=True)
+        shutil.copy2(kept, there / kept.relative_to(ROOT))
+    for source in ROOT.glob("himpc/**/*.py"):
+        told = source.stat()
+        os.utime(there / source.relative_to(ROOT), ns=(told.st_atime_ns, told.st_mtime_ns))
+
+
+def run(command: Path, folder: Path, what: Sequence[str]) -> str:
+    """What the command prints, started in `folder` with nothing of this process's paths."""
+    environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
+    done = subprocess.run(
+        [str(command), *what], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_everything_that_is_no_code_is_in_it(wheel: Path) -> None:
+    """Every file of the packages that is under version control."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", *PACKAGES], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    with zipfile.ZipFile(wheel) as archive:
+        held = set(archive.namelist())
+    assert set(filter(None, listed.stdout.split("\0"))) - held == set()
+
+
+def test_it_runs_without_the_checkout(command: Path, tmp_path: Path) -> None:
+    """Scenes are listed, a lesson's file is found, and a run gives its numbers."""
+    python = command.parent / "python"
+    home = run(python, tmp_path, ["-c", "import app, robots; print(app.__file__); print(robots.__file__)"])
+    assert str(ROOT) not in home
+    scenes = json.loads(run(command, tmp_path, ["scenes", "--json", "-"]))
+    assert "planar3-circle" in {scene["name"] for scene in scenes}
+    result = json.loads(
+        run(
+            command,
+            tmp_path,
+            ["run", "planar3-circle", "--duration", "0.02", "--json", "-"],
+        )
+    )
+    assert result["finite"]
+    assert "lamp" in run(python, tmp_path, ["-c", "from lessons.course.your_robot import *; print(LAMP)"])
