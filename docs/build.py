@@ -1,0 +1,58 @@
+"""Builds the documentation site: `python -m docs.build [--out out/site]`.
+
+Pages are made anew from the code: lessons from the course, the reference from docstrings, examples from
+their files, the rest from README, CONTRIBUTING and docs/. Every warning is an error. The result is static and
+needs no server: open index.html.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from docs.pages import api, examples, lessons, texts
+
+ROOT = Path(__file__).parents[1]
+
+
+def write_sources(folder: Path) -> None:
+    """All pages as Sphinx reads them."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(ROOT / "docs" / "site", folder, ignore=shutil.ignore_patterns("__pycache__", "*.json"))
+    pages = {**texts.pages(ROOT), **lessons.pages(ROOT), **examples.pages(ROOT), **api.pages(ROOT)}
+    for name, text in pages.items():
+        path = folder / f"{name}.md"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    shutil.copy(ROOT / "docs" / "page.png", folder / "page.png")
+    for picture in sorted((ROOT / "docs" / "lessons").glob("*.webp")):
+        shutil.copy(picture, folder / "lessons" / picture.name)
+
+
+def build(out: Path) -> int:
+    """Sphinx's exit code."""
+    from sphinx.cmd.build import build_main
+
+    source = out.parent / f"{out.name}-source"
+    write_sources(source)
+    shutil.rmtree(out, ignore_errors=True)
+    sys.path.insert(0, str(ROOT))
+    return build_main(
+        ["-q", "-W", "--keep-going", "-b", "html", "-d", str(source / "_build"), str(source), str(out)]
+    )
+
+
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "site")
+    out = parser.parse_args().out.resolve()
+    code = build(out)
+    print(f"{out / 'index.html'}" if code == 0 else "the site was not built", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""A page per lesson, made from its file: idea, prediction, run, claims with what was measured, why."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lessons.course import COURSE, load_lesson
+from lessons.teaching.claim import Claim
+from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.prediction import Choice
+
+MEASURED = "docs/site/measured.json"
+"""What `himpc-lab lessons --check --json docs/site/measured.json` found."""
+
+Checks = dict[tuple[str, str], dict[str, Any]]
+
+
+def pages(root: Path) -> dict[str, str]:
+    """Name and Markdown of each, and of their list."""
+    known = measured(root / MEASURED)
+    found, rows = {}, []
+    for number, name in enumerate(COURSE, start=1):
+        lesson = load_lesson(name)
+        picture = (root / "docs" / "lessons" / f"{name}.webp").exists()
+        found[f"lessons/{name}"] = page(lesson, known.get(name, {}), picture)
+        card = lesson.card
+        rows.append(f"| {number} | [{card.title}]({name}.md) | {cell(card.question)} | {card.minutes} |")
+    listed = "\n".join(COURSE)
+    found["lessons/index"] = (
+        "# Lessons\n\nEach asks for a prediction, runs the real controller and judges its claims. On the "
+        "page: `himpc-lab --lesson NAME`. Without it: `himpc-lab lessons --check NAME`.\n\n"
+        "| | lesson | asks | minutes |\n|---|---|---|---|\n"
+        + "\n".join(rows)
+        + f"\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+    )
+    return found
+
+
+def measured(path: Path) -> dict[str, Checks]:
+    """By lesson, step and claim what was measured; nothing if nobody has."""
+    if not path.exists():
+        return {}
+    told = json.loads(path.read_text(encoding="utf-8"))
+    return {
+        each["name"]: {(check["step"], check["what"]): check for check in each["checks"]}
+        for each in told["lessons"]
+    }
+
+
+def page(lesson: Lesson, checks: Checks, picture: bool) -> str:
+    """One lesson."""
+    card = lesson.card
+    parts = [
+        f"# {card.title}",
+        f"*{card.question}*",
+        f"About {card.minutes} minutes. You need: {card.needs}",
+        f"`himpc-lab --lesson {lesson.name}` opens it, `himpc-lab lessons --check {lesson.name}` judges it.",
+    ]
+    for number, step in enumerate(lesson.steps, start=1):
+        parts += step_parts(step, number, checks)
+    if lesson.challenge is not None:
+        goals = lesson.challenge.goals
+        parts += ["## Challenge", unindented(lesson.challenge.text), table(goals, "challenge", checks)]
+    if picture:
+        parts += [
+            "## On the page",
+            "Every step before and after its run. The predictions drawn are the tempting ones, often wrong.",
+            f"![{card.title}, step by step]({lesson.name}.webp)",
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def step_parts(step: Step, number: int, checks: Checks) -> list[str]:
+    """One idea."""
+    parts = [f"## {number}. {step.title}", unindented(step.text)]
+    if step.prediction is not None:
+        asked = [f"**What do you think?** {step.prediction.question}"]
+        if isinstance(step.prediction, Choice):
+            asked.append("\n".join(f"- {option.text}" for option in step.prediction.options))
+        parts += asked
+    parts += ["**What the run shows**", table(step.claims, step.title, checks)]
+    parts += ["<details><summary>Why</summary>", unindented(step.why), "</details>"]
+    parts.append(f"**Then, by hand**: {unindented(step.do)}")
+    return parts
+
+
+def table(claims: Sequence[Claim], step: str, checks: Checks) -> str:
+    """Claims, their bounds, what was measured, and the setting under which each fails."""
+    rows = ["| claim | bound | measured | fails with |", "|---|---|---|---|"]
+    for claim in claims:
+        check = next(
+            (found for (where, what), found in checks.items() if what == claim.text and step in where), {}
+        )
+        wrong = ", ".join(f"`{each}`" for each in claim.fails_with)
+        wrong += f": {number_of(check.get('measured_there'), claim.measure.unit)}" if check and wrong else ""
+        wrong += f" ({claim.because})" if claim.because else ""
+        seen = number_of(check.get("measured"), claim.measure.unit)
+        rows.append(f"| {cell(claim.text)} | {claim.condition} | {seen} | {cell(wrong)} |")
+    return "\n".join(rows)
+
+
+def number_of(value: float | None, unit: str) -> str:
+    """A number with three digits and its unit."""
+    return "–" if value is None else f"{value:.3g} {unit}".rstrip()
+
+
+def cell(text: str) -> str:
+    """A text that may stand in a table."""
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+def unindented(text: str) -> str:
+    """A lesson's text; formulas on a line of their own stay so."""
+    return text.strip()

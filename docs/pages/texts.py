@@ -1,0 +1,63 @@
+"""Pages made of the project's own texts, their links turned to the site's pages."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+LINKS = {
+    "docs/lessons/README.md": "lessons/index.md",
+    "docs/serving.md": "serving.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "examples/README.md": "examples/index.md",
+    "README.md": "index.md",
+    "CHANGELOG.md": "changelog.md",
+}
+FROM_README = {
+    "start": ("Start", "Start"),
+    "own-program": ("In your own program", "In your own program"),
+    "results": ("Results beside the papers'", "Results beside the papers'"),
+    "house": ("How it is built", "How it is built"),
+    "limits": ("Limits", "Limits"),
+}
+"""Page: its title and the README's section."""
+
+
+def pages(root: Path) -> dict[str, str]:
+    """Name and Markdown of each."""
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    found = {name: f"# {title}\n\n{section(readme, part)}" for name, (title, part) in FROM_README.items()}
+    found["start"] += "\n## What you can do\n\n" + section(readme, "What you can do")
+    if "## Systems" in readme:
+        found["start"] += "\n## Systems\n\n" + section(readme, "Systems")
+    for name, file in (
+        ("contributing", "CONTRIBUTING.md"),
+        ("changelog", "CHANGELOG.md"),
+        ("serving", "docs/serving.md"),
+    ):
+        found[name] = (root / file).read_text(encoding="utf-8")
+    citation = (root / "CITATION.cff").read_text(encoding="utf-8")
+    found["cite"] = (
+        f"# How to cite\n\nThis file stands in the repository as `CITATION.cff`.\n\n```yaml\n{citation}```\n"
+    )
+    return {name: relinked(text) for name, text in found.items()}
+
+
+def section(text: str, title: str) -> str:
+    """What stands under a second-level heading. Raises ValueError if there is none of that title."""
+    found = re.search(rf"^## {re.escape(title)}\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
+    if found is None:
+        raise ValueError(f"no section '{title}' in the README")
+    return found[1].strip() + "\n"
+
+
+def relinked(text: str) -> str:
+    """Links to files of the repository lead to the site's pages; those to other files are plain words."""
+
+    def turn(link: re.Match[str]) -> str:
+        words, goal = link[1], link[2]
+        if goal.startswith(("http://", "https://", "#")):
+            return link[0]
+        return f"[{words}]({LINKS[goal]})" if goal in LINKS else words
+
+    return re.sub(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)", turn, text)
