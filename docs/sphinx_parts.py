@@ -51,8 +51,10 @@ def safe(text: str) -> str:
     parts = _CODE.split(text)
     for k, part in enumerate(parts):
         if k % 2:
-            parts[k] = f"``{part.strip('`')}``"
+            # Code must not touch a word.
+            after = "\\ " if re.match(r"\w", parts[k + 1]) else ""
+            before = "\\ " if re.search(r"\w$", parts[k - 1]) else ""
+            parts[k] = f"{before}``{part.strip('`').strip()}``{after}"
         else:
             parts[k] = re.sub(r"([\\*|_`])", r"\\\1", part)
-    # Code must not touch a word, and a list's hyphen or number stays one.
-    return re.sub(r"``(?=\w)", "``\\\\ ", "".join(parts))
+    return "".join(parts)

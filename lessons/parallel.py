@@ -144,9 +144,11 @@ def on_cluster(address: str) -> Iterator[Spread]:
                     yield places[future.key], future.result() if error is None else Failed(_sentence(error))
             # A dying worker takes along what waited there: one at a time, the culprit shows.
             for place in sorted(orphans):
-                futures.append(client.submit(_guarded, function, items[place], pure=False))
-                error = futures[-1].exception()
-                yield place, futures[-1].result() if error is None else Failed(_sentence(error))
+                alone = client.submit(_guarded, function, items[place], pure=False)
+                futures.append(alone)
+                for future in as_they_end([alone]):
+                    error = future.exception()
+                    yield place, future.result() if error is None else Failed(_sentence(error))
         finally:
             client.cancel(futures)
 

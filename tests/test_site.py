@@ -75,6 +75,7 @@ def test_styles_load_nothing_from_elsewhere(site: Path) -> None:
 
 def test_every_lesson_is_a_page(site: Path) -> None:
     """With its steps, its claims and equations that a browser draws by itself."""
+    text = ""
     for name in COURSE:
         text = (site / "lessons" / f"{name}.html").read_text(encoding="utf-8")
         for step in load_lesson(name).steps:
