@@ -77,7 +77,15 @@ class Viewer:
         address = urlsplit(self._url)
         line.connect((address.hostname, address.port))
         queue = 1 if slow or self._delay else 16
-        connection = connect(self._url, sock=line, subprotocols=protocol, max_size=None, max_queue=queue)
+        # A page sends no pings; ours would end it where the machine has no time to answer them.
+        connection = connect(
+            self._url,
+            sock=line,
+            subprotocols=protocol,
+            max_size=None,
+            max_queue=queue,
+            ping_interval=None,
+        )
         self._forget()
         connection.send(pack(camera()))
         return connection

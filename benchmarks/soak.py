@@ -91,7 +91,7 @@ def reconnected(viewers: Viewers, times: int) -> float | None:
     between any two of several batches, since a single reading goes up and down."""
     if not times:
         return None
-    visit(viewers, max(5, times // 5))
+    visit(viewers, max(20, times // 5))
     size, held = max(1, times // BATCHES), [rested(viewers.pid)]
     for _ in range(BATCHES):
         visit(viewers, size)
