@@ -19,6 +19,7 @@ COMMANDS: dict[str, str] = {
     "controllers": "list the controllers",
     "robots": "list the robots, or check a URDF",
     "lessons": "list the lessons, or run every claim of them headless",
+    "grade": "judge solutions of the exercises, one file or a folder of them",
     "new": "write a controller, scene, lesson or task of your own to begin with",
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",

@@ -17,8 +17,8 @@ def new(
     Args:
         kind: what the file is to be.
         file: where to write it.
-        start: begin with one there is: an example controller (pd, osf, one_level_qp, himpc_one_page), a
-            scene, or a lesson.
+        start: begin with one there is: an example controller (pd, osf, one_level_qp, himpc_one_page) or the
+            file of an exercise (himpc-lab grade lists them), a scene, or a lesson.
     """
     from lessons.own.new import write_new
 

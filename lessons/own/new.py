@@ -7,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from lessons.course import COURSE
+from lessons.exercises import EXERCISES, start_of
 from lessons.own.files import is_file
 from lessons.own.kinds import Kind
 from lessons.scenes.names import ALL_SCENES
@@ -19,7 +20,8 @@ EXAMPLES: tuple[str, ...] = ("pd", "osf", "one_level_qp", "himpc_one_page")
 
 def choices(kind: Kind) -> Sequence[str]:
     """What a new file of a kind may begin with; nothing: there is one beginning."""
-    return {"controller": EXAMPLES, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": ()}[kind]
+    controllers = (*EXAMPLES, *EXERCISES)
+    return {"controller": controllers, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": ()}[kind]
 
 
 def text_of(kind: Kind, start: str | None, file: str) -> str:
@@ -27,7 +29,9 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
     known = choices(kind)
     if start is not None and start not in known:
         raise unknown_name(f"{kind} to begin with called", start, known)
-    if kind == "controller":
+    if kind == "controller" and start in EXERCISES:
+        text = start_of(start)
+    elif kind == "controller":
         text = _read("lessons.examples", start or EXAMPLES[0])
     elif kind == "lesson" and start is not None:
         text = _read("lessons.course", start.replace("-", "_"))

@@ -1,0 +1,130 @@
+"""`himpc-lab grade`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tyro
+
+from app.commands.output import print_table, write_json
+from app.commands.progress import progress_bar
+
+if TYPE_CHECKING:
+    from lessons.exercises.grade import Grade
+
+
+def grade(
+    file: tyro.conf.Positional[Path | None] = None,
+    exercise: tyro.conf.Positional[str | None] = None,
+    hints: int = 0,
+    seed: int = 0,
+    out: Path = Path("grades.csv"),
+    json: str | None = None,
+) -> int:
+    """Judge a solution of an exercise by what it does; without a file, list the exercises.
+
+    Every file is run in a process of its own, a minute at most. A folder of submissions gives one table;
+    stopped, the same command carries on. Exit code 0: all points; 1: some are missing; 2: it cannot be run.
+
+    Args:
+        file: Python file with the solution, or a folder of them.
+        exercise: name of the exercise; by default what the file says in EXERCISE.
+        hints: show so many hints of the exercise.
+        seed: decides the disturbances.
+        out: table to write for a folder, and to carry on.
+        json: write JSON to this file, or to standard output for "-".
+    """
+    from lessons.exercises.grade import as_data
+    from lessons.exercises.grade import grade as grade_file
+
+    if file is None:
+        return _list(exercise, hints, json)
+    if file.is_dir():
+        return _folder(file, exercise, seed, out, json)
+    found = grade_file(str(file), exercise, seed)
+    if json is not None:
+        write_json(as_data(found), json)
+    else:
+        _show(found, hints)
+    return 2 if found.error else 0 if found.passed else 1
+
+
+def _show(found: Grade, hints: int) -> None:
+    from lessons.exercises import load_exercise
+
+    if found.error:
+        print(f"{found.error}\n0 of 10 points")
+        return
+    rows = [
+        [
+            f"{line.points}/{line.of}",
+            line.check,
+            "–" if math.isnan(line.measured) else f"{line.measured:.3g} {line.unit}",
+            line.wanted,
+            line.why,
+        ]
+        for line in found.lines
+    ]
+    columns = ("points", "what is checked", "measured", "wanted", "why it is missed")
+    print_table(f"{found.file} · {found.exercise}", columns, rows)
+    print(f"{found.points} of {found.of} points")
+    _hints(load_exercise(found.exercise).hints, hints)
+
+
+def _hints(all_hints: tuple[str, ...], count: int) -> None:
+    for number, hint in enumerate(all_hints[:count], start=1):
+        print(f"hint {number} of {len(all_hints)}: {hint}")
+
+
+def _list(exercise: str | None, hints: int, json: str | None) -> int:
+    from lessons.exercises import EXERCISES, load_exercise
+
+    chosen = [load_exercise(name) for name in ([exercise] if exercise is not None else EXERCISES)]
+    if json is not None:
+        write_json(
+            [
+                {
+                    "name": each.name,
+                    "title": each.card.title,
+                    "question": each.card.question,
+                    "minutes": each.card.minutes,
+                    "needs": each.card.needs,
+                    "equation": each.equation,
+                    "lesson": each.lesson,
+                    "checks": [check.text for check in each.checks(0)],
+                }
+                for each in chosen
+            ],
+            json,
+        )
+        return 0
+    for each in chosen:
+        card = each.card
+        print(f"{each.name}: {card.title} ({card.minutes} minutes; belongs to lesson {each.lesson})")
+        print(f"  {card.question}")
+        print(f"  {each.equation}")
+        print(f"  begin: himpc-lab new controller my_{each.name.replace('-', '_')}.py --from {each.name}")
+        for check in each.checks(0):
+            print(f"    {check.points} points: {check.text} {check.condition}")
+        _hints(each.hints, hints)
+    return 0
+
+
+def _folder(folder: Path, exercise: str | None, seed: int, out: Path, json: str | None) -> int:
+    from lessons.exercises.folder import grade_folder
+
+    with progress_bar(f"grading {folder} …", json is None) as advance:
+        rows = grade_folder(folder, exercise, seed, out, advance)
+    if json is not None:
+        write_json(rows, json)
+        return 0
+    print_table(str(folder), ("file", "exercise", "points", "what is missing"), [_short(row) for row in rows])
+    print(f"{len(rows)} files, table: {out}")
+    return 0
+
+
+def _short(row: Mapping[str, str]) -> list[str]:
+    return [row["file"], row["exercise"], f"{row['points']}/{row['of']}", row["error"] or row["missed"]]

@@ -1,0 +1,85 @@
+"""An exercise as data: what to write, and the checks it is judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lessons.events import Push
+from lessons.teaching.claim import Relation
+from lessons.teaching.control import Script
+from lessons.teaching.lesson import Card, Run
+from lessons.teaching.measure import Measure
+
+TORQUE_UNIT = "N·m"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One measured sentence about a submission.
+
+    Attributes:
+        text: the sentence.
+        why: what it means if it is missed.
+        run: where it is measured; the controller is the submission.
+        relation, bound: "at most" or "at least" so much.
+        measure: of the submission's own run; None: the torque beside another controller's.
+        beside: the lab's controller that drives the run while the submission is shown the same states; the
+            largest difference in torque is measured, N·m.
+        points: for meeting it.
+    """
+
+    text: str
+    why: str
+    run: Run
+    bound: float
+    relation: Relation = "at most"
+    measure: Measure | None = None
+    beside: str = ""
+    points: int = 1
+
+    def holds(self, value: float) -> bool:
+        """Whether a value meets it; NaN does not."""
+        return value <= self.bound if self.relation == "at most" else value >= self.bound
+
+    @property
+    def unit(self) -> str:
+        return TORQUE_UNIT if self.measure is None else self.measure.unit
+
+    @property
+    def condition(self) -> str:
+        """E.g. "≤ 1 mm"."""
+        return f"{'≤' if self.relation == 'at most' else '≥'} {self.bound:g} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """What to write and what it is judged by.
+
+    Attributes:
+        name: its name in `lessons.exercises.EXERCISES`.
+        card: the docstring of its file.
+        equation: LaTeX.
+        hints: that open one by one.
+        lesson: the lesson it belongs to.
+        checks: for a seed, which decides the disturbances.
+    """
+
+    name: str
+    card: Card
+    equation: str
+    hints: tuple[str, ...]
+    lesson: str
+    checks: Callable[[int], tuple[Check, ...]]
+
+
+def pushed(run: Run, seed: int, body: str, newtons: float, at: float = 0.2, plane: bool = False) -> Run:
+    """The run with a push of 0.1 s in a direction that the seed decides; in the plane of a planar arm."""
+    direction = np.random.default_rng(seed).normal(size=3)
+    if plane:
+        direction[2] = 0.0
+    x, y, z = (newtons * direction / np.linalg.norm(direction)).tolist()
+    events: Script = (*run.events, (at, Push(body, (x, y, z), seconds=0.1)))
+    return replace(run, events=events)

@@ -1,0 +1,120 @@
+"""A folder of submissions: one table, which is also what an interrupted grading carries on from."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+from lessons.exercises import load_exercise
+from lessons.exercises.grade import Grade, grade
+from lessons.own.files import SUFFIX, read
+from lessons.parallel import cores
+from robots import InputError
+
+COLUMNS: tuple[str, ...] = ("file", "exercise", "points", "of", "missed", "error", "seed", "asked", "sha256")
+Row = dict[str, str]
+
+
+def grade_folder(
+    folder: Path, exercise: str | None, seed: int, out: Path, progress: Callable[[float], None]
+) -> list[Row]:
+    """Grades every Python file of a folder, on all cores, each in a process of its own.
+
+    Args:
+        folder: of the submissions.
+        exercise: which; None: what each file says.
+        seed: decides the disturbances, the same for all.
+        out: CSV file; rows that are there already, of the same content, are kept.
+        progress: called with the share that is done.
+
+    Raises:
+        InputError: no such exercise, no Python file in the folder, or the table cannot be written.
+    """
+    if exercise is not None:
+        load_exercise(exercise)
+    files = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX and path.is_file())
+    if not files:
+        raise InputError(f"{folder}: has no Python file; give a folder of submissions")
+    held = {(row["file"], row["sha256"], row["seed"], row["asked"]): row for row in _rows(out)}
+    done: dict[Path, Row] = {}
+    for path in files:
+        row = held.get((path.name, _digest(path), str(seed), exercise or ""))
+        if row is not None:
+            done[path] = row
+    left = [path for path in files if path not in done]
+    with ThreadPoolExecutor(cores()) as pool:
+        futures = {pool.submit(grade, str(path), exercise, seed): path for path in left}
+        try:
+            for future in as_completed(futures):
+                path = futures[future]
+                try:
+                    done[path] = row_of(future.result(), seed, exercise)
+                except InputError as error:  # it cannot even be read
+                    failed = Grade(str(path), "", exercise or "", error=str(error))
+                    done[path] = row_of(failed, seed, exercise)
+                _write(out, [done[each] for each in files if each in done])
+                progress(len(done) / len(files))
+        finally:
+            pool.shutdown(cancel_futures=True)
+    found = [done[path] for path in files]
+    _write(out, found)
+    return found
+
+
+def row_of(found: Grade, seed: int, asked: str | None) -> Row:
+    """A grade as a row of the table."""
+    missed = "; ".join(f"{line.check} {line.why}" for line in found.lines if line.why)
+    name = Path(found.file).name
+    values = (
+        name,
+        found.exercise,
+        str(found.points),
+        str(found.of),
+        _one_line(missed.replace(found.file, name)),
+        _one_line(found.error.replace(found.file, name)),
+        str(seed),
+        asked or "",
+        found.digest,
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _digest(path: Path) -> str:
+    try:
+        return read(str(path)).digest
+    except InputError:
+        return ""
+
+
+def _rows(out: Path) -> Iterator[Row]:
+    """What a table holds already; one that is no table of ours holds nothing."""
+    if not out.exists():
+        return
+    try:
+        with out.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            if tuple(reader.fieldnames or ()) != COLUMNS:
+                raise InputError(f"{out}: is no table of himpc-lab grade; give another file for --out")
+            yield from reader
+    except (OSError, UnicodeDecodeError, csv.Error):
+        raise InputError(f"{out}: cannot be read; give another file for --out") from None
+
+
+def _write(out: Path, rows: list[Row]) -> None:
+    """As a whole or not at all: whoever stops it finds what was there before."""
+    beside = out.with_name(out.name + ".part")
+    try:
+        with beside.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, COLUMNS)
+            writer.writeheader()
+            writer.writerows(rows)
+        os.replace(beside, out)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); give another file") from None

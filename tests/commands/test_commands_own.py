@@ -1,0 +1,90 @@
+"""`himpc-lab new`, and paths where the command line takes names, in a folder outside the checkout."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.__main__ import main
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_new_file_of_ones_own_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    for kind in ("controller", "scene", "task"):
+        assert main(["new", kind, f"my_{kind}.py"]) == 0
+        assert f"my_{kind}.py" in Path(f"my_{kind}.py").read_text()
+    assert (
+        main(
+            [
+                "run",
+                "planar3-circle",
+                "--controller",
+                "my_controller.py",
+                "--duration",
+                "0.05",
+                "--json",
+                "a.json",
+            ]
+        )
+        == 0
+    )
+    assert json.loads(Path("a.json").read_text())["controller"] == "my_controller.py"
+    assert main(["run", "my_scene.py", "--duration", "0.05", "--json", "b.json"]) == 0
+    assert json.loads(Path("b.json").read_text())["scene"] == "my_scene.py"
+    assert main(["run", "my_task.py", "--duration", "0.02", "--json", "c.json"]) == 0
+    assert json.loads(Path("c.json").read_text())["tasks"][3]["name"] == "reach"
+    capsys.readouterr()
+
+
+def test_new_lesson_of_ones_own_is_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "lesson", "my_lesson.py"]) == 0
+    assert main(["lessons", "--check", "my_lesson.py"]) == 0
+    assert "faults: 0" in capsys.readouterr().out
+
+
+def test_new_writes_over_nothing_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "controller", "mine.py", "--from", "osf"]) == 0
+    before = Path("mine.py").read_text()
+    assert main(["new", "scene", "mine.py"]) == 2
+    assert Path("mine.py").read_text() == before
+    assert main(["new", "controller", "mine.txt"]) == 2
+    assert main(["new", "controller", "other.py", "--from", "ofs"]) == 2
+    assert "did you mean 'osf'" in capsys.readouterr().err
+
+
+def test_grade_lists_the_exercises_and_their_own_hints(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["grade"]) == 0
+    assert "joint-pd" in capsys.readouterr().out
+    import app.commands.grade as command
+
+    assert command.grade(None, "two-levels", hints=2) == 0
+    out = capsys.readouterr().out
+    assert "hint 2 of 4" in out
+    assert "hint 3" not in out
+
+
+def test_grade_has_exit_codes_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "controller", "mine.py", "--from", "joint-pd"]) == 0
+    assert main(["grade", "mine.py", "--json", "grade.json"]) == 1
+    found = json.loads(Path("grade.json").read_text())
+    assert (found["exercise"], found["of"]) == ("joint-pd", 10)
+    assert 0 <= found["points"] < 10
+    Path("mine.py").write_text("import os\nos._exit(0)\n")
+    assert main(["grade", "mine.py", "joint-pd"]) == 2
+    assert "ended by the program" in capsys.readouterr().out
+    assert main(["grade", "mine.py", "joint-dp"]) == 2
+    assert main(["grade", "nothing.py"]) == 2
+
+
+def test_sweep_takes_files_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["new", "controller", "mine.py"])
+    line = "sweep planar3-circle --controller mine.py --over M_bar_scale=1:2:2 --duration 0.05 --out s"
+    assert main(line.split()) == 0
+    assert "0 could not be run" in capsys.readouterr().out
