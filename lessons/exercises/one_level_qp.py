@@ -15,7 +15,7 @@ from lessons.teaching.measure import Measure, Signal
 ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false")
 FREE = Run("planar3-circle", ALONE, duration=1.0)
 WEAK = Run("planar3-circle", (*ALONE, "limits.torque_scale=0.02"), duration=1.0)
-SLOW = Run("planar3-circle", (*ALONE, "limits.velocity_scale=0.05"), duration=1.0)
+SLOW = Run("planar3-circle", (*ALONE, "limits.velocity_scale=0.02"), duration=1.0)
 HEAVY = Run("planar3-circle", (*ALONE, "levels.position.Q=[100,400]", "levels.position.R=2000"), duration=0.4)
 
 

@@ -16,7 +16,7 @@ def judged(source: Source) -> Kind:
     return _judged(source)
 
 
-LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
+LOADING = Allowance(20.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
 """What a file may cost before it is known to be harmless."""
 
 

@@ -39,7 +39,7 @@ def test_new_file_of_ones_own_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "my_scene.py", "--duration", "0.05", "--json", "b.json"]) == 0
     assert json.loads(Path("b.json").read_text())["scene"] == "my_scene.py"
     assert main(["run", "my_task.py", "--duration", "0.02", "--json", "c.json"]) == 0
-    assert json.loads(Path("c.json").read_text())["tasks"][3]["name"] == "reach"
+    assert json.loads(Path("c.json").read_text())["tasks"][1]["name"] == "reach"
     capsys.readouterr()
 
 

@@ -51,4 +51,4 @@ LOAD = Step(
     plots=(HAND,),
 )
 
-LESSON = Lesson(name="a-lesson-of-my-own", card=card_of(__doc__), scene="planar3-hold", steps=(LOAD,))
+LESSON = Lesson(name="a-lesson-of-my-own", card=card_of(__doc__), scene="iiwa14-hold", steps=(LOAD,))
