@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lessons.events import Push
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.claim import Relation
 from lessons.teaching.control import Script
-from lessons.teaching.lesson import Card, Run
+from lessons.teaching.lesson import Card
 from lessons.teaching.measure import Measure
 
 TORQUE_UNIT = "N·m"
@@ -33,7 +34,7 @@ class Check:
 
     text: str
     why: str
-    run: Run
+    run: RunSpec
     bound: float
     relation: Relation = "at most"
     measure: Measure | None = None
@@ -75,11 +76,13 @@ class Exercise:
     checks: Callable[[int], tuple[Check, ...]]
 
 
-def pushed(run: Run, seed: int, body: str, newtons: float, at: float = 0.2, plane: bool = False) -> Run:
+def pushed(
+    run: RunSpec, seed: int, body: str, newtons: float, at: float = 0.2, plane: bool = False
+) -> RunSpec:
     """The run with a push of 0.1 s in a direction that the seed decides; in the plane of a planar arm."""
     direction = np.random.default_rng(seed).normal(size=3)
     if plane:
         direction[2] = 0.0
     x, y, z = (newtons * direction / np.linalg.norm(direction)).tolist()
-    events: Script = (*run.events, (at, Push(body, (x, y, z), seconds=0.1)))
+    events: Script = (*(run.events or ()), (at, Push(body, (x, y, z), seconds=0.1)))
     return replace(run, events=events)

@@ -19,9 +19,9 @@ from lessons.own.kinds import law_of
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.scenes.catalog import prepared
+from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
-from lessons.teaching.lesson import Run
 from robots import InputError
 from robots.isolation import Allowance, Fault, isolated
 
@@ -124,7 +124,7 @@ def graded(source: Source, exercise: str | None, seed: int) -> Grade:
 
 def judged_by(exercise: Exercise, path: str, seed: int) -> tuple[Line, ...]:
     """Every check of an exercise; a run that fails costs its own checks only."""
-    recordings: dict[Run, Recording | str] = {}
+    recordings: dict[RunSpec, Recording | str] = {}
     lines = []
     for check in exercise.checks(seed):
         try:
@@ -146,9 +146,9 @@ def judged_by(exercise: Exercise, path: str, seed: int) -> tuple[Line, ...]:
     return tuple(lines)
 
 
-def _measured(check: Check, path: str, recordings: dict[Run, Recording | str]) -> float:
+def _measured(check: Check, path: str, recordings: dict[RunSpec, Recording | str]) -> float:
     if check.measure is None:
-        return beside(_scene(check.run, check.beside), path, check.run.duration)
+        return beside(_scene(check.run, check.beside), path, check.run.duration or 1.0)
     if check.run not in recordings:
         try:
             recordings[check.run] = run(_scene(check.run, path))
@@ -162,7 +162,7 @@ def _measured(check: Check, path: str, recordings: dict[Run, Recording | str]) -
     return check.measure.value(found)
 
 
-def _scene(run: Run, controller: str) -> TorqueScene:
+def _scene(run: RunSpec, controller: str) -> TorqueScene:
     scene = prepared(run.prepared(), controller, ())
     assert isinstance(scene, TorqueScene)
     return scene

@@ -12,19 +12,20 @@ from math import radians
 
 from lessons.events import MoveTarget
 from lessons.exercises.exercise import Check, Exercise, pushed
-from lessons.teaching.lesson import Run, card_of
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
 ERROR = Signal("error/posture", "deg")
 ALONE = ("levels.position.enabled=false", "levels.orientation.enabled=false")
-IIWA = Run("iiwa14-hold", (*ALONE, "levels.posture.K_p=100", "levels.posture.K_v=20"), duration=1.0)
-PLANAR = Run("planar3-hold", ALONE, duration=3.0)
+IIWA = RunSpec("iiwa14-hold", set=(*ALONE, "levels.posture.K_p=100", "levels.posture.K_v=20"), duration=1.0)
+PLANAR = RunSpec("planar3-hold", set=ALONE, duration=3.0)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
     moved = tuple(radians(each) for each in (10.0, 80.0, -80.0))
     there = (0.1, MoveTarget("posture", moved))
-    sent = Run("planar3-hold", ALONE, (there,), 2.5)
+    sent = RunSpec("planar3-hold", set=ALONE, events=(there,), duration=2.5)
     return (
         Check(
             "The iiwa stays where it is.",

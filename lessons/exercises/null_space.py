@@ -9,7 +9,8 @@ You need: Jacobians; exercise "joint-pd"; lesson "two-tasks"
 from __future__ import annotations
 
 from lessons.exercises.exercise import Check, Exercise, pushed
-from lessons.teaching.lesson import Run, card_of
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
 # What the plant of this scene really is, told to the controller: then the law is exact.
@@ -19,8 +20,8 @@ EXACT = (
     "nominal.armature=[0.05,0.05,0.03]",
     "nominal.damping=[0.15,0.1,0.08]",
 )
-CIRCLE = Run("planar3-circle", ("q1_amplitude_deg=20", *EXACT), duration=2.0)
-ROUGH = Run("planar3-circle", ("q1_amplitude_deg=20",), duration=1.0)
+CIRCLE = RunSpec("planar3-circle", set=("q1_amplitude_deg=20", *EXACT), duration=2.0)
+ROUGH = RunSpec("planar3-circle", set=("q1_amplitude_deg=20",), duration=1.0)
 
 
 def checks(seed: int) -> tuple[Check, ...]:

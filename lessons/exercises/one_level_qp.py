@@ -9,14 +9,17 @@ You need: quadratic programs; exercise "time-delay"; lesson "torque-has-a-limit"
 from __future__ import annotations
 
 from lessons.exercises.exercise import Check, Exercise, pushed
-from lessons.teaching.lesson import Run, card_of
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
 ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false")
-FREE = Run("planar3-circle", ALONE, duration=1.0)
-WEAK = Run("planar3-circle", (*ALONE, "limits.torque_scale=0.02"), duration=1.0)
-SLOW = Run("planar3-circle", (*ALONE, "limits.velocity_scale=0.02"), duration=1.0)
-HEAVY = Run("planar3-circle", (*ALONE, "levels.position.Q=[100,400]", "levels.position.R=2000"), duration=0.4)
+FREE = RunSpec("planar3-circle", set=ALONE, duration=1.0)
+WEAK = RunSpec("planar3-circle", set=(*ALONE, "limits.torque_scale=0.02"), duration=1.0)
+SLOW = RunSpec("planar3-circle", set=(*ALONE, "limits.velocity_scale=0.02"), duration=1.0)
+HEAVY = RunSpec(
+    "planar3-circle", set=(*ALONE, "levels.position.Q=[100,400]", "levels.position.R=2000"), duration=0.4
+)
 
 
 def checks(seed: int) -> tuple[Check, ...]:

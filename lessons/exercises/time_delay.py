@@ -10,14 +10,17 @@ from __future__ import annotations
 
 from lessons.exercises.exercise import Check, Exercise, pushed
 from lessons.exercises.joint_pd import ALONE, ERROR
-from lessons.teaching.lesson import Run, card_of
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure
 
 GAINS = ("levels.posture.K_p=100", "levels.posture.K_v=20")
-LOADED = Run("iiwa14-hold", (*ALONE, *GAINS, "plant.payload_kg=3"), duration=1.0)
-MISLED = Run("iiwa14-hold", (*ALONE, *GAINS, "plant.payload_kg=3", "nominal.mass_scale=2"), duration=1.0)
-FRICTION = Run("planar3-hold", (*ALONE, "plant.damping=1"), duration=1.5)
-PLANAR = Run("planar3-hold", ALONE, duration=0.6)
+LOADED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS, "plant.payload_kg=3"), duration=1.0)
+MISLED = RunSpec(
+    "iiwa14-hold", set=(*ALONE, *GAINS, "plant.payload_kg=3", "nominal.mass_scale=2"), duration=1.0
+)
+FRICTION = RunSpec("planar3-hold", set=(*ALONE, "plant.damping=1"), duration=1.5)
+PLANAR = RunSpec("planar3-hold", set=ALONE, duration=0.6)
 
 
 def checks(seed: int) -> tuple[Check, ...]:

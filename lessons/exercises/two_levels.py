@@ -9,13 +9,14 @@ You need: exercise "one-level-qp"; lesson "inside-the-qp"
 from __future__ import annotations
 
 from lessons.exercises.exercise import Check, Exercise, pushed
-from lessons.teaching.lesson import Run, card_of
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
 SETTINGS = ("horizon=1", "damping=false", "q1_amplitude_deg=60")
-FREE = Run("planar3-circle", SETTINGS, duration=1.0)
-WEAK = Run("planar3-circle", (*SETTINGS, "limits.torque_scale=0.04"), duration=1.0)
-FIGHT = Run("planar3-conflict", SETTINGS[:2], duration=1.5)
+FREE = RunSpec("planar3-circle", set=SETTINGS, duration=1.0)
+WEAK = RunSpec("planar3-circle", set=(*SETTINGS, "limits.torque_scale=0.04"), duration=1.0)
+FIGHT = RunSpec("planar3-conflict", set=SETTINGS[:2], duration=1.5)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
