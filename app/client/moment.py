@@ -17,7 +17,7 @@ _FAR = 0.5  # s: a ghost further behind is not waited for with the picture
 
 
 @dataclass(frozen=True, eq=False)
-class Shade:
+class GhostState:
     """The ghost at that instant; see `Moment`."""
 
     poses: np.ndarray
@@ -47,7 +47,7 @@ class Moment:
     latest: np.ndarray
     window: Window
     way: np.ndarray
-    ghost: Shade | None
+    ghost: GhostState | None
 
 
 def moment_of(learner: Learner, past: float | None, curves: bool = True) -> Moment | None:
@@ -94,13 +94,13 @@ def moment_of(learner: Learner, past: float | None, curves: bool = True) -> Mome
         latest=latest,
         window=window,
         way=way,
-        ghost=None if ghost is None or beside is None else _shade(ghost, t, curves),
+        ghost=None if ghost is None or beside is None else _ghost_state(ghost, t, curves),
     )
 
 
-def _shade(ghost: Ghost, t: float, ways: bool) -> Shade | None:
+def _ghost_state(ghost: Ghost, t: float, ways: bool) -> GhostState | None:
     found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t, ways)))
-    return None if found is None or found[0] is None else Shade(found[0].poses, found[1], found[2])
+    return None if found is None or found[0] is None else GhostState(found[0].poses, found[1], found[2])
 
 
 def _way(simulation: Simulation, t: float, wanted: bool) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.client.moment import Shade
+from app.client.moment import GhostState
 from app.html.palette import GHOST
 from app.view.robot import RobotView
 from app.view.trails import NOTHING, trace
@@ -23,15 +23,15 @@ class GhostView:
         self._trace = scene.add_line_segments("/ghost/trace", NOTHING, GHOST, thickness=0.004)
         self._label = scene.add_label("/ghost/label", f"ghost: {words}")
 
-    def move(self, shade: Shade) -> None:
-        self._robot.move(shade.poses[:-1])
-        at = shade.poses[-1, :3] + np.array([0.0, 0.0, 0.08])
+    def move(self, ghost: GhostState) -> None:
+        self._robot.move(ghost.poses[:-1])
+        at = ghost.poses[-1, :3] + np.array([0.0, 0.0, 0.08])
         if not np.allclose(at, self._label.position, atol=1e-4):
             self._label.position = at
 
-    def draw(self, shade: Shade) -> None:
+    def draw(self, ghost: GhostState) -> None:
         """The trace, about ten times a second."""
-        self._trace.points = trace(shade.way[:, -1, :3]) if len(shade.way) else NOTHING
+        self._trace.points = trace(ghost.way[:, -1, :3]) if len(ghost.way) else NOTHING
 
     def remove(self) -> None:
         self._root.remove()

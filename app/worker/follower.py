@@ -19,7 +19,7 @@ _STATUS = 0.1  # s
 _CHUNK = 0.01  # s: the longest run before commands are looked at again
 
 
-class Shadow(Body):
+class GhostBody(Body):
     """A body whose session follows another's."""
 
     def __init__(self, begin: Begin, own: tuple[str, ...]) -> None:
@@ -46,52 +46,52 @@ class Shadow(Body):
 
 def follow(wire: Wire, first: Follow) -> None:
     """Follows until the page says Quit; `first` is what a process that waited for work was told."""
-    shadow = _hear(wire, None, first)
+    ghost = _hear(wire, None, first)
     next_pose = next_reached = next_status = 0.0
     reached = -1.0
     try:
         while True:
-            while wire.poll(None if shadow is None else 0.0):
+            while wire.poll(None if ghost is None else 0.0):
                 command: Command = wire.recv()
                 if isinstance(command, Quit):
                     return
                 if isinstance(command, Follow):
-                    shadow = _hear(wire, shadow, command)
+                    ghost = _hear(wire, ghost, command)
                     if command.script.begin is not None:
                         reached = -1.0  # the leader waits to hear that its follower is there
-            if shadow is None:
+            if ghost is None:
                 continue
-            ran = shadow.catch_up(time.perf_counter() + _CHUNK)
+            ran = ghost.catch_up(time.perf_counter() + _CHUNK)
             now = time.perf_counter()
             if now >= next_pose:
-                shadow.write_poses()
+                ghost.write_poses()
                 next_pose = now + _POSES
-            t = shadow.session.t
+            t = ghost.session.t
             if t != reached and now >= next_reached:
                 wire.send(Reached(t))
                 reached, next_reached = t, now + _REACHED
             if now >= next_status:
-                wire.send(shadow.status())
+                wire.send(ghost.status())
                 next_status = now + _STATUS
             if not ran:
                 wire.poll(_POSES)
     finally:
-        if shadow is not None:
-            shadow.block.close()
+        if ghost is not None:
+            ghost.block.close()
 
 
-def _hear(wire: Wire, shadow: Shadow | None, command: Follow) -> Shadow | None:
+def _hear(wire: Wire, ghost: GhostBody | None, command: Follow) -> GhostBody | None:
     script = command.script
     if script.begin is not None:
         wire.send(Loading())
-        if shadow is not None:
-            shadow.block.close()
+        if ghost is not None:
+            ghost.block.close()
         try:
-            shadow = Shadow(script.begin, command.own)
+            ghost = GhostBody(script.begin, command.own)
         except InputError as error:
             wire.send(Refused(str(error)))
             return None
-        wire.send(shadow.ready())
-    if shadow is not None:
-        shadow.follower.hear(script.events, script.t)
-    return shadow
+        wire.send(ghost.ready())
+    if ghost is not None:
+        ghost.follower.hear(script.events, script.t)
+    return ghost

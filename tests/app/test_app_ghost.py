@@ -18,7 +18,7 @@ from app.link.process import wait_until
 from app.link.spares import Spares
 from app.link.wire import Wire
 from app.server.sessions import WORKER
-from app.worker.follower import Shadow
+from app.worker.follower import GhostBody
 from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
 from lessons.teaching.lesson import Ghost
@@ -64,21 +64,21 @@ def test_a_shadow_has_the_rows_of_its_leader(body: Body) -> None:
     before = body.block.count
     first = script_of(body)
     assert first.begin is not None and first.t == 0.0 and first.begin.settings.horizon == 3
-    shadow = Shadow(first.begin, ())
+    ghost = GhostBody(first.begin, ())
     try:
         body.handle(Post(Push(body.session.robot.joint_names[-1], (0.0, 3.0, 0.0), seconds=0.02)))
         body.tick(30)
         body.handle(Post(Set("M_bar_scale", 2.0)))
         body.tick(13)
         script = script_of(body)
-        shadow.follower.hear(script.events, script.t)
-        while shadow.catch_up(0.0):
+        ghost.follower.hear(script.events, script.t)
+        while ghost.catch_up(0.0):
             pass
-        assert shadow.session.t == body.session.t
-        assert np.array_equal(untimed(body)[before:], untimed(shadow), equal_nan=True)
+        assert ghost.session.t == body.session.t
+        assert np.array_equal(untimed(body)[before:], untimed(ghost), equal_nan=True)
         assert body.leader.script(body.session) is None  # told once
     finally:
-        shadow.close()
+        ghost.close()
 
 
 def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
