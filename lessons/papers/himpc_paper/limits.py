@@ -9,6 +9,7 @@ from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
 from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Bars, Picture
+from lessons.scenes.run_spec import RunSpec
 
 MODES = {
     "as printed": ("limits.position=paper", "limits.velocity_approach=0"),
@@ -27,7 +28,7 @@ PLANTS = {
 
 
 def _job(mode: str, plant: str) -> Job:
-    return Job(RT4_DATA_SHEET, "himpc", (*MODES[mode], *PLANTS[plant]))
+    return Job(RunSpec(RT4_DATA_SHEET, controller="himpc", set=(*MODES[mode], *PLANTS[plant])))
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:
