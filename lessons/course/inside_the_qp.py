@@ -28,7 +28,7 @@ CONTROLLER = Control("controller", "Controller", choices=("himpc", "weighted", "
 LINE = Step(
     title="A valley and a line",
     text=r"""
-    The picture on the left is one tick. With $N = 1$ the unknowns are three torque changes; joint 3
+    The picture *Inside* is one tick. With $N = 1$ the unknowns are three torque changes; joint 3
     only holds its own angle, so all the rest happens in the plane of $\Delta\tau_1$ and
     $\Delta\tau_2$. The red frame holds the bounds: nothing outside can be asked for.
 
