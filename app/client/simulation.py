@@ -107,9 +107,11 @@ class Simulation:
 
     def _enter(self, ready: Ready) -> None:
         self._free()
-        self.ready, self.settings, self.status = ready, ready.settings, None
+        self.ready, self.settings = ready, ready.settings
         self._block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
-        self.tape.clear()
+        if not ready.again:
+            self.status = None
+            self.tape.clear()
         self.score, self.record = Score(ready.layout), Record(ready.layout)
         self._history = History(self._block, ready.layout, self.score.take, self.record.take)
         self.changed += 1

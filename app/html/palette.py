@@ -44,5 +44,21 @@ def level_colours(names: Sequence[str]) -> dict[str, RGB]:
     return colours
 
 
+def recoloured(names: Sequence[str], before: dict[str, RGB]) -> dict[str, RGB]:
+    """The colours of another stack: a level of before keeps its own, and so does one that shares a task with
+    it; others get colours that nobody has."""
+    found: dict[str, RGB] = {}
+    for name in names:
+        tasks = set(name.split("+"))
+        kept = [before[name]] if name in before else []
+        kept += [colour for level, colour in before.items() if tasks & set(level.split("+"))]
+        free = [colour for colour in LEVELS if colour not in found.values()]
+        unused = [colour for colour in free if colour not in before.values()]
+        own = [colour for colour in kept if colour in free]
+        found[name] = (own or unused or free or list(LEVELS))[0]
+    found["damping"] = DAMPING
+    return found
+
+
 def joint_colour(index: int) -> RGB:
     return JOINTS[index % len(JOINTS)]

@@ -129,9 +129,10 @@ Command = (
 class TaskView:
     """What the page must know about a task to draw it.
 
-    kind: "position", "orientation" or "joints"; frame: a link's name (tasks on frames only); axes: the
-    world axes under control; raw: where the hand put a draggable target, None for other references; path:
-    (k, 3) closed curve of the reference, m; speed_cap: of the filtered target, m/s or rad/s.
+    kind: the word of himpc.tasks.KINDS; frame: a link's name (tasks on frames only); axes: the axes under
+    control; raw: where the hand put a draggable target, None for other references; path: (k, 3) closed curve
+    of the reference, m; speed_cap: of the filtered target, m/s or rad/s; root: the link that sees the frame,
+    of relative tasks; normal, offset: of the plane, for a distance to one.
     """
 
     name: str
@@ -143,12 +144,15 @@ class TaskView:
     raw: np.ndarray | None
     path: np.ndarray | None
     speed_cap: float
+    root: str = ""
+    normal: tuple[float, ...] = (0.0, 0.0, 1.0)
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
-    besides the robot."""
+    besides the robot; again: it is the same run as before, under another stack."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -157,6 +161,7 @@ class Ready:
     settings: Settings
     tasks: tuple[TaskView, ...]
     room: np.ndarray
+    again: bool = False
 
 
 @dataclass(frozen=True)
@@ -215,8 +220,8 @@ class Status:
     resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
     path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
     I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one; lecture:
-    of a lesson, when there is news; inside: while the page watches;
-    own: of a controller from a file.
+    of a lesson, when there is news; inside: while the page watches; own: of a controller from a file; ranks:
+    per level the directions it gets, and its rows.
     """
 
     t: float
@@ -238,6 +243,7 @@ class Status:
     lecture: Lecture | None = None
     inside: Inside | None = None
     own: OwnCode | None = None
+    ranks: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

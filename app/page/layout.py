@@ -17,7 +17,7 @@ from app.client.learner import Learner
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
 from app.client.trouble import Trouble
-from app.html.palette import level_colours
+from app.html.palette import level_colours, recoloured
 from app.html.text import PHONE
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready, Status
@@ -158,6 +158,14 @@ class Stage:
 
     def _post(self, event: Event) -> None:
         self._learner.send(Post(event))
+
+    def recompose(self, ready: Ready) -> None:
+        """The same run goes on under another stack: what shows levels and tasks is built anew."""
+        self._ready = ready
+        colours = recoloured([task.level for task in in_order(ready)], self._colours)
+        self._colours.clear()
+        self._colours.update(colours)
+        self._face.recompose(ready)
 
     # ---------------------------------------------------------------- following
 

@@ -115,8 +115,13 @@ class Page:
         learner = self.learner
         ready = learner.ready
         if ready is not None and ready is not self._built:
-            self._built = ready  # also of one that cannot be built: once is enough
-            self._build(ready)
+            before, self._built = self._built, ready  # also of one that cannot be built: once is enough
+            same = ready.again and before is not None and before.choice == ready.choice
+            if same and self._stage is not None:
+                with self._client.atomic():
+                    self._stage.recompose(ready)
+            else:
+                self._build(ready)
         self._pass_on()
         stage = self._stage
         if stage is None:

@@ -72,6 +72,10 @@ class Face(Protocol):
         """What the 3D view shows besides robot and floor."""
         ...
 
+    def recompose(self, ready: Ready) -> None:
+        """The same run goes on under another stack."""
+        ...
+
     def toggle(self, place: int) -> Event | None:
         """The event that switches the level at a place (0-based) on or off; None if there is none."""
         ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -9,7 +10,7 @@ import viser
 
 from app.client.moment import Moment
 from app.html.palette import LEVELS
-from app.link.messages import Status
+from app.link.messages import Ready, Status
 from app.page.scene_ui import Context
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
@@ -18,13 +19,16 @@ from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
+from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import draggable
 from app.view.drag import Hand
 from app.view.ellipsoids import EllipsoidView
+from app.view.link_picker import LinkPicker
 from app.view.pull import Pull
 from app.view.robot import RobotView, camera_for
 from app.view.target import Frames
+from app.view.targets import Targets
 from app.view.trails import Trails
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
@@ -48,7 +52,15 @@ class TorqueFace:
         with tabs.add_tab("Start"):
             self._start = StartPanel(gui, context.post, ready.robot.joint_names, by_hand, context.dark)
         with tabs.add_tab("Tasks"):
-            self._tasks = TasksPanel(gui, bindings, settings, context.colours, lambda: context.settings)
+            self._tasks = TasksPanel(
+                gui,
+                bindings,
+                lambda: Bindings(context.post, context.loop),
+                ready.robot,
+                context.colours,
+                lambda: self._context.settings,
+                in_lesson=ready.choice.exercise is not None,
+            )
         with tabs.add_tab("Control"):
             self._controller = ControllerPanel(
                 context.client, context.in_view, bindings, settings, ready.robot
@@ -66,12 +78,18 @@ class TorqueFace:
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         context = self._context
         with plots.add_tab("Errors"):
-            self._level_plots = LevelPlots(
-                gui, self._context.in_view, self._context.ready, self._context.colours
-            )
+            self._level_plots = LevelPlots(gui, context.in_view, context.ready, context.colours)
         with plots.add_tab("Joints"):
-            self._joint_plots = JointPlots(gui, self._context.in_view, self._context.ready.robot)
+            self._joint_plots = JointPlots(gui, context.in_view, context.ready.robot)
         with self._inside_tab or plots.add_tab("Inside"):
+            self._inside_place = gui.add_folder(None)
+        self._look_inside(gui)
+
+    def _look_inside(self, gui: viser.GuiApi) -> None:
+        context = self._context
+        with self._inside_place:
+            self._inside_parts = gui.add_folder(None)
+        with self._inside_parts:
             self._inside = InsidePanel(
                 context.client,
                 context.in_view,
@@ -82,25 +100,24 @@ class TorqueFace:
                 self._controller.spectrum,
             )
 
+    def recompose(self, ready: Ready) -> None:
+        """The same run goes on under another stack."""
+        context = self._context = replace(self._context, ready=ready)
+        self._tasks.rebuild()
+        self._level_plots.rebuild(ready)
+        self._inside_parts.remove()
+        self._look_inside(context.client.gui)
+        self._hand.remove()
+        self._targets.remove()
+        self._add_targets(context.client.scene)
+
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         context, ready = self._context, self._context.ready
-        poses = context.poses()
-        tip = np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
-        status = context.learner.status
-        reach = camera_for(ready.robot)[2]
+        tip = self._tip()
         self._frames = Frames(scene)
         self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until there is a tick to tell
-        self._hand = Hand(
-            scene,
-            ready,
-            context.colours,
-            {} if status is None else status.targets,
-            tip,
-            float(np.clip(0.2 * reach, 0.12, 0.4)),
-            context.post,
-            lambda: bool(self._start.clamp.value),
-            self._start.dragged,
-        )
+        self._add_targets(scene)
+        self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [
@@ -111,6 +128,37 @@ class TorqueFace:
         position = draggable(ready.tasks)[0]
         self._trails = Trails(
             scene, curves, LEVELS[0] if position is None else context.colours[position.level]
+        )
+
+    def _tip(self) -> np.ndarray:
+        poses = self._context.poses()
+        return np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
+
+    def _add_targets(self, scene: viser.SceneApi) -> None:
+        context, ready = self._context, self._context.ready
+        status = context.learner.status
+        targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
+        targets |= {} if status is None or ready.again else status.targets
+        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
+        self._hand = Hand(
+            scene,
+            ready,
+            context.colours,
+            targets,
+            self._tip(),
+            size,
+            context.post,
+            lambda: bool(self._start.clamp.value),
+            self._start.dragged,
+        )
+        poses = context.poses()
+        self._targets = Targets(
+            scene,
+            ready,
+            context.colours,
+            np.zeros((ready.robot.n + 1, 7)) if poses is None else poses,
+            0.75 * size,
+            context.post,
         )
 
     # ---------------------------------------------------------------- events out
@@ -127,6 +175,8 @@ class TorqueFace:
 
     def follow(self, moment: Moment) -> None:
         self._frames.actual(moment.poses[-1])
+        self._targets.follow(moment.poses, moment.status.targets, moment.live)
+        self._links.follow(self._tasks.picking)
         if moment.live:
             self._hand.follow(moment.status.targets)
         running = moment.live and moment.status.running
@@ -162,4 +212,5 @@ class TorqueFace:
         self._inside.write(now.status, now.settings)
 
     def close(self) -> None:
+        self._tasks.close()
         self._hand.close()

@@ -9,7 +9,7 @@ import viser
 
 from app.client.moment import Moment
 from app.html.text import free_name
-from app.link.messages import Status, TaskView
+from app.link.messages import Ready, Status, TaskView
 from app.page.scene_ui import Context
 from app.panels.run.joints import ACCELERATION, JointPlots
 from app.panels.velocity.controller import HtmpcPanel
@@ -107,6 +107,9 @@ class VelocityFace:
         if self._base:
             first = len(self._base)
             self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
+
+    def recompose(self, ready: Ready) -> None:
+        """Never happens: the stack of a velocity-level scene is its mission's."""
 
     # ---------------------------------------------------------------- events out
 

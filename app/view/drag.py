@@ -74,7 +74,8 @@ class Hand:
 
     def _judged(self, verdict: Verdict) -> None:
         gizmo = self._gizmo
-        assert gizmo is not None
+        if gizmo is None:
+            return  # another stack has another target
         place = verdict.accepted if self._clamp() else verdict.question.position
         axes = ["xyz".index(axis) for axis in gizmo.position.axes]
         self._post(MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes)))
@@ -129,6 +130,13 @@ class Hand:
         if gizmo is not None:
             then = None if targets is None else targets.get(gizmo.position.name)
             gizmo.look_back(None if then is None else full(gizmo.position, then, gizmo.raw))
+
+    def remove(self) -> None:
+        """Takes the gizmo out of the scene."""
+        self.close()
+        if self._gizmo is not None:
+            self._gizmo.remove()
+            self._gizmo = None
 
     def close(self) -> None:
         if self._judge is not None:

@@ -123,6 +123,11 @@ class TargetGizmo:
             self._gap.points = np.array([[self.raw, accepted]], np.float32)
             self._label.text = f"out of reach by {100 * missing:.0f} cm"
 
+    def remove(self) -> None:
+        """Takes it out of the scene."""
+        for node in (self._gizmo, self._accepted, self._then, self._gap):
+            node.remove()
+
     def look_back(self, then: np.ndarray | None) -> None:
         """The ball at its place in the past, with nothing to drag it by; None: as it is now."""
         back = then is not None

@@ -62,6 +62,9 @@ def follow(wire: Wire, first: Follow) -> None:
             if ghost is None:
                 continue
             ran = ghost.catch_up(time.perf_counter() + _CHUNK)
+            news = ghost.news()
+            if news is not None:
+                wire.send(news)
             now = time.perf_counter()
             if now >= next_pose:
                 ghost.write_poses()

@@ -110,6 +110,9 @@ def _simulate(wire: Wire, body: Body) -> None:
             pacer.rest(now)
             body.settle()
             body.tick(body.take_steps())
+        news = body.news()
+        if news is not None:
+            wire.send(news)
         now = time.perf_counter()
         if now >= next_pose:
             body.write_poses()

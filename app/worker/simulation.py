@@ -3,7 +3,7 @@ tests drive it by hand."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,8 @@ from app.link.messages import (
 from app.link.ring import Block
 from app.worker.leader import Leader
 from app.worker.lesson.lecturer import Lecturer
-from app.worker.link_poses import LinkPoses
+from app.worker.loaded import Loaded
+from app.worker.outlet import Outlet
 from app.worker.reports.start import Run, start
 from lessons.events import Reset, Set
 from lessons.scenes.scene import Scene
@@ -42,26 +43,13 @@ from lessons.settings.settings import Settings
 from robots import InputError
 
 
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """A scene at its beginning, once nothing of it can be refused any more. mine: a learner's changes."""
-
-    choice: SceneChoice
-    scene: Scene
-    run: Run
-    lecturer: Lecturer | None
-    mine: tuple[Post, ...]
-
-
 class Body:
     """A session, whether it plays and how fast, and the memory its telemetry goes to."""
 
     def __init__(self, choice: SceneChoice) -> None:
         """Raises InputError for a scene or robot that cannot be loaded."""
         self.running, self.speed = True, 1.0
-        self.ticks = self.over_budget = self.late = self._steps = self.resets = 0
-        self._sent: Settings | None = None
-        self.leader = Leader()
+        self.resets, self.leader = 0, Leader()
         self._enter(self._loaded(choice, self._load_scene(choice)))
 
     def _loaded(self, choice: SceneChoice, scene: Scene) -> Loaded:
@@ -70,12 +58,7 @@ class Body:
         return Loaded(choice.resolved(), scene, run, self._lecturer(choice, run), mine)
 
     def _enter(self, loaded: Loaded) -> None:
-        session = loaded.run.session
-        poses, block = LinkPoses(session.robot), Block.for_robot(session.robot, session.layout.size)
-        self._poses, self.block = poses, block
-        fields = session.layout.fields
-        self._step_us = fields["step_us"].start
-        self._late = fields["late"].start if "late" in fields else None
+        self._outlet = Outlet(loaded.run.session)
         self._begin_anew(loaded)
 
     def _load_scene(self, choice: SceneChoice) -> Scene:
@@ -94,16 +77,35 @@ class Body:
         for post in loaded.mine:
             self.handle(post)
         self.session.drain()
+        self._refit()
 
     def _fresh_start(self) -> None:
         self.ticks = self.over_budget = self.late = self._steps = 0
-        self.resets, self._sent = self.resets + 1, None
+        self.resets += 1
+        self._sent: Settings | None = None
         if self.leader.on:
             self.leader.begin(self.choice, self.session)
 
     @property
     def session(self) -> Session:
         return self.run.session
+
+    @property
+    def block(self) -> Block:
+        """Where telemetry goes."""
+        return self._outlet.block
+
+    def _refit(self) -> None:
+        """Another stack has other rows: they go to memory of their own, of which `news` tells the page."""
+        if not self._outlet.fits(self.session):
+            before, self._outlet = self._outlet, Outlet(self.session, told=False)
+            before.block.close()
+            self.write_poses()
+
+    def news(self) -> Ready | None:
+        """What the page must hear of since the last call: the same run has other telemetry."""
+        told, self._outlet.told = self._outlet.told, True
+        return None if told else replace(self.ready(), again=True)
 
     # ---------------------------------------------------------------- commands
 
@@ -121,6 +123,10 @@ class Body:
                 self.resets += 1
                 if not self.running:
                     self._steps = max(self._steps, 1)  # a reset must show while paused, too
+            case Post(Set(path)) if lecturer is not None and path.partition(".")[0] == "stack":
+                self.session.notices.append(
+                    "In a lesson the stack stays: choose its scene under Robot first."
+                )
             case Post(event):
                 self.session.post(event)
                 if lecturer is not None:
@@ -165,6 +171,7 @@ class Body:
             self.tick()
         self.session.post(Reset())
         self.session.drain()
+        self._refit()
         self.resets += 1
         self.write_poses()
         self.leader.begin(self.choice, self.session)
@@ -179,17 +186,10 @@ class Body:
         self.running = self.lecturer.begin(self.session, fast)
         self.write_poses()
 
-    def _looks_the_same(self, loaded: Loaded) -> bool:
-        """Another step of the same lesson: as long as it looks the same, nothing needs to be built anew."""
-        then, now = self.choice.exercise, loaded.choice.exercise
-        if then is None or now is None or then.lesson != now.lesson:
-            return False
-        return loaded.run.session.layout == self.session.layout
-
     def _load(self, choice: SceneChoice) -> Report | None:
         try:
             loaded, before = self._loaded(choice, self._load_scene(choice)), self.block
-            if self._looks_the_same(loaded):
+            if loaded.looks_like(self.choice, self.session):
                 self._begin_anew(loaded)
                 return None
             self._enter(loaded)
@@ -197,8 +197,6 @@ class Body:
             return Refused(str(error))
         before.close()
         return self.ready()
-
-    # ---------------------------------------------------------------- simulation
 
     def take_steps(self) -> int:
         """Single ticks that were asked for while paused, once."""
@@ -216,10 +214,12 @@ class Body:
         row = self.session.advance()
         if row is None:
             return False
-        self.block.write(row)
+        self._refit()
+        outlet = self._outlet
+        outlet.block.write(row)
         self.ticks += 1
-        self.over_budget += bool(row[self._step_us] > 1e6 * self.session.settings.T_s)
-        self.late += self._late is not None and bool(row[self._late])
+        self.over_budget += bool(row[outlet.step_us] > 1e6 * self.session.settings.T_s)
+        self.late += outlet.late is not None and bool(row[outlet.late])
         if self.lecturer is not None and self.lecturer.follow(row):
             # What is out of control only gets worse; the learner should see where it ended.
             self.running = self.session.diverged_at is None
@@ -245,14 +245,13 @@ class Body:
     def settle(self) -> None:
         """While paused: what was asked for takes effect at once, though no time passes."""
         self.session.drain()
+        self._refit()
         if self.lecturer is not None and self.lecturer.idle():
             self.running = True
 
     def write_poses(self) -> None:
         """The plant's true link poses, for the 3D view."""
-        poses = self._poses.at(np.asarray(self.session.plant.q))
-        if poses is not None:
-            self.block.write_poses(poses, self.session.t)
+        self._outlet.write_poses(self.session)
 
     # ---------------------------------------------------------------- reports
 
@@ -293,6 +292,7 @@ class Body:
             lecture=None if self.lecturer is None else self.lecturer.report(),
             inside=run.inside() if ran else None,
             own=run.own(),
+            ranks=run.ranks(),
         )
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from app.client.decimated import BUCKETS, History
 from app.link.choice import SceneChoice
+from app.link.exercise import Exercise
 from app.link.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
@@ -37,7 +38,7 @@ def test_ticks_reach_the_block_in_order(body: Body) -> None:
 def test_reports_survive_the_pipe(body: Body) -> None:
     ready = pickle.loads(pickle.dumps(body.ready()))
     assert ready.robot.joint_names == body.session.robot.joint_names
-    assert [task.kind for task in ready.tasks] == ["position", "orientation", "joints"]
+    assert [task.kind for task in ready.tasks] == ["position", "orientation", "posture"]
     body.tick(3)
     status = pickle.loads(pickle.dumps(body.status()))
     assert status.settings is not None and status.path.shape == (6, 3)
@@ -205,3 +206,39 @@ def test_late_torques_are_counted() -> None:
     made.tick(4)
     assert (made.status().ticks, made.status().late) == (7, 4)
     made.close()
+
+
+def test_another_stack_has_memory_of_its_own(body: Body) -> None:
+    """While it runs and while it is paused: rows of the new width go where the page hears of, once."""
+    body.tick(5)
+    assert body.news() is None
+    elbow = {"task": "position", "name": "elbow", "frame": "link_4", "level": 2}
+    body.handle(Post(Set("stack.add", elbow)))
+    body.tick(3)
+    news = body.news()
+    assert news is not None and news.again and body.news() is None
+    assert [task.name for task in news.tasks][:2] == ["position", "elbow"]
+    _, rows = body.block.since(0)
+    assert rows.shape == (3, news.layout.size)
+    assert np.isfinite(rows[:, news.layout.fields["error/elbow"]]).all()
+    assert body.status().ranks["elbow"] == (2, 3)
+    body.handle(Play(False))
+    body.handle(Post(Set("stack.remove", "elbow")))
+    body.settle()
+    news = body.news()
+    assert news is not None and "elbow" not in [task.name for task in news.tasks]
+    body.handle(Post(Set("stack.add", elbow)))
+    body.settle()
+    body.handle(ResetAll())
+    news = body.news()
+    assert news is not None and "elbow" not in [task.name for task in news.tasks]
+
+
+def test_in_a_lesson_the_stack_stays() -> None:
+    lesson = Body(SceneChoice.of_lesson(Exercise("a-redundant-arm")))
+    before = lesson.session.settings.levels
+    lesson.handle(Post(Set("stack.remove", "posture")))
+    lesson.settle()
+    assert lesson.session.settings.levels == before
+    assert "In a lesson the stack stays" in lesson.status().notices[0]
+    lesson.close()

@@ -137,8 +137,8 @@ class ComparePanel:
             _line(
                 f"{swatch(self._colours.get(task.level, BOUND))}{places.get(task.level, '')} "
                 f"{esc(task.name)}, RMSE",
-                mine.rmse[task.name],
-                its.rmse[task.name],
+                mine.rmse.get(task.name, math.nan),
+                its.rmse.get(task.name, math.nan),
                 lambda value, unit=task.unit: quantity(value, unit),
             )
             for task in tasks

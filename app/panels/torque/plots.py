@@ -27,6 +27,11 @@ class LevelPlots:
         self._charts: list[Chart] = []
         self._build(ghost=False)
 
+    def rebuild(self, ready: Ready) -> None:
+        """Other tasks have other curves."""
+        self._tasks = ready.tasks
+        self._build(self._with_ghost)
+
     def _build(self, ghost: bool) -> None:
         for chart in self._charts:
             chart.remove()
@@ -61,9 +66,12 @@ class LevelPlots:
 
     def _errors(self, window: Window) -> list[np.ndarray]:
         fields = window.layout.fields
+        nothing = np.full(2 * BUCKETS, np.nan)  # of a ghost that does not have the new stack yet
         return [
             np.linalg.norm(window.columns(fields[f"error/{task.name}"]), axis=1)
             * (1e3 if task.unit == "m" else np.degrees(1.0))
+            if f"error/{task.name}" in fields
+            else nothing
             for task in self._tasks
         ]
 

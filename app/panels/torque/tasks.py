@@ -1,4 +1,4 @@
-"""The stack as an ordered list: on/off, up/down, gains, weights, live error per level."""
+"""The stack as an ordered list: levels with their tasks, and one more of them."""
 
 from __future__ import annotations
 
@@ -7,41 +7,43 @@ from collections.abc import Callable
 import viser
 
 from app.client.wish import Wish
-from app.html.palette import BAD, DAMPING, RGB, css
-from app.html.text import badge, block, esc, formula, quantity, swatch
-from app.panels.widgets.mirror import Bindings, scalar
+from app.html.palette import DAMPING, RGB
+from app.html.text import block, formula, swatch
+from app.panels.torque.add_task import AddTask
+from app.panels.torque.level_card import LevelCard, Names
+from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
-from himpc.stack import Level
-from himpc.telemetry import RUNGS
 from lessons.events import MoveLevel, Set
 from lessons.settings.torque import TorqueSettings
-
-_UP, _DOWN = "▲ Up", "▼ Down"
+from robots import Robot
 
 
 class TasksPanel:
-    """One folder per level, in the order of priority."""
+    """One folder per level, in the order of priority. Another stack has other folders: see `rebuild`."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
         bindings: Bindings[TorqueSettings],
-        settings: TorqueSettings,
+        own: Callable[[], Bindings[TorqueSettings]],
+        robot: Robot,
         colours: dict[str, RGB],
         current: Callable[[], TorqueSettings],
+        in_lesson: bool,
     ) -> None:
-        self._current = current
+        """bindings: of what stays; own: makes those of what goes with a stack; in_lesson: whether the stack
+        may not be changed."""
+        self._gui, self._own, self._colours, self._current = gui, own, colours, current
+        self._names, self._in_lesson = Names(robot.frames, robot.joint_names, robot.tip), in_lesson
         self._post = bindings.post
-        self._order: Wish[tuple[str, ...]] = Wish()
-        self._enabled: dict[str, Wish[bool]] = {level.name: Wish() for level in settings.levels}
-        self._cards = [
-            _Card(gui, bindings, level, colours, place, self._move)
-            for place, level in enumerate(settings.levels)
-        ]
+        self._place = gui.add_folder(None)
+        self._cards: list[LevelCard] = []
+        self._bindings: Bindings[TorqueSettings] | None = None
+        self._build(current())
         with gui.add_folder("Last level: damping", order=900.0):
             damping = gui.add_checkbox(
                 "Damp what no level controls",
-                settings.damping,
+                current().damping,
                 hint="R weighs changes of torque only, so a direction without a task keeps its torque and "
                 "runs away when pushed. This last level brings it to rest. Switch it off and push.",
             )
@@ -57,20 +59,49 @@ class TasksPanel:
                 )
             )
 
+    def _build(self, settings: TorqueSettings) -> None:
+        self._order: Wish[tuple[str, ...]] = Wish()
+        self._enabled: dict[str, Wish[bool]] = {level.name: Wish() for level in settings.levels}
+        bindings = self._bindings = self._own()
+        with self._place:
+            self._levels = self._gui.add_folder(None)
+        with self._levels:
+            self._cards = [
+                LevelCard(self._gui, bindings, settings, level, self._colours, place, self._names, self._move)
+                for place, level in enumerate(settings.levels)
+            ]
+            if not self._in_lesson:
+                self._add = AddTask(self._gui, self._post, self._names, settings.levels)
+
+    def rebuild(self) -> None:
+        """Shows another stack, the one in force."""
+        self.close()
+        self._levels.remove()
+        self._build(self._current())
+
+    @property
+    def picking(self) -> bool:
+        """Whether a click on a link chooses a frame."""
+        return not self._in_lesson and self._add.picking
+
+    def choose(self, frame: str) -> None:
+        """The link of this frame was clicked."""
+        self._add.choose(frame)
+
     def toggle(self, place: int) -> Set | None:
         """The event for the hotkey of a place (0-based); None if no level stands there."""
         levels = {level.name: level for level in self._current().levels}
         names = self._order.now(tuple(levels))
-        if place >= len(names):
+        if place >= len(names) or names[place] not in levels:
             return None
         name = names[place]
-        wish = self._enabled[name]
+        wish = self._enabled.setdefault(name, Wish())
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(levels[name].enabled)))
 
     def _move(self, name: str, by: int) -> None:
         """Moves a level one place up (−1) or down (+1), if there is one."""
         names = list(self._order.now(tuple(level.name for level in self._current().levels)))
-        to = names.index(name) + by
+        to = names.index(name) + by if name in names else -1
         if 0 <= to < len(names):
             names.remove(name)
             names.insert(to, name)
@@ -82,6 +113,8 @@ class TasksPanel:
             for card in self._cards:
                 if card.name == level.name:
                     card.update(now, level, place)
+        if self._bindings is not None:
+            self._bindings.refresh(now.settings)
         cost = now.number("cost/damping")
         busy = cost == cost
         self._damping.content = block(
@@ -95,113 +128,7 @@ class TasksPanel:
             )
         )
 
-
-class _Card:
-    """One level."""
-
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        bindings: Bindings[TorqueSettings],
-        level: Level,
-        colours: dict[str, RGB],
-        place: int,
-        shift: Callable[[str, int], None],
-    ) -> None:
-        name = self.name = level.name
-        self._colour = colours[name]
-        self._folder = gui.add_folder(_title(place, name), order=float(place))
-        with self._folder:
-            self._live = gui.add_html("")
-            on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
-            move = gui.add_button_group("Priority", (_UP, _DOWN))
-            with gui.add_folder("Gains and weights", expand_by_default=False):
-                for task in level.tasks:
-                    many = len(level.tasks) > 1
-                    for field, top, step, what in (
-                        ("K_p", 1000.0, 1.0, "stiffness, 1/s²"),
-                        ("K_v", 100.0, 0.5, "damping, 1/s"),
-                    ):
-                        value = scalar(getattr(task, field))
-                        self._slider(
-                            gui,
-                            bindings,
-                            (f"{task.name} " if many else "") + ("K_P" if field == "K_p" else "K_V"),
-                            f"tasks.{task.name}.{field}",
-                            (0.0, max(top, value), step),
-                            value,
-                            _gain(name, task.name, field),
-                            what,
-                        )
-                self._slider(
-                    gui, bindings, "Q", f"levels.{name}.Q", (1.0, 1000.0, 1.0), scalar(level.Q),
-                    _weight(name, "Q"), "weight of the residual",
-                )  # fmt: skip
-                self._slider(
-                    gui, bindings, "R", f"levels.{name}.R", (0.1, 100.0, 0.1), scalar(level.R),
-                    _weight(name, "R"), "weight of the changes of torque",
-                )  # fmt: skip
-        bindings.bind(
-            on,
-            lambda s: _find(s, name).enabled,
-            lambda value: Set(f"levels.{name}.enabled", bool(value)),
-        )
-
-        @move.on_click
-        async def _(_: object) -> None:
-            shift(name, -1 if move.value == _UP else 1)
-
-    @staticmethod
-    def _slider(
-        gui: viser.GuiApi,
-        bindings: Bindings[TorqueSettings],
-        label: str,
-        path: str,
-        span: tuple[float, float, float],
-        value: float,
-        read: Callable[[TorqueSettings], float],
-        hint: str,
-    ) -> None:
-        low, high, step = span
-        slider = gui.add_slider(
-            label, min=min(low, value), max=max(high, value), step=step, initial_value=value, hint=hint
-        )
-        bindings.bind(slider, read, lambda number: Set(path, float(number)))
-
-    def update(self, now: Snapshot[TorqueSettings], level: Level, place: int) -> None:
-        title = _title(place, level.name)
-        if self._folder.label != title:
-            self._folder.label = title
-            self._folder.order = float(place)
-        errors = ", ".join(
-            (f"{esc(task.name)} " if len(level.tasks) > 1 else "")
-            + f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
-            for task in level.tasks
-        )
-        notes = "" if level.enabled else " " + badge("OFF", DAMPING)
-        rung = now.number(f"rung/{level.name}")
-        if level.enabled and rung == rung and rung > 0:
-            notes += " " + badge(RUNGS[int(rung)], BAD)
-        self._live.content = block(
-            f"{swatch(self._colour)}{errors}{notes}", f"border-left:3px solid {css(self._colour)}"
-        )
-
-
-def _title(place: int, name: str) -> str:
-    return f"{place + 1} · {name}"
-
-
-def _find(settings: TorqueSettings, name: str) -> Level:
-    return next(level for level in settings.levels if level.name == name)
-
-
-def _weight(level: str, field: str) -> Callable[[TorqueSettings], float]:
-    return lambda settings: scalar(getattr(_find(settings, level), field))
-
-
-def _gain(level: str, task: str, field: str) -> Callable[[TorqueSettings], float]:
-    def read(settings: TorqueSettings) -> float:
-        found = next(each for each in _find(settings, level).tasks if each.name == task)
-        return scalar(getattr(found, field))
-
-    return read
+    def close(self) -> None:
+        """The controls are about to be removed."""
+        if self._bindings is not None:
+            self._bindings.close()

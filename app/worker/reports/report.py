@@ -54,6 +54,10 @@ class Run(ABC):
         """Norm and spectral radius of I − M⁻¹M̄, where the controller has an M̄."""
         return None
 
+    def ranks(self) -> dict[str, tuple[int, int]]:
+        """Per level the directions it gets where the robot is, and its rows, where there is a stack."""
+        return {}
+
     def mission(self) -> MissionView | None:
         """How far the mission is, where there is one."""
         return None

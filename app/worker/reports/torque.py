@@ -11,7 +11,8 @@ from app.link.messages import TaskView
 from app.link.own_code import OwnCode
 from app.worker.reports.own_code import File
 from app.worker.reports.report import Run
-from himpc.tasks import Task
+from himpc.tasks import PlaneDistance, Task
+from himpc.tasks.kinds import word_of
 from lessons.geometry.look import matrix_of, plane_of
 from lessons.session.torque import TorqueSession
 from robots import InputError, convergence_eigenvalues, convergence_gauge
@@ -36,15 +37,17 @@ class TorqueRun(Run):
 
     def _view(self, task: Task, level: str) -> TaskView:
         target = self.session.target(task.name)
-        axes = str(getattr(task, "axes", ""))
-        kind = "joints" if not axes else "orientation" if task.unit == "rad" else "position"
+        robot = self.session.robot
         return TaskView(
             name=task.name,
             level=level,
-            kind=kind,
+            kind=word_of(task),
             unit=task.unit,
-            frame=str(getattr(task, "frame", "")) or self.session.robot.tip,
-            axes=axes,
+            frame=str(getattr(task, "frame", "")) or robot.tip,
+            axes=str(getattr(task, "axes", "")),
+            root=str(getattr(task, "root", "")) or robot.frames[0],
+            normal=tuple(task.n.tolist()) if isinstance(task, PlaneDistance) else (0.0, 0.0, 1.0),
+            offset=task.offset if isinstance(task, PlaneDistance) else 0.0,
             raw=None if target is None else np.array(target.raw),
             path=self.session.reference_path(task.name),
             speed_cap=float("nan") if target is None else target.caps.speed,
@@ -56,6 +59,10 @@ class TorqueRun(Run):
 
     def path(self) -> np.ndarray:
         return np.array(self.session.predicted_path())
+
+    def ranks(self) -> dict[str, tuple[int, int]]:
+        finite = np.isfinite(self.session.plant.q).all()
+        return self.session.ranks() if finite else {}
 
     def gauge(self) -> tuple[float, float] | None:
         found = self._mechanics()

@@ -1,0 +1,111 @@
+"""One more task: its kind, its frame, its axes, and whose priority it gets."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import viser
+
+from app.client.wish import Send
+from app.html.text import block
+from app.panels.torque.level_card import Names
+from app.panels.torque.task_editor import AXES
+from himpc.stack import Stack
+from himpc.tasks import KINDS
+from himpc.tasks.pointing import DIRECTIONS
+from lessons.events import Set
+
+_NORMALS = {"z, the floor": (0.0, 0.0, 1.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+_TOGETHER = "together with "
+_OWN = "a level of its own, at place "
+
+
+class AddTask:
+    """A folder whose controls show what the chosen kind needs. Nothing happens before Add is pressed."""
+
+    def __init__(self, gui: viser.GuiApi, post: Send, names: Names, stack: Stack) -> None:
+        self._post = post
+        with gui.add_folder("Add a task", expand_by_default=False, order=800.0):
+            self._kind = gui.add_dropdown("Kind", tuple(KINDS), initial_value="position")
+            self._says = gui.add_html("")
+            with gui.add_folder(None):
+                self._frame = gui.add_dropdown(
+                    "Of frame",
+                    tuple(names.frames),
+                    initial_value=names.tip,
+                    hint="Or click a link, see below",
+                )
+            with gui.add_folder(None):
+                self._pick = gui.add_checkbox("Click a link to choose", False)
+            with gui.add_folder(None):
+                self._root = gui.add_dropdown("As seen from", tuple(names.frames))
+            with gui.add_folder(None):
+                self._axes = gui.add_dropdown("Along axes", AXES)
+            with gui.add_folder(None):
+                self._axis = gui.add_dropdown("Its axis", DIRECTIONS, initial_value="z")
+            with gui.add_folder(None):
+                self._normal = gui.add_dropdown("Plane across", tuple(_NORMALS))
+            with gui.add_folder(None):
+                self._joint = gui.add_dropdown("Of joint", tuple(names.joints))
+            with gui.add_folder(None):
+                self._level = gui.add_dropdown("Priority", _places(stack), initial_value=_places(stack)[1])
+            with gui.add_folder(None):
+                self._name = gui.add_text("Its name", "", hint="Empty: the kind's")
+            self._add = gui.add_button("Add")
+        self._add.on_click(lambda _: self._post(Set("stack.add", self._wish())))
+        self._kind.on_update(lambda _: self._show())
+        self._show()
+
+    @property
+    def picking(self) -> bool:
+        """Whether a click on a link chooses the frame."""
+        return bool(self._pick.value)
+
+    def choose(self, frame: str) -> None:
+        """A link was clicked."""
+        if frame in self._frame.options:
+            self._frame.value = frame
+
+    def _needs(self) -> set[str]:
+        kind = KINDS[self._kind.value]
+        found = {each.name for each in fields(kind.makes[0])}
+        return found - {"joints"} if self._kind.value in ("posture", "damping") else found
+
+    def _show(self) -> None:
+        needs = self._needs()
+        self._says.content = block(KINDS[self._kind.value].says)
+        for field, handle in (
+            ("frame", self._frame),
+            ("frame", self._pick),
+            ("root", self._root),
+            ("axes", self._axes),
+            ("axis", self._axis),
+            ("normal", self._normal),
+            ("joints", self._joint),
+        ):
+            handle.visible = field in needs
+
+    def _wish(self) -> dict[str, Any]:
+        needs = self._needs()
+        given = {
+            "frame": self._frame.value,
+            "root": self._root.value,
+            "axes": self._axes.value,
+            "axis": self._axis.value,
+            "normal": list(_NORMALS[self._normal.value]),
+            "joints": [self._joint.value],
+        }
+        wish: dict[str, Any] = {"task": self._kind.value}
+        wish |= {field: value for field, value in given.items() if field in needs}
+        if self._name.value.strip():
+            wish["name"] = self._name.value.strip()[:100]
+        level = self._level.value
+        if level.startswith(_TOGETHER):
+            return wish | {"with": level.removeprefix(_TOGETHER)}
+        return wish | {"level": int(level.removeprefix(_OWN))}
+
+
+def _places(stack: Stack) -> tuple[str, ...]:
+    own = [f"{_OWN}{place}" for place in range(1, len(stack) + 2)]
+    return (*own, *(f"{_TOGETHER}{level.name}" for level in stack))

@@ -1,0 +1,109 @@
+"""One level in the list of tasks: its error and rank, gains and weights, and what can be done to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import viser
+
+from app.html.palette import BAD, BOUND, DAMPING, RGB, css
+from app.html.text import badge, block, esc, quantity, swatch
+from app.panels.torque.task_editor import TaskEditor
+from app.panels.widgets.controls import Controls
+from app.panels.widgets.mirror import Bindings
+from app.panels.widgets.snapshot import Snapshot
+from himpc.stack import Level
+from himpc.telemetry import RUNGS
+from lessons.events import Set
+from lessons.settings.torque import TorqueSettings
+
+UP, DOWN = "▲ Up", "▼ Down"
+
+
+@dataclass(frozen=True)
+class Names:
+    """What a robot's parts are called."""
+
+    frames: Sequence[str]
+    joints: Sequence[str]
+    tip: str
+
+
+class LevelCard:
+    """One level."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        bindings: Bindings[TorqueSettings],
+        settings: TorqueSettings,
+        level: Level,
+        colours: dict[str, RGB],
+        place: int,
+        names: Names,
+        shift: Callable[[str, int], None],
+    ) -> None:
+        """names: of the robot; shift: moves the level of a name by so many places."""
+        name = self.name = level.name
+        self._colour = colours.get(name, BOUND)
+        self._folder = gui.add_folder(_title(place, name), order=float(place))
+        with self._folder:
+            self._live = gui.add_html("")
+            on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
+            move = gui.add_button_group("Priority", (UP, DOWN))
+            with gui.add_folder("Gains and weights", expand_by_default=False):
+                controls = Controls(gui, bindings, settings)
+                for task in level.tasks:
+                    if len(level.tasks) > 1:
+                        gui.add_html(block(f"<b>{esc(task.name)}</b>"))
+                    controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
+                controls.add(f"levels.{name}.Q", f"levels.{name}.R")
+            with gui.add_folder("Change", expand_by_default=False):
+                for task in level.tasks:
+                    TaskEditor(gui, bindings, task, names, alone=len(level.tasks) == 1)
+                if place > 0:
+                    above = settings.levels[place - 1].name
+                    merge = gui.add_button("Merge with the level above")
+                    merge.on_click(lambda _: bindings.post(Set("stack.merge", [name, above])))
+        bindings.bind(
+            on,
+            lambda s: any(each.enabled for each in s.levels if each.name == name),
+            lambda value: Set(f"levels.{name}.enabled", bool(value)),
+        )
+
+        @move.on_click
+        async def _(_: object) -> None:
+            shift(name, -1 if move.value == UP else 1)
+
+    def update(self, now: Snapshot[TorqueSettings], level: Level, place: int) -> None:
+        title = _title(place, level.name)
+        if self._folder.label != title:
+            self._folder.label = title
+            self._folder.order = float(place)
+        errors = ", ".join(
+            (f"{esc(task.name)} " if len(level.tasks) > 1 else "")
+            + f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
+            for task in level.tasks
+        )
+        notes = "" if level.enabled else " " + badge("OFF", DAMPING)
+        rung = now.number(f"rung/{level.name}")
+        if level.enabled and rung == rung and rung > 0:
+            notes += " " + badge(RUNGS[int(rung)], BAD)
+        self._live.content = block(
+            f"{swatch(self._colour)}{errors}{notes}{_rank(now.status.ranks.get(level.name))}",
+            f"border-left:3px solid {css(self._colour)}",
+        )
+
+
+def _title(place: int, name: str) -> str:
+    return f"{place + 1} · {name}"
+
+
+def _rank(found: tuple[int, int] | None) -> str:
+    """What the level gets of what it asks for."""
+    if found is None:
+        return ""
+    rank, rows = found
+    short = "" if rank == rows else ": the rest is taken by the levels above, or the arm cannot"
+    return f"<br>gets {rank} of {rows} directions{short}"

@@ -1,0 +1,64 @@
+"""What a task is about, to be changed while the robot moves: its name, its frame, its axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import viser
+
+from app.html.text import block, esc
+from app.panels.widgets.mirror import Bindings
+from himpc.tasks import KINDS, Task
+from himpc.tasks.axes import OnAxes
+from himpc.tasks.kinds import word_of
+from himpc.tasks.pointing import DIRECTIONS
+from lessons.events import Set
+from lessons.settings.torque import TorqueSettings
+
+if TYPE_CHECKING:
+    from app.panels.torque.level_card import Names
+
+AXES = ("xyz", "xy", "xz", "yz", "x", "y", "z")
+
+
+class TaskEditor:
+    """The controls of one task. Each stands in a nameless folder, see `Controls`."""
+
+    def __init__(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], task: Task, names: Names, alone: bool
+    ) -> None:
+        """alone: whether the task has a level of its own."""
+        self._gui, self._bindings, self._task = gui, bindings, task
+        name = task.name
+        gui.add_html(block(f"<b>{esc(name)}</b>: {KINDS[word_of(task)].says}"))
+        if hasattr(task, "frame"):
+            self._menu("Frame", "frame", names.frames, names.tip)
+        if hasattr(task, "root"):
+            self._menu("Seen from", "root", names.frames, names.frames[0])
+        if hasattr(task, "axis"):
+            self._menu("Axis", "axis", DIRECTIONS, "z")
+        if isinstance(task, OnAxes):
+            self._menu("Axes", "axes", AXES if task.axes in AXES else (*AXES, task.axes), "xyz")
+        with gui.add_folder(None):
+            text = gui.add_text("Name", name)
+        self._button("Rename", lambda: Set("stack.rename", [name, text.value[:100]]))
+        if not alone:
+            self._button(f"Own level for {name}", lambda: Set("stack.split", name))
+        self._button(f"Remove {name}", lambda: Set("stack.remove", name))
+
+    def _menu(self, label: str, field: str, options: Sequence[str], usual: str) -> None:
+        """usual: what an empty field means."""
+        name = self._task.name
+
+        def read(settings: TorqueSettings) -> str:
+            tasks = (task for level in settings.levels for task in level.tasks if task.name == name)
+            return str(getattr(next(tasks, self._task), field, "")) or usual
+
+        with self._gui.add_folder(None):
+            now = str(getattr(self._task, field)) or usual
+            menu = self._gui.add_dropdown(label, tuple(options), initial_value=now)
+        self._bindings.bind(menu, read, lambda value: Set("stack.edit", {"name": name, field: str(value)}))
+
+    def _button(self, label: str, event: Callable[[], Set]) -> None:
+        self._gui.add_button(label).on_click(lambda _: self._bindings.post(event()))

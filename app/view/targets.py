@@ -1,0 +1,180 @@
+"""Targets of all tasks but the hand's: something to drag for each that has one."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pinocchio as pin
+import viser
+import viser.transforms as vtf
+
+from app.client.wish import HOLD, Send
+from app.html.palette import BOUND, RGB
+from app.link.messages import Ready, TaskView
+from app.view.coordinates import draggable, full, xyzw
+from lessons.events import MoveTarget
+from robots import Robot
+
+_BALL = 0.035  # m
+_DISC = 0.09  # m
+_STILL = 1e-4  # m, and about as many rad
+_TURNING = ("orientation", "relative_orientation")
+_POINTS = ("position", "com", "pointing", "relative_position")
+_SHOWN = (*_TURNING, *_POINTS, "plane_distance")
+
+
+class Targets:
+    """One for every task that `Hand` has no gizmo for and that is about places in space."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        ready: Ready,
+        colours: dict[str, RGB],
+        poses: np.ndarray,
+        size: float,
+        post: Send,
+    ) -> None:
+        """poses (n + 1, 7): of joints and tip now; size: of the arrows, m."""
+        of_hand = {task.name for task in draggable(ready.tasks) if task is not None}
+        self._targets = [
+            _Target(scene, task, ready.robot, colours.get(task.level, BOUND), poses, size, post)
+            for task in ready.tasks
+            if task.raw is not None and task.kind in _SHOWN and task.name not in of_hand
+        ]
+
+    def follow(self, poses: np.ndarray, raw: dict[str, np.ndarray], live: bool) -> None:
+        """poses (n + 1, 7) of the instant that is shown; raw: where the session has each target; live:
+        whether it is now, so that they can be dragged."""
+        for target in self._targets:
+            target.follow(poses, raw.get(target.name), live)
+
+    def remove(self) -> None:
+        """Takes them out of the scene."""
+        for target in self._targets:
+            target.remove()
+
+
+class _Target:
+    """Arrows or rings, a mark, and a label. The hand wins: for a moment after it moved the target, `follow`
+    leaves it where it is."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        task: TaskView,
+        robot: Robot,
+        colour: RGB,
+        poses: np.ndarray,
+        size: float,
+        post: Send,
+    ) -> None:
+        self.name, self._task, self._robot, self._post = task.name, task, robot, post
+        self._touched = -float("inf")
+        self._home = np.array(pin.centerOfMass(robot.model, robot.model.createData(), robot.home))
+        node = f"/targets/{task.name}"
+        self._base = scene.add_frame(node, show_axes=False)
+        turning, flat = task.kind in _TURNING, task.kind == "plane_distance"
+        along = "xyz" if task.kind == "pointing" else "x" if flat else task.axes
+        x, y, z = (axis in along for axis in "xyz")
+        self._control = scene.add_transform_controls(
+            f"{node}/control",
+            scale=size,
+            active_axes=(x, y, z),
+            disable_axes=turning,
+            disable_sliders=turning,
+            disable_rotations=not turning,
+            depth_test=False,
+            line_width=3.0,
+        )
+        mark = f"{node}/control/mark"
+        if flat:
+            scene.add_box(
+                mark, color=colour, dimensions=(0.006, _DISC, _DISC), opacity=0.5, cast_shadow=False
+            )
+        elif not turning:
+            scene.add_icosphere(mark, radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
+        scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, 0.6 * size + 0.03))
+        self._gap = scene.add_line_segments(
+            f"/gaps/{task.name}", np.zeros((1, 2, 3), np.float32), colour, thickness=0.005, visible=False
+        )
+        self.follow(poses, task.raw, True)
+
+        @self._control.on_update
+        async def _(_: viser.TransformControlsEvent) -> None:
+            self._touched = time.monotonic()
+            self._post(MoveTarget(self.name, self._value()))
+
+    def _value(self) -> tuple[float, ...]:
+        """What the task's target is where the hand has it."""
+        task, at = self._task, np.array(self._control.position, float)
+        if task.kind in _TURNING:
+            return xyzw(vtf.SO3(np.array(self._control.wxyz, float)).as_matrix())
+        if task.kind == "plane_distance":
+            return (float(np.array(task.normal) @ at - task.offset),)
+        axes = "xyz" if task.kind == "pointing" else task.axes
+        return tuple(float(at["xyz".index(axis)]) for axis in axes)
+
+    def follow(self, poses: np.ndarray, raw: np.ndarray | None, live: bool) -> None:
+        task = self._task
+        frame = frame_pose(self._robot, poses, task.frame)
+        base = pin.SE3.Identity()
+        if task.kind.startswith("relative"):
+            base = frame_pose(self._robot, poses, task.root)
+        if self._control.visible != live:
+            self._control.visible = live
+        _put(self._base, base.translation, base.rotation)
+        if raw is None or time.monotonic() - self._touched < HOLD:
+            return
+        here = base.actInv(frame)
+        if task.kind in _TURNING:
+            _put(self._control, here.translation, raw)
+        elif task.kind == "plane_distance":
+            normal = np.array(task.normal)
+            above = float(normal @ frame.translation - task.offset - raw[0])
+            _put(self._control, frame.translation - above * normal, _facing(normal))
+        else:
+            else_ = self._home if task.kind == "com" else here.translation
+            at = raw if task.kind == "pointing" else full(task, raw, else_)
+            _put(self._control, at, np.eye(3))
+            self._reach(frame.translation, base.act(at))
+
+    def _reach(self, point: np.ndarray, goal: np.ndarray) -> None:
+        """Draws the line from the frame to what is asked of it."""
+        if self._task.kind == "com":
+            return
+        ends = np.array([[point, goal]], np.float32)
+        shown = bool(np.linalg.norm(point - goal) > _BALL)
+        if self._gap.visible != shown:
+            self._gap.visible = shown
+        if shown and not np.allclose(ends, self._gap.points, rtol=0.0, atol=1e-3):
+            self._gap.points = ends
+
+    def remove(self) -> None:
+        self._base.remove()
+        self._gap.remove()
+
+
+def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
+    """Where a link is in the world, from the poses (n + 1, 7) of the joints."""
+    found = robot.model.frames[robot.frame_id(frame)]
+    joint = found.parentJoint
+    if joint == 0:
+        return found.placement
+    pose = poses[joint - 1]
+    return pin.SE3(vtf.SO3(pose[3:]).as_matrix(), pose[:3]) * found.placement
+
+
+def _put(node: viser.SceneNodeHandle, position: np.ndarray, rotation: np.ndarray) -> None:
+    """Moves a node, unless it is there: what does not move need not be drawn again."""
+    wxyz = vtf.SO3.from_matrix(rotation).wxyz
+    if np.abs(np.array(node.position) - position).max() > _STILL:
+        node.position = position
+    if min(np.abs(node.wxyz - wxyz).max(), np.abs(node.wxyz + wxyz).max()) > _STILL:
+        node.wxyz = wxyz
+
+
+def _facing(normal: np.ndarray) -> np.ndarray:
+    """A rotation whose x axis is the normal."""
+    return pin.Quaternion.FromTwoVectors(np.array([1.0, 0.0, 0.0]), normal).toRotationMatrix()

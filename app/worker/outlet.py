@@ -1,0 +1,42 @@
+"""What a session's telemetry goes through: memory of the width that its rows have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.link.ring import Block
+from app.worker.link_poses import LinkPoses
+from lessons.session.session import Session
+
+
+class Outlet:
+    """The memory of one robot under one stack.
+
+    Attributes:
+        block: the shared memory.
+        poses: what computes the poses that go there.
+        layout: of the rows.
+        step_us, late: columns; None if there is none.
+        told: whether the page knows of it.
+    """
+
+    def __init__(self, session: Session, told: bool = True) -> None:
+        """Raises InputError if there is not enough memory."""
+        self.told = told
+        self.poses, self.layout = LinkPoses(session.robot), session.layout
+        self.block = Block.for_robot(session.robot, session.layout.size)
+        fields = session.layout.fields
+        self.step_us = fields["step_us"].start
+        self.late = fields["late"].start if "late" in fields else None
+
+    def fits(self, session: Session) -> bool:
+        """Whether the session's rows are still laid out this way: another stack has others."""
+        if session.layout is not self.layout and session.layout == self.layout:
+            self.layout = session.layout
+        return session.layout is self.layout
+
+    def write_poses(self, session: Session) -> None:
+        """The plant's true link poses, for the 3D view."""
+        poses = self.poses.at(np.asarray(session.plant.q))
+        if poses is not None:
+            self.block.write_poses(poses, session.t)
