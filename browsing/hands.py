@@ -106,6 +106,13 @@ def write(page: Page, label: str, text: str) -> None:
     page.wait_for_timeout(BETWEEN)
 
 
+def pick(page: Page, label: str, option: str) -> None:
+    """Chooses from a menu."""
+    row(page, label).locator("input").first.click()
+    page.get_by_role("option", name=option, exact=True).first.click()
+    page.wait_for_timeout(BETWEEN)
+
+
 def press(page: Page, button: str) -> None:
     page.get_by_role("button", name=button, exact=True).first.click()
     page.wait_for_timeout(BETWEEN)

@@ -43,17 +43,33 @@ class History:
         self._takers = takers
         self._block = block
         self._t = layout.fields["t"].start
-        self._count = 0
+        self._before = self._count = 0
         self._numbers = np.full(_SLOTS, -1)
         self._pairs = np.full((_SLOTS, 2, layout.size), np.nan)
         self._lasts = np.full((_SLOTS, layout.size), np.nan)
         self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
         self._first = np.full(layout.size, np.nan)  # of the open bucket, for the order of the pair
 
+    def under(self, block: Block, layout: Layout, *takers: Take) -> History:
+        """The same curves as another layout has them: the run goes on under another stack."""
+        from himpc.telemetry import relaid
+
+        def moved(rows: np.ndarray) -> np.ndarray:
+            flat = rows.reshape(-1, self.layout.size)
+            return relaid(flat, self.layout, layout).reshape(*rows.shape[:-1], layout.size)
+
+        new = History(block, layout, *takers)
+        new.latest, new._first = moved(self.latest), moved(self._first)
+        new._pairs, new._lasts = moved(self._pairs), moved(self._lasts)
+        new.bound_ticks, new.bucket = self.bound_ticks, self.bucket
+        new._numbers, new._bits = self._numbers, self._bits
+        new._before = self.count
+        return new
+
     @property
     def count(self) -> int:
         """Rows seen or lost so far."""
-        return self._count
+        return self._before + self._count
 
     def pull(self) -> int:
         """Takes over what was written since the last pull; returns how many rows."""

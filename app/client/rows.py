@@ -36,6 +36,17 @@ class Record:
         self._mark = -1
         self._last = -np.inf
 
+    def under(self, layout: Layout) -> Record:
+        """The same rows as another layout has them: the run goes on under another stack."""
+        from himpc.telemetry import relaid
+
+        new = Record(layout)
+        new._recent = relaid(self._recent, self.layout, layout)
+        new._whole = relaid(self._whole, self.layout, layout)
+        new._every, new._kept, new._thinned = self._every, self._kept, self._thinned
+        new._mark, new._last = self._mark, self._last
+        return new
+
     def take(self, rows: np.ndarray) -> None:
         """Rows in order; a time that goes back begins a new run."""
         times = rows[:, self._t]

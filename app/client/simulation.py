@@ -106,14 +106,20 @@ class Simulation:
                     pass
 
     def _enter(self, ready: Ready) -> None:
+        record, history = self.record, self._history
         self._free()
         self.ready, self.settings = ready, ready.settings
         self._block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
         if not ready.again:
             self.status = None
             self.tape.clear()
-        self.score, self.record = Score(ready.layout), Record(ready.layout)
-        self._history = History(self._block, ready.layout, self.score.take, self.record.take)
+        self.score = Score(ready.layout)
+        if ready.again and record is not None and history is not None:
+            self.record = record.under(ready.layout)
+            self._history = history.under(self._block, ready.layout, self.score.take, self.record.take)
+        else:
+            self.record = Record(ready.layout)
+            self._history = History(self._block, ready.layout, self.score.take, self.record.take)
         self.changed += 1
 
     def _free(self) -> None:

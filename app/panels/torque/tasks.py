@@ -36,7 +36,7 @@ class TasksPanel:
         self._gui, self._own, self._colours, self._current = gui, own, colours, current
         self._names, self._in_lesson = Names(robot.frames, robot.joint_names, robot.tip), in_lesson
         self._post = bindings.post
-        self._place = gui.add_folder(None)
+        self._place = gui.add_folder(None, order=0.0)
         self._cards: list[LevelCard] = []
         self._bindings: Bindings[TorqueSettings] | None = None
         self._build(current())
