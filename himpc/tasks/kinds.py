@@ -49,9 +49,19 @@ KINDS: dict[str, Kind] = {
 posture, damping)."""
 
 
+OWN = "own"
+"""Instead of a word, for kinds that somebody else made."""
+
+
 def word_of(task: Task) -> str:
-    """The word of a task's kind. Raises KeyError if it is of none."""
-    return _WORDS[type(task)]
+    """The word of a task's kind; OWN if it is of none of ours."""
+    return _WORDS.get(type(task), OWN)
+
+
+def said(task: Task) -> str:
+    """What a task is about, one line."""
+    word = word_of(task)
+    return KINDS[word].says if word != OWN else (type(task).__doc__ or "a task of your own").split("\n")[0]
 
 
 _WORDS: dict[type[Task], str] = {kind.makes[0]: word for word, kind in KINDS.items() if len(kind.makes) == 1}

@@ -9,7 +9,7 @@ from typing import Any
 
 from himpc.stack import DAMPING_LEVEL, Level, Stack, check_names, essence
 from himpc.tasks import KINDS, Task
-from himpc.tasks.kinds import word_of
+from himpc.tasks.kinds import OWN, word_of
 from lessons.settings.values import form_of
 from robots import InputError
 from robots.errors import shortened, unknown_name
@@ -288,12 +288,11 @@ def _told_level(level: Level) -> dict[str, Any]:
 
 
 def _told_task(task: Task) -> dict[str, Any]:
-    try:
-        word = word_of(task)
-    except KeyError:
+    word = word_of(task)
+    if word == OWN:
         raise InputError(
             f"task '{task.name}' is of a kind of its own, which no word names: it cannot be told"
-        ) from None
+        )
     own = {each.name: getattr(task, each.name) for each in fields(task) if each.name != "name"}
     usual = {each.name: each.default for each in fields(task)}
     kept = {key: value for key, value in own.items() if key in _GAINS or value != usual[key]}

@@ -9,9 +9,9 @@ import viser
 
 from app.html.text import block, esc
 from app.panels.widgets.mirror import Bindings
-from himpc.tasks import KINDS, Task
+from himpc.tasks import Task
 from himpc.tasks.axes import OnAxes
-from himpc.tasks.kinds import word_of
+from himpc.tasks.kinds import said
 from himpc.tasks.pointing import DIRECTIONS
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
@@ -31,7 +31,7 @@ class TaskEditor:
         """alone: whether the task has a level of its own."""
         self._gui, self._bindings, self._task = gui, bindings, task
         name = task.name
-        gui.add_html(block(f"<b>{esc(name)}</b>: {KINDS[word_of(task)].says}"))
+        gui.add_html(block(f"<b>{esc(name)}</b>: {esc(said(task))}"))
         if hasattr(task, "frame"):
             self._menu("Frame", "frame", names.frames, names.tip)
         if hasattr(task, "root"):
