@@ -82,6 +82,29 @@ class Configuration:
             self.frame_jacobians(frame)
         return self._placements[frame]
 
+    def relative_placement(self, frame: str, root: str) -> pin.SE3:
+        """Placement of a frame as another one sees it, at the measured state."""
+        return self.placement(root).actInv(self.placement(frame))
+
+    def relative_jacobians(self, frame: str, root: str) -> Array:
+        """(N, 6, n) Jacobians of a frame as another one sees it, linear over angular, axes of the root.
+
+        With R of the root and d = p − p_root: Rᵀ(J_p − J_p,root + [d]× J_ω,root) and Rᵀ(J_ω − J_ω,root).
+        """
+        key = f"{frame}\0{root}"
+        found = self._jacobians.get(key)
+        if found is None:
+            seen, sees = self.frame_jacobians(frame), self.frame_jacobians(root)
+            found = seen - sees
+            for j, (far, near) in enumerate(zip(self.placements(frame), self.placements(root), strict=True)):
+                x, y, z = far.translation - near.translation
+                turn = near.rotation.T
+                across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+                found[j, :3] = turn @ (found[j, :3] + across @ sees[j, 3:])
+                found[j, 3:] = turn @ found[j, 3:]
+            self._jacobians[key] = found
+        return found
+
     def centre_of_mass(self) -> Array:
         """Centre of all moving masses at the measured state by the robot's own description, (3,) m, world."""
         return np.array(pin.centerOfMass(self.robot.model, self._data, self.q))
