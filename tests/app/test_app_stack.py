@@ -43,7 +43,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     tab(page, "Tasks")
     unfold(page, "Add a task")
     pick(page, "Of frame", "link_4")
-    pick(page, "Priority", "a level of its own, at place 2")
+    pick(page, "On level", "a level of its own, at place 2")
     write(page, "Its name", "elbow")
     press(page, "Add")
     assert eventually(page, lambda: levels(learner) == ["position", "elbow", "orientation", "posture"])

@@ -49,7 +49,7 @@ class AddTask:
             with gui.add_folder(None):
                 self._joint = gui.add_dropdown("Of joint", tuple(names.joints))
             with gui.add_folder(None):
-                self._level = gui.add_dropdown("Priority", _places(stack), initial_value=_places(stack)[1])
+                self._level = gui.add_dropdown("On level", _places(stack), initial_value=_places(stack)[1])
             with gui.add_folder(None):
                 self._name = gui.add_text("Its name", "", hint="Empty: the kind's")
             self._add = gui.add_button("Add")

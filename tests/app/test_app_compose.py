@@ -1,0 +1,97 @@
+"""The hierarchy is composed on a page without a browser: what its controls say, the simulation does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.server import PageServer
+from browsing.wire import Wire
+from himpc.tasks.axes import OnAxes
+from lessons.replay.state import decode, encode, state_of
+from lessons.settings.torque import TorqueSettings
+
+LONG = 60.0
+
+
+@pytest.fixture
+def server() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=1, grace=2.0)
+    yield running
+    running.close()
+
+
+def settings(learner: Learner) -> TorqueSettings:
+    assert isinstance(learner.settings, TorqueSettings)
+    return learner.settings
+
+
+def levels(learner: Learner) -> list[str]:
+    return [level.name for level in settings(learner).levels]
+
+
+def shown(wire: Wire, label: str, at: int = 0) -> str:
+    """One of the controls with this label, from the top, once it is there."""
+
+    def found() -> list[str]:
+        return [uuid for uuid, each in list(wire.controls.items()) if each["props"].get("label") == label]
+
+    assert wait_until(lambda: len(found()) > at, LONG), label
+    return found()[at]
+
+
+def choose(wire: Wire, label: str, value: str, at: int = 0) -> None:
+    wire.write(shown(wire, label, at), value=value)
+
+
+def press(wire: Wire, label: str) -> None:
+    wire.write(shown(wire, label), value=True)
+
+
+def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServer) -> None:
+    """The panel follows every change; the stack's code is the same stack elsewhere; the robot goes on."""
+    with Wire(server.url) as wire:
+        assert wait_until(lambda: bool(server.sessions.learners), LONG)
+        learner = server.sessions.learners[0]
+
+        def are(*names: str) -> bool:
+            return wait_until(lambda: levels(learner) == list(names), LONG)
+
+        choose(wire, "Of frame", "link_4")
+        choose(wire, "Its name", "elbow")
+        assert wait_until(lambda: learner.settings is not None, LONG)
+        press(wire, "Add")
+        assert are("position", "elbow", "orientation", "posture")
+        shown(wire, "Remove elbow")
+        assert wait_until(lambda: wire.shows("gets 2 of 3 directions"), LONG)
+
+        choose(wire, "Axes", "y", at=1)
+        assert wait_until(lambda: axes(learner, "elbow") == "y", LONG)
+        assert wait_until(lambda: wire.shows("gets 1 of 1 directions"), LONG)
+        choose(wire, "Priority", "▲ Up", at=1)
+        assert are("elbow", "position", "orientation", "posture")
+        before = settings(learner)
+        assert decode(encode(state_of("iiwa14-hold", before))).prepared().settings == before
+
+        press(wire, "Merge with the level above")
+        assert wait_until(lambda: len(levels(learner)) == 3, LONG)
+        press(wire, "Own level for elbow")
+        assert wait_until(lambda: wire.find("Own level for elbow") is None, LONG)
+        press(wire, "Remove elbow")
+        assert are("position", "orientation", "posture")
+        assert wait_until(lambda: wire.find("Remove elbow") is None, LONG)
+        assert learner.failure is None and learner.status is not None
+        t = learner.status.t
+        assert wait_until(lambda: learner.status is not None and learner.status.t > t + 0.1, LONG)
+        assert wire.notices == []
+
+
+def axes(learner: Learner, name: str) -> str:
+    tasks = (task for level in settings(learner).levels for task in level.tasks if task.name == name)
+    found = next(tasks)
+    assert isinstance(found, OnAxes)
+    return found.axes
