@@ -13,6 +13,7 @@ from app.server.server import PageServer
 from browsing.wire import Wire
 from himpc.tasks.axes import OnAxes
 from lessons.replay.state import decode, encode, state_of
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 
 LONG = 60.0
@@ -75,7 +76,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         choose(wire, "Priority", "▲ Up", at=1)
         assert are("elbow", "position", "orientation", "posture")
         before = settings(learner)
-        assert decode(encode(state_of("iiwa14-hold", before))).prepared().settings == before
+        assert decode(encode(state_of(RunSpec("iiwa14-hold"), before))).run.prepared().settings == before
 
         press(wire, "Merge with the level above")
         assert wait_until(lambda: len(levels(learner)) == 3, LONG)
