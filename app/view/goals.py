@@ -10,7 +10,8 @@ import viser
 from app.client.wish import Send
 from app.html.palette import RGB
 from app.html.text import free_name, quantity
-from app.link.messages import MissionRow, Ready, Status, TaskView
+from app.link.messages import Ready, Status, TaskView
+from app.link.mission_view import MissionRow
 from app.view.goal import Goal
 from lessons.events import InsertTask, MoveTarget
 

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.html.palette import BOUND, JOINTS, RGB
-from app.link.messages import Person
+from app.link.mission_view import Person
 
 _BALL: RGB = (245, 190, 30)
 _BALL_RADIUS = 0.06  # m

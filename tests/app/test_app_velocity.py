@@ -11,7 +11,8 @@ import pytest
 from app.client.decimated import History
 from app.html.text import free_name
 from app.link.choice import SceneChoice
-from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, Step
+from app.link.messages import Play, Post, Ready, ResetAll, Status, Step
+from app.link.mission_view import MissionView
 from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
-from app.link.messages import MissionView
+from app.link.mission_view import MissionView
 from app.server.server import PageServer
 from browsing.hands import (
     drag_target,

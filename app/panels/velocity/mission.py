@@ -10,7 +10,8 @@ import viser
 from app.client.wish import Send
 from app.html.palette import GOOD, RGB, css
 from app.html.text import badge, block, esc, free_name, swatch
-from app.link.messages import MissionRow, Status, TaskView
+from app.link.messages import Status, TaskView
+from app.link.mission_view import MissionRow
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
 from lessons.settings.velocity import VelocitySettings

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from app.link.inside import Inside, Watch
-from app.link.messages import BindingRow, MissionView, TaskView
+from app.link.messages import BindingRow, TaskView
+from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
 
 LISTED = 24

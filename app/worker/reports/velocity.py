@@ -6,7 +6,8 @@ from typing import final
 
 import numpy as np
 
-from app.link.messages import MissionRow, MissionView, Person, TaskView
+from app.link.messages import TaskView
+from app.link.mission_view import MissionRow, MissionView, Person
 from app.worker.reports.report import Run
 from himpc.htmpc import base_joints
 from himpc.missions import Go, MissionTask
