@@ -12,7 +12,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from docs.pages import api, examples, lessons, texts
+from docs.pages import api, examples, exercises, lessons, texts
 
 ROOT = Path(__file__).parents[1]
 
@@ -21,7 +21,9 @@ def write_sources(folder: Path) -> None:
     """All pages as Sphinx reads them."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / "docs" / "site", folder, ignore=shutil.ignore_patterns("__pycache__", "*.json"))
-    pages = {**texts.pages(ROOT), **lessons.pages(ROOT), **examples.pages(ROOT), **api.pages(ROOT)}
+    pages: dict[str, str] = {}
+    for kind in (texts, lessons, exercises, examples, api):
+        pages |= kind.pages(ROOT)
     for name, text in pages.items():
         path = folder / f"{name}.md"
         path.parent.mkdir(parents=True, exist_ok=True)

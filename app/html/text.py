@@ -102,14 +102,15 @@ def figure(value: float, unit: str = "") -> str:
         number = f"{value:.0f}" if size >= 999.5 else f"{value:.3g}"
     else:
         number = _power(value)
-    return f"{number} {unit}".rstrip().replace(" deg", "°").replace("-", "−")
+    return _DEGREES.sub("°", f"{number} {unit}".rstrip()).replace("-", "−")
 
 
 def readable(words: str) -> str:
     """A sentence whose numbers and units are written as `figure` does."""
-    return _EXPONENT.sub(lambda found: figure(float(found[0])), words).replace(" deg", "°")
+    return _EXPONENT.sub(lambda found: figure(float(found[0])), _DEGREES.sub("°", words))
 
 
+_DEGREES = re.compile(r" deg\b")
 _EXPONENT = re.compile(r"-?\d+(?:\.\d+)?e[+-]\d+")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

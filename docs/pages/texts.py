@@ -8,13 +8,21 @@ from pathlib import Path
 LINKS = {
     "docs/lessons/README.md": "lessons/index.md",
     "docs/serving.md": "serving.md",
+    "docs/authoring.md": "authoring.md",
+    "authoring.md": "authoring.md",
+    "docs/instructors.md": "instructors.md",
+    "instructors.md": "instructors.md",
+    "docs/disagreements.md": "disagreements.md",
+    "docs/settings.md": "settings.md",
     "CONTRIBUTING.md": "contributing.md",
     "examples/README.md": "examples/index.md",
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
 }
+IN_DOCS = ("serving", "authoring", "instructors", "disagreements", "settings")
 FROM_README = {
     "start": ("Start", "Start"),
+    "own": ("Bring your own", "Bring your own"),
     "own-program": ("In your own program", "In your own program"),
     "results": ("Results beside the papers'", "Results beside the papers'"),
     "house": ("How it is built", "How it is built"),
@@ -33,7 +41,7 @@ def pages(root: Path) -> dict[str, str]:
     for name, file in (
         ("contributing", "CONTRIBUTING.md"),
         ("changelog", "CHANGELOG.md"),
-        ("serving", "docs/serving.md"),
+        *((name, f"docs/{name}.md") for name in IN_DOCS),
     ):
         found[name] = (root / file).read_text(encoding="utf-8")
     citation = (root / "CITATION.cff").read_text(encoding="utf-8")

@@ -75,6 +75,11 @@ class Exercise:
     lesson: str
     checks: Callable[[int], tuple[Check, ...]]
 
+    @property
+    def scene(self) -> str:
+        """Where to watch it live."""
+        return self.checks(0)[-1].run.scene
+
 
 def pushed(
     run: RunSpec, seed: int, body: str, newtons: float, at: float = 0.2, plane: bool = False

@@ -12,6 +12,7 @@ from app.client.progress import Notebook
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, Lecture
 from app.panels.lesson.cards import add_cards, add_invitation
+from app.panels.lesson.exercise_cards import exercise_cards
 from app.panels.lesson.step import LessonPanel
 from app.panels.widgets.window import Window
 from lessons.settings.settings import Settings
@@ -70,6 +71,7 @@ class Course:
 
     def _fill(self) -> None:
         add_cards(self._gui, self._notebook, self._leave_for)
+        self._gui.add_html(exercise_cards())
 
     def _leave_for(self, choice: SceneChoice) -> None:
         self._list.close()

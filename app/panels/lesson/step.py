@@ -15,6 +15,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, Lecture, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
 from app.panels.lesson.claims import after, heading, idea, pictures, state
+from app.panels.lesson.exercise_cards import belonging_to
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.command import add_command
 from app.panels.widgets.controls import add_control
@@ -236,7 +237,11 @@ class LessonPanel:
         self._put("idea", self._idea, heading(self._exercise) + idea(self._part, opened=not seen))
         self._put("state", self._state, state(self._part, lecture, best))
         self._put("pictures", self._pictures, pictures(self._part, lecture))
-        self._put("after", self._after, after(self._part, lecture) if over else "")
+        self._put("after", self._after, self._last_words(lecture) if over else "")
+
+    def _last_words(self, lecture: Lecture) -> str:
+        last = self._exercise.place + 1 >= len(parts_of(self._exercise.whole))
+        return after(self._part, lecture) + (belonging_to(self._exercise.lesson) if last else "")
 
     def _put(self, name: str, handle: viser.GuiHtmlHandle, html: str) -> None:
         if self._shown.get(name) != html:

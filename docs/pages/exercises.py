@@ -1,0 +1,45 @@
+"""One page of all exercises, made from their files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from docs.pages.lessons import cell
+from lessons.course import load_lesson
+from lessons.exercises import EXERCISES, load_exercise, start_of
+from lessons.exercises.exercise import Exercise
+
+
+def pages(_: Path) -> dict[str, str]:
+    """Name and Markdown."""
+    parts = [
+        "# Exercises",
+        "Write the missing lines of a controller in a file of your own. What you save runs on the page, and "
+        "`himpc-lab grade` judges what the robot does, not what the file says.",
+    ]
+    return {"exercises": "\n\n".join([*parts, *(part(load_exercise(name)) for name in EXERCISES)]) + "\n"}
+
+
+def part(exercise: Exercise) -> str:
+    """One exercise: card, equation, commands, the file with the hole, checks, hints to unfold."""
+    card, file = exercise.card, f"my_{exercise.name.replace('-', '_')}.py"
+    lesson = load_lesson(exercise.lesson).card.title
+    checks = ["| points | check | bound |", "|--:|---|---|"]
+    checks += [f"| {each.points} | {cell(each.text)} | {each.condition} |" for each in exercise.checks(0)]
+    hints = [
+        f"<details><summary>Hint {number}</summary>\n\n{hint.strip()}\n\n</details>"
+        for number, hint in enumerate(exercise.hints, start=1)
+    ]
+    return "\n\n".join(
+        [
+            f"## {card.title}",
+            f"*{card.question}*",
+            f"About {card.minutes} minutes; after [{lesson}](lessons/{exercise.lesson}.md).",
+            f"$$\n{exercise.equation}\n$$",
+            f"```sh\nhimpc-lab new controller {file} --from {exercise.name}\n"
+            f"himpc-lab --scene {exercise.scene} --controller {file}\nhimpc-lab grade {file}\n```",
+            f"```python\n{start_of(exercise.name).strip()}\n```",
+            "\n".join(checks),
+            *hints,
+        ]
+    )
