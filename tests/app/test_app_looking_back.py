@@ -81,6 +81,19 @@ def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
     assert tape.span == (0.0, 0.0)
 
 
+@pytest.mark.parametrize("rate", [30.0, 10.0])
+def test_the_tape_holds_no_more_than_a_minute(rate: float) -> None:
+    """Also where a busy machine shows fewer frames than it would keep."""
+    tape = Tape()
+    lengths: list[int] = []
+    for k in range(round(150 * rate)):
+        tape.add(frame(k / rate))
+        lengths.append(len(list(tape.between(-1.0, 1e3))))
+    filled = lengths[round(61 * rate) :]
+    assert max(filled) - min(filled) <= 1
+    assert max(filled) <= KEPT * rate + 1
+
+
 # ---------------------------------------------------------------- curves
 
 
