@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -136,22 +135,6 @@ class ReachJudge:
         return ReachResult(
             q.copy(), distance, angle, distance <= POSITION_TOLERANCE and angle <= ROTATION_TOLERANCE
         )
-
-
-def solve_posture(
-    robot: Robot,
-    position: np.ndarray,
-    rotation: np.ndarray | None = None,
-    q_seed: np.ndarray | None = None,
-    frame: str = "",
-) -> ReachResult:
-    """`ReachJudge.solve`; the judges of the robots last asked about are kept."""
-    return _judge_of(robot).solve(position, rotation, q_seed, frame)
-
-
-@lru_cache(maxsize=2)
-def _judge_of(robot: Robot) -> ReachJudge:
-    return ReachJudge(robot)
 
 
 def _residual(result: ReachResult) -> float:

@@ -44,10 +44,10 @@ def _euler(N: int, T_s: float) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _lags(N: int, T_s: float) -> tuple[Array, Array]:
-    """How Δτ/M̄ at knot s moves q̇ and q at knot j+1."""
+def _lags(N: int, T_s: float) -> Array:
+    """How Δτ/M̄ at knot s moves q at knot j+1, (N, N)."""
     lag = np.subtract.outer(np.arange(N), np.arange(N)).astype(float)
-    return np.where(lag >= 0, T_s * (lag + 1), 0.0), np.where(lag >= 0, T_s**2 * lag * (lag + 1) / 2, 0.0)
+    return np.where(lag >= 0, T_s**2 * lag * (lag + 1) / 2, 0.0)
 
 
 def predict_positions(state: JointState, U: Array, M_bar: Array, T_s: float) -> Array:
@@ -64,6 +64,6 @@ def predict_positions(state: JointState, U: Array, M_bar: Array, T_s: float) -> 
     """
     q = np.empty((len(U) + 1, state.q.size))
     q[0] = state.q
-    moved = np.matmul(_lags(len(U), T_s)[1], U / M_bar, out=q[1:])
+    moved = np.matmul(_lags(len(U), T_s), U / M_bar, out=q[1:])
     moved += state.free_position(len(U), T_s)
     return q

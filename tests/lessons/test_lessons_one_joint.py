@@ -13,7 +13,7 @@ from lessons.events import MoveTarget
 from lessons.recording.run import run
 from lessons.scenes.catalog import load_scene
 from robots.collision import Ball
-from robots.reach import solve_posture
+from robots.reach import ReachJudge
 
 ONE_JOINT = """<robot name="one"><link name="base"/><link name="arm"><inertial><origin xyz="0.1 0 0"/>
 <mass value="1"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -49,6 +49,6 @@ def test_one_joint_follows_a_dragged_target(kind: str) -> None:
 def test_one_joint_is_judged_and_kept_clear(kind: str) -> None:
     robot = load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind)).robot
     there = np.array([0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0.0] if kind == "revolute" else [0.3, 0.0, 0.4])
-    assert solve_posture(robot, there).reachable
+    assert ReachJudge(robot).solve(there).reachable
     clear = CollisionModel(robot, (Ball("ball", (0.5, 0.0, 0.0), 0.1),)).clearances(robot.home[None], 1.0)
     assert np.isfinite(clear.gradient).all()

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from robots import CATALOG, InputError, load_robot
-from robots.reach import ReachJudge, solve_posture
+from robots.reach import ReachJudge
 
 
 @pytest.mark.parametrize("name", CATALOG)
@@ -30,7 +30,7 @@ def test_poses_of_the_robot_are_reachable(name: str) -> None:
 
 def test_a_target_out_of_reach_is_said_to_be() -> None:
     robot = load_robot("iiwa14")
-    result = solve_posture(robot, np.array([3.0, 0.0, 0.5]))
+    result = ReachJudge(robot).solve(np.array([3.0, 0.0, 0.5]))
     assert not result.reachable
     assert 1.0 < result.position_error < 2.5
     assert np.all(np.isfinite(result.q))
@@ -38,12 +38,12 @@ def test_a_target_out_of_reach_is_said_to_be() -> None:
 
 def test_the_stretched_arm_as_seed_is_no_trap() -> None:
     robot = load_robot("iiwa14")
-    assert solve_posture(robot, np.array([0.5, 0.0, 0.5]), None, np.zeros(7), "flange").reachable
+    assert ReachJudge(robot).solve(np.array([0.5, 0.0, 0.5]), None, np.zeros(7), "flange").reachable
 
 
 def test_bad_targets_are_refused() -> None:
     robot = load_robot("planar3")
     with pytest.raises(ValueError, match="position"):
-        solve_posture(robot, np.array([np.nan, 0, 0]))
+        ReachJudge(robot).solve(np.array([np.nan, 0, 0]))
     with pytest.raises(InputError, match="did you mean 'ee'"):
-        solve_posture(robot, np.array([0.5, 0.3, 0]), None, None, "eee")
+        ReachJudge(robot).solve(np.array([0.5, 0.3, 0]), None, None, "eee")
