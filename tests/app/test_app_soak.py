@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 def test_nothing_grows() -> None:
     """Memory of server and simulations, threads, handles; and over reloads. In a process of its own, which
     holds nothing of other tests."""
-    options = ["--minutes", "2", "--clients", "1", "--reconnects", "50", "--scene", "planar3-hold"]
+    options = ["--minutes", "2", "--clients", "2", "--reconnects", "50", "--scene", "planar3-hold"]
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.soak", *options, "--json", "-"],
         cwd=ROOT,

@@ -1,0 +1,57 @@
+"""Many threads of the server share few arenas of the allocator. In a process of its own: it is for good."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.server.arenas import ARENAS
+
+ROOT = Path(__file__).parents[2]
+COUNT = """
+import ctypes, sys, threading
+from app.server.arenas import few_arenas
+
+if {few} and not few_arenas():
+    sys.exit(3)
+gate = threading.Barrier(7)
+held = []
+
+
+def hold():
+    held.append(bytearray(10_000))
+    gate.wait()
+
+
+threads = [threading.Thread(target=hold) for _ in range(6)]
+for each in threads:
+    each.start()
+gate.wait()
+libc = ctypes.CDLL(None)
+libc.fopen.restype = ctypes.c_void_p
+stream = ctypes.c_void_p(libc.fopen(sys.argv[1].encode(), b"w"))
+libc.malloc_info(0, stream)
+libc.fclose(stream)
+"""
+
+
+def arenas(few: bool, report: Path) -> int:
+    """Of a process with six threads that hold memory."""
+    environment = {key: value for key, value in os.environ.items() if key != "MALLOC_ARENA_MAX"}
+    subprocess.run(
+        [sys.executable, "-c", COUNT.format(few=few), str(report)],
+        cwd=ROOT,
+        env={**environment, "PYTHONPATH": str(ROOT)},
+        check=True,
+    )
+    return report.read_text().count("<heap nr=")
+
+
+@pytest.mark.skipif("CS_GNU_LIBC_VERSION" not in os.confstr_names, reason="the option is glibc's")
+def test_threads_share_few_arenas(tmp_path: Path) -> None:
+    assert arenas(False, tmp_path / "as-it-is") > ARENAS
+    assert arenas(True, tmp_path / "few") <= ARENAS
