@@ -94,8 +94,9 @@ class Learner(Simulation):
             self._replace_ghost(ghost.words, ghost.own)
 
     def _enter(self, ready: Ready) -> None:
-        super()._enter(ready)
+        # First: who sees the new settings finds the choice they came with.
         self.choice, self.lecture = ready.choice, None
+        super()._enter(ready)
 
     def choice_of(self, ready: Ready) -> SceneChoice:
         """What was chosen, as `settings_of`: perhaps a later step of the lesson than the one it came with."""
