@@ -67,7 +67,10 @@ def load(page: Page, url: str) -> None:
         timeout=SLOW,
     )
     # "Software WebGL" covers the canvas and swallows the mouse.
-    page.add_style_tag(content=".mantine-Notifications-root{pointer-events:none !important;opacity:0}")
+    page.add_style_tag(
+        content=".mantine-Notifications-root, .mantine-Notifications-root *"
+        "{pointer-events:none !important;opacity:0}"
+    )
 
 
 def wait_for_scene(page: Page, node: str = "/actual") -> None:
@@ -163,15 +166,15 @@ def sheet(page: Page) -> tuple[float, float]:
     return float(found[0]), float(found[1])
 
 
-def target_position(page: Page) -> tuple[float, float, float]:
+def target_position(page: Page, node: str = "/target/ball") -> tuple[float, float, float]:
     """Where the browser draws the ball that a hand drags, in the world's axes."""
     found: Any = page.evaluate(
-        """() => { const m = window.__viserMutable, node = m.nodeRefFromName["/target/ball"];
-             node.updateWorldMatrix(true, false);
+        """(node) => { const m = window.__viserMutable;
              const world = (name) => { const n = m.nodeRefFromName[name]; n.updateWorldMatrix(true, false);
                                        return n.matrixWorld.clone(); };
-             const p = world("").invert().multiply(world("/target/ball")).elements;
-             return [p[12], p[13], p[14]]; }"""
+             const p = world("").invert().multiply(world(node)).elements;
+             return [p[12], p[13], p[14]]; }""",
+        node,
     )
     return float(found[0]), float(found[1]), float(found[2])
 
@@ -184,6 +187,23 @@ def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm:
     start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
     end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
     _drag(page, start, end)
+
+
+def click_on(page: Page, node: str) -> None:
+    """Clicks on the middle of a mesh."""
+    middle = page.evaluate(
+        """(node) => { let found = null;
+             window.__viserMutable.nodeRefFromName[node].traverse((o) => {
+               if (!o.isMesh || found) return;
+               o.geometry.computeBoundingSphere(); found = o.geometry.boundingSphere.center; });
+             return [found.x, found.y, found.z]; }""",
+        node,
+    )
+    page.mouse.move(*page.evaluate(_PROJECT, [node, middle]))
+    page.wait_for_timeout(250)
+    page.mouse.down()
+    page.mouse.up()
+    page.wait_for_timeout(BETWEEN)
 
 
 def turn_target(page: Page, degrees: float) -> None:

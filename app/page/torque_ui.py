@@ -55,7 +55,7 @@ class TorqueFace:
             self._tasks = TasksPanel(
                 gui,
                 bindings,
-                lambda: Bindings(context.post, context.loop),
+                lambda post: Bindings(post, context.loop),
                 ready.robot,
                 context.colours,
                 lambda: self._context.settings,

@@ -95,7 +95,8 @@ class _Target:
             )
         elif not turning:
             scene.add_icosphere(mark, radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
-        scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, 0.6 * size + 0.03))
+        above = (0.65 if turning or "z" not in along else 1.0) * size + 0.04
+        scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, above))
         self._gap = scene.add_line_segments(
             f"/gaps/{task.name}", np.zeros((1, 2, 3), np.float32), colour, thickness=0.005, visible=False
         )

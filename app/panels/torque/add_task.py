@@ -26,7 +26,7 @@ class AddTask:
 
     def __init__(self, gui: viser.GuiApi, post: Send, names: Names, stack: Stack) -> None:
         self._post = post
-        with gui.add_folder("Add a task", expand_by_default=False, order=800.0):
+        with gui.add_folder("Add a task", expand_by_default=False, order=-1.0):
             self._kind = gui.add_dropdown("Kind", tuple(KINDS), initial_value="position")
             self._says = gui.add_html("")
             with gui.add_folder(None):
@@ -37,7 +37,11 @@ class AddTask:
                     hint="Or click a link, see below",
                 )
             with gui.add_folder(None):
-                self._pick = gui.add_checkbox("Click a link to choose", False)
+                self._pick = gui.add_checkbox(
+                    "Click a link",
+                    False,
+                    hint="While on, a click on a link of the robot chooses it",
+                )
             with gui.add_folder(None):
                 self._root = gui.add_dropdown("As seen from", tuple(names.frames))
             with gui.add_folder(None):

@@ -43,8 +43,10 @@ class LevelCard:
         place: int,
         names: Names,
         shift: Callable[[str, int], None],
+        unfolded: bool,
     ) -> None:
-        """names: of the robot; shift: moves the level of a name by so many places."""
+        """names: of the robot; shift: moves the level of a name by so many places; unfolded: whether what
+        changes the tasks is in sight."""
         name = self.name = level.name
         self._colour = colours.get(name, BOUND)
         self._folder = gui.add_folder(_title(place, name), order=float(place))
@@ -59,7 +61,7 @@ class LevelCard:
                         gui.add_html(block(f"<b>{esc(task.name)}</b>"))
                     controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
                 controls.add(f"levels.{name}.Q", f"levels.{name}.R")
-            with gui.add_folder("Change", expand_by_default=False):
+            with gui.add_folder("Change", expand_by_default=unfolded):
                 for task in level.tasks:
                     TaskEditor(gui, bindings, task, names, alone=len(level.tasks) == 1)
                 if place > 0:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import viser
 
+from app.html.palette import BAD, RGB
 from app.html.text import block, esc
 from app.panels.widgets.mirror import Bindings
 from himpc.tasks import Task
@@ -45,7 +46,7 @@ class TaskEditor:
         self._button("Rename", lambda: Set("stack.rename", [name, text.value[:100]]))
         if not alone:
             self._button(f"Own level for {name}", lambda: Set("stack.split", name))
-        self._button(f"Remove {name}", lambda: Set("stack.remove", name))
+        self._button(f"Remove {name}", lambda: Set("stack.remove", name), BAD)
 
     def _menu(self, label: str, field: str, options: Sequence[str], usual: str) -> None:
         """usual: what an empty field means."""
@@ -60,5 +61,5 @@ class TaskEditor:
             menu = self._gui.add_dropdown(label, tuple(options), initial_value=now)
         self._bindings.bind(menu, read, lambda value: Set("stack.edit", {"name": name, field: str(value)}))
 
-    def _button(self, label: str, event: Callable[[], Set]) -> None:
-        self._gui.add_button(label).on_click(lambda _: self._bindings.post(event()))
+    def _button(self, label: str, event: Callable[[], Set], colour: RGB | None = None) -> None:
+        self._gui.add_button(label, color=colour).on_click(lambda _: self._bindings.post(event()))

@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.wish import Wish
+from app.client.wish import Send, Wish
 from app.html.palette import DAMPING, RGB
 from app.html.text import block, formula, swatch
 from app.panels.torque.add_task import AddTask
 from app.panels.torque.level_card import LevelCard, Names
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
-from lessons.events import MoveLevel, Set
+from lessons.events import Event, MoveLevel, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
@@ -25,7 +25,7 @@ class TasksPanel:
         self,
         gui: viser.GuiApi,
         bindings: Bindings[TorqueSettings],
-        own: Callable[[], Bindings[TorqueSettings]],
+        own: Callable[[Send], Bindings[TorqueSettings]],
         robot: Robot,
         colours: dict[str, RGB],
         current: Callable[[], TorqueSettings],
@@ -35,7 +35,10 @@ class TasksPanel:
         may not be changed."""
         self._gui, self._own, self._colours, self._current = gui, own, colours, current
         self._names, self._in_lesson = Names(robot.frames, robot.joint_names, robot.tip), in_lesson
-        self._post = bindings.post
+        self._post, self._edited = bindings.post, ""
+        gui.add_html(
+            block("The most important level first: each gets what the levels above leave."), order=-1.0
+        )
         self._place = gui.add_folder(None, order=0.0)
         self._cards: list[LevelCard] = []
         self._bindings: Bindings[TorqueSettings] | None = None
@@ -62,16 +65,35 @@ class TasksPanel:
     def _build(self, settings: TorqueSettings) -> None:
         self._order: Wish[tuple[str, ...]] = Wish()
         self._enabled: dict[str, Wish[bool]] = {level.name: Wish() for level in settings.levels}
-        bindings = self._bindings = self._own()
+        bindings = self._bindings = self._own(self._ask)
         with self._place:
             self._levels = self._gui.add_folder(None)
         with self._levels:
             self._cards = [
-                LevelCard(self._gui, bindings, settings, level, self._colours, place, self._names, self._move)
+                LevelCard(
+                    self._gui,
+                    bindings,
+                    settings,
+                    level,
+                    self._colours,
+                    place,
+                    self._names,
+                    self._move,
+                    unfolded=any(task.name == self._edited for task in level.tasks),
+                )
                 for place, level in enumerate(settings.levels)
             ]
             if not self._in_lesson:
                 self._add = AddTask(self._gui, self._post, self._names, settings.levels)
+
+    def _ask(self, event: Event) -> None:
+        """Posts it. What is being edited stays unfolded on the stack that comes of it."""
+        match event:
+            case Set("stack.edit", {"name": str(name)}) | Set("stack.rename", [_, str(name)]):
+                self._edited = name
+            case _:
+                self._edited = ""
+        self._post(event)
 
     def rebuild(self) -> None:
         """Shows another stack, the one in force."""

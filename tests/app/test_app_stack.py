@@ -1,0 +1,117 @@
+"""The hierarchy is composed in a real browser, while the robot moves."""
+
+from __future__ import annotations
+
+import numpy as np
+from playwright.sync_api import Page, expect
+
+from app.client.learner import Learner
+from app.server.server import PageServer
+from browsing.hands import (
+    click_on,
+    drag_target,
+    eventually,
+    is_drawn,
+    pick,
+    press,
+    row,
+    tab,
+    target_position,
+    write,
+)
+from himpc.tasks.axes import OnAxes
+from lessons.replay.state import decode
+from lessons.settings.torque import TorqueSettings
+
+ELBOW = "/targets/elbow/control/mark"
+
+
+def settings(learner: Learner) -> TorqueSettings:
+    assert isinstance(learner.settings, TorqueSettings)
+    return learner.settings
+
+
+def levels(learner: Learner) -> list[str]:
+    return [level.name for level in settings(learner).levels]
+
+
+def error(learner: Learner, task: str) -> float:
+    found = learner.read(lambda _, history: (history.layout, history.latest))
+    assert found is not None
+    layout, latest = found
+    return float(np.linalg.norm(latest[layout.fields[f"error/{task}"]]))
+
+
+def unfold(page: Page, title: str, at: int = 0) -> None:
+    page.get_by_text(title, exact=True).nth(at).click()
+    page.wait_for_timeout(300)
+
+
+def frame_clicked(page: Page) -> str:
+    """What the menu shows after a click on the forearm."""
+    click_on(page, "/robot/4/shape8")
+    return row(page, "Of frame").locator("input").first.input_value()
+
+
+def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
+    page: Page, server: PageServer
+) -> None:
+    """An elbow under the hand: errors, ranks and gizmo follow, no level loses its target, and the stack's
+    code is the same stack elsewhere."""
+    learner = server.sessions.learners[0]
+    tab(page, "Tasks")
+    unfold(page, "Add a task")
+    row(page, "Click a link").get_by_role("checkbox").check()
+    assert eventually(page, lambda: frame_clicked(page) == "link_4")
+    pick(page, "On level", "a level of its own, at place 2")
+    write(page, "Its name", "elbow")
+    press(page, "Add")
+    assert eventually(page, lambda: levels(learner) == ["position", "elbow", "orientation", "posture"])
+    assert eventually(page, lambda: is_drawn(page, "/targets/elbow/control"))
+    expect(page.get_by_text("gets 2 of 3 directions", exact=False).first).to_be_visible()
+    assert error(learner, "position") < 1e-3
+
+    before = target_position(page, ELBOW)
+    drag_target(page, axis=0, along=0.08, node="/targets/elbow/control", arm=0.13)
+    assert eventually(page, lambda: target_position(page, ELBOW)[0] > before[0] + 0.03)
+    assert eventually(page, lambda: error(learner, "elbow") > 1e-3)
+    assert error(learner, "position") < 2e-3
+
+    page.get_by_role("button", name="▲ Up", exact=True).nth(1).click()
+    assert eventually(page, lambda: levels(learner)[:2] == ["elbow", "position"])
+    expect(page.get_by_text("1 · elbow", exact=True)).to_be_visible()
+    unfold(page, "Change")
+    pick(page, "Axes", "x")
+    assert eventually(page, lambda: axes(learner, "elbow") == "x")
+    expect(page.get_by_text("gets 1 of 1 directions", exact=False).first).to_be_visible()
+    assert eventually(page, lambda: error(learner, "elbow") < 2e-3)
+
+    expect(row(page, "Axes").locator("input").first).to_be_visible()  # it stays unfolded
+    unfold(page, "Change", 1)
+    page.get_by_role("button", name="Merge with the level above", exact=True).first.click()
+    assert eventually(page, lambda: levels(learner) == ["elbow+position", "orientation", "posture"])
+    expect(page.get_by_text("gets 4 of 4 directions", exact=False).first).to_be_visible()
+    assert eventually(page, lambda: error(learner, "position") < 2e-3)
+
+    tab(page, "Export")
+    press(page, "Write it down")
+    code = row(page, "Code").locator("textarea").input_value()
+    assert decode(code).run.prepared().settings == settings(learner)
+
+    tab(page, "Tasks")
+    unfold(page, "Change")
+    press(page, "Remove elbow")
+    assert eventually(page, lambda: levels(learner) == ["position", "orientation", "posture"])
+    assert eventually(page, lambda: not is_drawn(page, "/targets/elbow/control"))
+    assert learner.failure is None
+    status = learner.status
+    assert status is not None
+    assert eventually(page, lambda: learner.status is not None and learner.status.t > status.t + 0.1)
+    assert error(learner, "position") < 2e-3
+
+
+def axes(learner: Learner, name: str) -> str:
+    tasks = (task for level in settings(learner).levels for task in level.tasks if task.name == name)
+    found = next(tasks)
+    assert isinstance(found, OnAxes)
+    return found.axes
