@@ -10,12 +10,14 @@ import multiprocessing as mp
 import os
 import signal
 import socket
+import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from types import FrameType
 from typing import Protocol, TypeVar
 from urllib.parse import urlsplit
 
@@ -197,12 +199,23 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 @contextmanager
 def _born_deaf() -> Iterator[None]:
     """Children of this moment inherit that Ctrl-C is blocked: before any code of ours runs in them it would
-    end them with Python's own complaint."""
+    end them with Python's own complaint. So would an owner that leaves a start half done: a signal that comes
+    meanwhile, to whatever thread, is heard afterwards."""
+    heard: list[int] = []
+    handlers: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(number)):
+                handlers[number] = signal.signal(number, lambda came, _: heard.append(came))
     try:
         yield
     finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number in heard[:1]:
+            signal.raise_signal(number)
 
 
 def _obey_the_owner() -> None:
