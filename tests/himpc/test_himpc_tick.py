@@ -105,21 +105,25 @@ def test_kinematics_are_pinocchio_s(tmp_path_factory: pytest.TempPathFactory, se
 
 @pytest.mark.parametrize("controller", ["himpc", "hiqp", "nhimpc", "weighted"])
 @pytest.mark.parametrize(
-    ("name", "horizon"),
+    ("name", "horizon", "position"),
     [
-        ("iiwa14-circle", 5),
-        ("iiwa14-circle-paper", 5),
-        ("iiwa14-hold", 3),
-        ("planar3-circle", 5),
-        ("planar3-conflict", 10),
-        ("planar3-singular", 5),
-        ("ridgeback-ur10-hold", 2),
+        ("iiwa14-circle", 5, "viability"),
+        ("iiwa14-circle-paper", 5, "viability"),
+        ("iiwa14-circle-paper", 5, "paper"),
+        ("iiwa14-hold", 3, "viability"),
+        ("planar3-circle", 5, "viability"),
+        ("planar3-conflict", 10, "viability"),
+        ("planar3-singular", 5, "viability"),
+        ("ridgeback-ur10-hold", 2, "viability"),
     ],
 )
-def test_torques_are_those_of_the_printed_route(name: str, horizon: int, controller: str) -> None:
+def test_torques_are_those_of_the_printed_route(
+    name: str, horizon: int, position: str, controller: str
+) -> None:
     """Two closed loops side by side, one by the kernel, one by the rows as printed; targets are dragged."""
     scene = torque_scene(name)
     taken = replace(scene.settings, horizon=horizon, controller=controller)
+    taken = taken.changed("limits.position", position)
     compiled, printed = (
         TorqueSession(replace(scene, settings=replace(taken, route=route)))
         for route in ("compiled", "explicit")
@@ -139,8 +143,10 @@ def test_torques_are_those_of_the_printed_route(name: str, horizon: int, control
             assert one.leak <= 1e-6 or controller == "weighted"
             assert one.kkt_residual <= 1e-6
             assert one.cost == pytest.approx(other.cost, rel=1e-6, abs=1e-6)
-    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact.
-    assert worst <= (1e-7 if controller == "weighted" else 1e-8)
+    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact. So
+    # it is at the paper's start, where J₁…J₃ have rank 6, if no bound holds what rounding alone decides.
+    loose = controller == "weighted" or (name, position) == ("iiwa14-circle-paper", "paper")
+    assert worst <= (1e-7 if loose else 1e-8)
 
 
 def a_tick_later(hierarchy: Hierarchy, seed: int) -> Hierarchy:
@@ -217,6 +223,7 @@ def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, con
     scene = torque_scene(name)
     session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
     session.post(Set("limits.velocity_scale", 0.3))  # so that bounds bind
+    session.post(Set("limits.position", "viability"))
     target = session.target("orientation")
     if target is not None:
         target.move(pin.exp3(np.array([0.4, -0.2, 1.5])) @ target.value)
