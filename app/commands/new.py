@@ -20,20 +20,24 @@ def new(
         start: begin with one there is: an example controller (pd, osf, one_level_qp, himpc_one_page) or the
             file of an exercise (himpc-lab grade lists them), a scene, or a lesson.
     """
+    from lessons.exercises import EXERCISES, load_exercise
     from lessons.own.new import write_new
 
     write_new(kind, file, start)
+    exercise = load_exercise(start) if start is not None and start in EXERCISES else None
+    scene = "planar3-circle" if exercise is None else exercise.scene
     tries = {
-        "controller": f"himpc-lab run planar3-circle --controller {file}",
+        "controller": f"himpc-lab run {scene} --controller {file}",
         "scene": f"himpc-lab run {file}",
         "lesson": f"himpc-lab lessons --check {file}",
         "task": f"himpc-lab run {file}",
     }
     shows = {
-        "controller": f"himpc-lab --scene planar3-circle --controller {file}",
+        "controller": f"himpc-lab --scene {scene} --controller {file}",
         "scene": f"himpc-lab --scene {file}",
         "lesson": f"himpc-lab --lesson {file}",
         "task": f"himpc-lab --scene {file}",
     }
-    print(f"{file} is written. Try it:\n  {tries[kind]}\n  {shows[kind]}")
+    lines = [tries[kind], shows[kind], *([] if exercise is None else [f"himpc-lab grade {file}"])]
+    print("\n  ".join((f"{file} is written. Try it:", *lines)))
     return 0

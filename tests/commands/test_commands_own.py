@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.__main__ import main
+from lessons.exercises import EXERCISES
 
 
 @pytest.fixture(autouse=True)
@@ -40,6 +41,15 @@ def test_new_file_of_ones_own_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert json.loads(Path("b.json").read_text())["scene"] == "my_scene.py"
     assert main(["run", "my_task.py", "--duration", "0.02", "--json", "c.json"]) == 0
     assert json.loads(Path("c.json").read_text())["tasks"][1]["name"] == "reach"
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_file_of_an_exercise_runs_as_it_is_told_to(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "controller", "mine.py", "--from", name]) == 0
+    first, *_, last = (line.strip() for line in capsys.readouterr().out.splitlines()[1:])
+    assert last == "himpc-lab grade mine.py"
+    assert main([*first.split()[1:], "--duration", "0.02", "--json", "a.json"]) == 0
     capsys.readouterr()
 
 
