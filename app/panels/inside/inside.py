@@ -11,6 +11,7 @@ from app.client.moment import Moment
 from app.client.watching import Watching
 from app.client.wish import Send
 from app.html.palette import RGB
+from app.html.text import block
 from app.link.inside import Watch
 from app.link.messages import Command, Ready, Status
 from app.panels.inside.matrix import MatrixPanel
@@ -35,7 +36,11 @@ class InsidePanel:
     ) -> None:
         """post: an event for the session; send: a command; spectrum: where M̄ is set."""
         levels = tuple(dict.fromkeys(task.level for task in ready.tasks))
-        self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post)
+        self._plane: PlanePanel | None = None
+        if ready.robot.n > 1:
+            self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post)
+        else:
+            client.gui.add_html(block("One joint has one Δτ: there is no plane to draw it in."))
         with client.gui.add_folder("The Hessian of one level", expand_by_default=False):
             self._matrix = MatrixPanel(client, in_view, ready.robot, levels)
         self._spectrum = spectrum
@@ -43,14 +48,16 @@ class InsidePanel:
 
     def draw(self, moment: Moment) -> None:
         """Paints the instant, and asks for what the next one shall show."""
-        plane = self._plane.wish
+        plane = Watch() if self._plane is None else self._plane.wish
         wish: Watch = replace(plane, matrix=self._matrix.wish, spectrum=self._spectrum.in_view)
         self._watching.ask(wish, moment.status.inside)
-        self._plane.draw(moment)
+        if self._plane is not None:
+            self._plane.draw(moment)
         self._matrix.draw(moment.status.inside)
         self._spectrum.draw(moment.status.inside)
 
     def write(self, status: Status, settings: TorqueSettings) -> None:
         """Puts into words what is drawn."""
-        self._plane.write(status.inside, settings)
+        if self._plane is not None:
+            self._plane.write(status.inside, settings)
         self._matrix.write(status.inside)
