@@ -82,7 +82,7 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     length = float(np.sum(np.linalg.norm(np.diff(points[1:], axis=0), axis=1)))
     reach = max(0.4, length)
     planar = float(np.ptp(points[:, 2])) < 0.05 * reach
-    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([0.95, -0.95, 0.5])
+    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([1.2, -0.6, 0.5])
     return np.vstack([points, ends]), direction, reach
 
 
