@@ -208,7 +208,7 @@ def click_on(page: Page, node: str) -> None:
 
 def turn_target(page: Page, degrees: float) -> None:
     """Pulls the ring about the target's own z axis."""
-    radius = 0.13  # 0.65 of the gizmo's size for the iiwa
+    radius = 0.16  # 0.65 of the gizmo's size for the iiwa
 
     def on_ring(angle: float) -> Any:
         at = [radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle)), 0.0]

@@ -26,7 +26,7 @@ from app.view.drag import Hand
 from app.view.ellipsoids import EllipsoidView
 from app.view.link_picker import LinkPicker
 from app.view.pull import Pull
-from app.view.robot import RobotView, camera_for
+from app.view.robot import RobotView, gizmo_size
 from app.view.target import Frames
 from app.view.targets import Targets
 from app.view.trails import Trails
@@ -139,7 +139,7 @@ class TorqueFace:
         status = context.learner.status
         targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
         targets |= {} if status is None or ready.again else status.targets
-        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
+        size = gizmo_size(ready.robot)
         self._hand = Hand(
             scene,
             ready,

@@ -23,7 +23,7 @@ from app.view.coordinates import full
 from app.view.follow import FollowBase
 from app.view.goals import Goals
 from app.view.obstacles import Obstacles
-from app.view.robot import RobotView, camera_for, look_at
+from app.view.robot import RobotView, gizmo_size, look_at
 from app.view.surroundings import Carried, People, ReachCircle
 from app.view.target import Frames
 from app.view.trails import Trails
@@ -90,7 +90,7 @@ class VelocityFace:
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         del robot  # velocity servos do not feel a pull
         context, ready = self._context, self._context.ready
-        size = float(np.clip(0.2 * camera_for(ready.robot)[2], 0.12, 0.4))
+        size = gizmo_size(ready.robot)
         self._frames = Frames(scene)
         self._obstacles = Obstacles(scene, self._put)
         self._people = People(scene)

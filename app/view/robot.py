@@ -13,6 +13,8 @@ from robots import Robot
 from robots.shapes import link_shapes
 
 _STILL = 1e-4  # m, and about as many rad: a tenth of a pixel
+_ARROW = 1.2
+"""How far an arrow with its head reaches, in sizes of its gizmo."""
 
 
 class RobotView:
@@ -71,6 +73,15 @@ def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     return middle + reach * direction, middle, reach
 
 
+def gizmo_size(robot: Robot) -> float:
+    """How large the arrows and rings at a robot's targets are, m."""
+    return _gizmo(_home(robot)[2])
+
+
+def _gizmo(reach: float) -> float:
+    return float(np.clip(0.2 * reach, 0.12, 0.4))
+
+
 def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     """Base, joints and tip at home, (k, 3) m; from where to look at them; and the length of the arm, m."""
     data = robot.model.createData()
@@ -82,8 +93,9 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     length = float(np.sum(np.linalg.norm(np.diff(points[1:], axis=0), axis=1)))
     reach = max(0.4, length)
     planar = float(np.ptp(points[:, 2])) < 0.05 * reach
-    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([1.2, -0.6, 0.5])
-    return np.vstack([points, ends]), direction, reach
+    direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([1.0, 0.75, 0.55])
+    arrows = tip + _ARROW * _gizmo(reach) * np.eye(3)
+    return np.vstack([points, ends, arrows]), direction, reach
 
 
 def aim(camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray) -> None:

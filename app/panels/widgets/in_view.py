@@ -56,9 +56,9 @@ look();
 """
 
 
-def tells_what_is_seen(updates: Mapping[str, object]) -> bool:
+def tells_what_is_seen(updates: object) -> bool:
     """Whether a write to a control is the script's: nobody pressed anything."""
-    value = updates.get("value")
+    value = updates.get("value") if isinstance(updates, Mapping) else None
     return isinstance(value, str) and value.partition("\n")[0] in (AWAKE, ASLEEP)
 
 
