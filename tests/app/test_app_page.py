@@ -97,9 +97,9 @@ def turned(learner: Learner, before: np.ndarray) -> float:
 
 def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: Learner) -> None:
     for _ in range(3):
-        drag_target(page, axis=1, along=0.6)
+        drag_target(page, axis=1, along=-0.6)  # away from who looks: it stays in the picture
     expect(page.get_by_text("Out of reach by")).to_be_visible()
-    assert eventually(page, lambda: position(page, "/actual")[1] > 0.3)
+    assert eventually(page, lambda: position(page, "/actual")[1] < -0.3)
     assert eventually(page, lambda: error(learner, "position") < 5e-3)  # of the target it accepted
     assert learner.failure is None
     press(page, "Bring the target to the hand")
