@@ -106,7 +106,7 @@ def _list(exercise: str | None, hints: int, json: str | None) -> int:
         print(f"{each.name}: {card.title} ({card.minutes} minutes; belongs to lesson {each.lesson})")
         print(f"  {card.question}")
         print(f"  {each.equation}")
-        print(f"  begin: himpc-lab new controller my_{each.name.replace('-', '_')}.py --from {each.name}")
+        print(f"  begin: {each.commands()[0]}")
         for check in each.checks(0):
             print(f"    {check.points} points: {check.text} {check.condition}")
         _hints(each.hints, hints)

@@ -25,19 +25,12 @@ def new(
 
     write_new(kind, file, start)
     exercise = load_exercise(start) if start is not None and start in EXERCISES else None
-    scene = "planar3-circle" if exercise is None else exercise.scene
-    tries = {
-        "controller": f"himpc-lab run {scene} --controller {file}",
-        "scene": f"himpc-lab run {file}",
-        "lesson": f"himpc-lab lessons --check {file}",
-        "task": f"himpc-lab run {file}",
-    }
-    shows = {
-        "controller": f"himpc-lab --scene {scene} --controller {file}",
-        "scene": f"himpc-lab --scene {file}",
-        "lesson": f"himpc-lab --lesson {file}",
-        "task": f"himpc-lab --scene {file}",
-    }
-    lines = [tries[kind], shows[kind], *([] if exercise is None else [f"himpc-lab grade {file}"])]
+    if exercise is not None:
+        lines = (f"himpc-lab run {exercise.scene} --controller {file}", *exercise.commands(file)[1:])
+    else:
+        own = f"planar3-circle --controller {file}" if kind == "controller" else file
+        lines = {
+            "lesson": (f"himpc-lab lessons --check {file}", f"himpc-lab --lesson {file}"),
+        }.get(kind, (f"himpc-lab run {own}", f"himpc-lab --scene {own}"))
     print("\n  ".join((f"{file} is written. Try it:", *lines)))
     return 0

@@ -22,7 +22,7 @@ def pages(_: Path) -> dict[str, str]:
 
 def part(exercise: Exercise) -> str:
     """One exercise: card, equation, commands, the file with the hole, checks, hints to unfold."""
-    card, file = exercise.card, f"my_{exercise.name.replace('-', '_')}.py"
+    card, commands = exercise.card, "\n".join(exercise.commands())
     lesson = load_lesson(exercise.lesson).card.title
     checks = ["| points | check | bound |", "|--:|---|---|"]
     checks += [f"| {each.points} | {cell(each.text)} | {each.condition} |" for each in exercise.checks(0)]
@@ -36,8 +36,7 @@ def part(exercise: Exercise) -> str:
             f"*{card.question}*",
             f"About {card.minutes} minutes; after [{lesson}](lessons/{exercise.lesson}.md).",
             f"$$\n{exercise.equation}\n$$",
-            f"```sh\nhimpc-lab new controller {file} --from {exercise.name}\n"
-            f"himpc-lab --scene {exercise.scene} --controller {file}\nhimpc-lab grade {file}\n```",
+            f"```sh\n{commands}\n```",
             f"```python\n{start_of(exercise.name).strip()}\n```",
             "\n".join(checks),
             *hints,

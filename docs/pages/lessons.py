@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lessons.course import COURSE, load_lesson
-from lessons.exercises import EXERCISES, load_exercise
+from lessons.exercises import exercises_of
 from lessons.teaching.claim import Claim
 from lessons.teaching.lesson import Lesson, Step
 from lessons.teaching.prediction import Choice
@@ -65,8 +65,7 @@ def page(lesson: Lesson, checks: Checks, picture: bool) -> str:
     if lesson.challenge is not None:
         goals = lesson.challenge.goals
         parts += ["## Challenge", unindented(lesson.challenge.text), table(goals, "challenge", checks)]
-    own = [each for each in map(load_exercise, EXERCISES) if each.lesson == lesson.name]
-    if own:
+    if own := exercises_of(lesson.name):
         anchors = (f"[{each.card.title}](../exercises.md)" for each in own)
         parts += ["## Write it yourself", "Exercise: " + ", ".join(anchors)]
     if picture:

@@ -5,21 +5,16 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+IN_DOCS = ("serving", "authoring", "instructors", "disagreements", "settings")
 LINKS = {
+    **{f"{where}{name}.md": f"{name}.md" for name in IN_DOCS for where in ("docs/", "")},
     "docs/lessons/README.md": "lessons/index.md",
-    "docs/serving.md": "serving.md",
-    "docs/authoring.md": "authoring.md",
-    "authoring.md": "authoring.md",
-    "docs/instructors.md": "instructors.md",
-    "instructors.md": "instructors.md",
-    "docs/disagreements.md": "disagreements.md",
-    "docs/settings.md": "settings.md",
     "CONTRIBUTING.md": "contributing.md",
     "examples/README.md": "examples/index.md",
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
 }
-IN_DOCS = ("serving", "authoring", "instructors", "disagreements", "settings")
+"""Where the project's texts stand on the site; those of `docs/` also link each other by name alone."""
 FROM_README = {
     "start": ("Start", "Start"),
     "own": ("Bring your own", "Bring your own"),

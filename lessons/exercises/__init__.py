@@ -33,6 +33,11 @@ def load_exercise(name: str) -> Exercise:
     return found
 
 
+def exercises_of(lesson: str) -> tuple[Exercise, ...]:
+    """Those a lesson leads to, in order."""
+    return tuple(each for each in map(load_exercise, EXERCISES) if each.lesson == lesson)
+
+
 def start_of(name: str) -> str:
     """The file with the hole in it. Raises InputError for a name that is none."""
     load_exercise(name)

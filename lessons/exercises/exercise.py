@@ -80,6 +80,20 @@ class Exercise:
         """Where to watch it live."""
         return self.checks(0)[-1].run.scene
 
+    @property
+    def file(self) -> str:
+        """A name for the file with a solution."""
+        return f"my_{self.name.replace('-', '_')}.py"
+
+    def commands(self, file: str | None = None) -> tuple[str, str, str]:
+        """What begins a solution in a file (by default `file`), shows it on the page, and judges it."""
+        file = file or self.file
+        return (
+            f"himpc-lab new controller {file} --from {self.name}",
+            f"himpc-lab --scene {self.scene} --controller {file}",
+            f"himpc-lab grade {file}",
+        )
+
 
 def pushed(
     run: RunSpec, seed: int, body: str, newtons: float, at: float = 0.2, plane: bool = False

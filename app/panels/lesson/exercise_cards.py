@@ -6,7 +6,7 @@ from app.html.markdown import rendered_line
 from app.html.palette import LEVELS, css
 from app.html.text import block, esc
 from lessons.course import load_lesson
-from lessons.exercises import EXERCISES, load_exercise
+from lessons.exercises import EXERCISES, exercises_of, load_exercise
 from lessons.exercises.exercise import Exercise
 
 
@@ -21,20 +21,13 @@ def exercise_cards() -> str:
 
 def belonging_to(lesson: str) -> str:
     """The exercises that a lesson leads to; nothing if there is none."""
-    own = [each for each in map(load_exercise, EXERCISES) if each.lesson == lesson]
-    return "".join(block(f"<b>Write it yourself.</b> {card(each)}") for each in own)
+    return "".join(block(f"<b>Write it yourself.</b> {card(each)}") for each in exercises_of(lesson))
 
 
 def card(exercise: Exercise) -> str:
     """One exercise."""
-    file = f"my_{exercise.name.replace('-', '_')}.py"
     lesson = load_lesson(exercise.lesson).card.title
-    commands = (
-        f"himpc-lab new controller {file} --from {exercise.name}",
-        f"himpc-lab --scene {exercise.scene} --controller {file}",
-        f"himpc-lab grade {file}",
-    )
-    lines = "<br>".join(f"<code>{esc(each)}</code>" for each in commands)
+    lines = "<br>".join(f"<code>{esc(each)}</code>" for each in exercise.commands())
     return block(
         f"<b>{esc(exercise.card.title)}</b><br>{rendered_line(exercise.card.question)}"
         f'<div style="opacity:0.75">{exercise.card.minutes} min · after “{esc(lesson)}”</div>'

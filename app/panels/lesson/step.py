@@ -66,6 +66,8 @@ class LessonPanel:
     def _turn_to(self, exercise: Exercise) -> None:
         self._exercise, self._part = exercise, exercise.part
         self._lecture: Lecture | None = None
+        last = exercise.place + 1 >= len(parts_of(exercise.whole))
+        self._exercises = belonging_to(exercise.lesson) if last else ""
         self._shown: dict[str, str] = {}
         self._bindings: Bindings[Settings] = Bindings(self._post, self._loop)
         with self._tab:
@@ -237,11 +239,7 @@ class LessonPanel:
         self._put("idea", self._idea, heading(self._exercise) + idea(self._part, opened=not seen))
         self._put("state", self._state, state(self._part, lecture, best))
         self._put("pictures", self._pictures, pictures(self._part, lecture))
-        self._put("after", self._after, self._last_words(lecture) if over else "")
-
-    def _last_words(self, lecture: Lecture) -> str:
-        last = self._exercise.place + 1 >= len(parts_of(self._exercise.whole))
-        return after(self._part, lecture) + (belonging_to(self._exercise.lesson) if last else "")
+        self._put("after", self._after, after(self._part, lecture) + self._exercises if over else "")
 
     def _put(self, name: str, handle: viser.GuiHtmlHandle, html: str) -> None:
         if self._shown.get(name) != html:
