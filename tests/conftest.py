@@ -21,12 +21,15 @@ settings.register_profile("same-every-time", derandomize=True, deadline=None, da
 settings.load_profile("same-every-time")
 
 
-class OneWorkerForThePage(LoadScopeScheduling):
-    """The page's tests share a browser, which one core can draw; a file of the others goes to one worker."""
+_BROWSER = "tests/app/browser"
+
+
+class OneWorkerForTheBrowser(LoadScopeScheduling):
+    """The tests in a browser share one, which one core can draw; a file of the others goes to one worker."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.split("::")[0]
-        return "tests/app" if file.startswith("tests/app/") else file
+        return _BROWSER if file.startswith(f"{_BROWSER}/") else file
 
 
 _COMPILE = "from himpc.cascade.compiling import compile_all; compile_all(lambda *_: None)"
@@ -39,8 +42,8 @@ def pytest_configure(config: pytest.Config) -> None:
         subprocess.run([sys.executable, "-c", _COMPILE], cwd=root, check=True, capture_output=True)
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> OneWorkerForThePage:
-    return OneWorkerForThePage(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> OneWorkerForTheBrowser:
+    return OneWorkerForTheBrowser(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,7 @@ from app.server.door import new_token
 from app.server.server import PageServer
 from browsing.hands import SELDOM, open_page, press, write
 
-ROOT = Path(__file__).parents[2] / "app"
+ROOT = Path(__file__).parents[3] / "app"
 
 
 @pytest.fixture(scope="module")
