@@ -24,6 +24,7 @@ from app.client.simulation import Simulation
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 
 SETTLE = 5.0  # s
@@ -41,7 +42,7 @@ def main() -> int:
     parser.add_argument("--alone", action="store_true", help="without a ghost, for comparison")
     options = parser.parse_args()
     own = () if options.alone else tuple(options.set or ["controller=tdeosf"])
-    server = PageServer(SceneChoice(options.scene), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec(options.scene)), port=0, max_sessions=1)
     try:
         result = measure(server, own, options.seconds)
     finally:

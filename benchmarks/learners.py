@@ -26,6 +26,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
 from benchmarks.client import PATIENCE
+from lessons.scenes.run_spec import RunSpec
 
 SETTLE = 5.0  # s
 LONG = 180.0  # s
@@ -43,7 +44,7 @@ def main() -> int:
     parser.add_argument("--json", choices=["-"], default=None)
     options = parser.parse_args()
     own = () if options.horizon is None else (f"horizon={options.horizon}",)
-    server = PageServer(SceneChoice(options.scene, set=own), port=0, max_sessions=options.clients)
+    server = PageServer(SceneChoice(RunSpec(options.scene, set=own)), port=0, max_sessions=options.clients)
     try:
         found = measured(server, options.clients, options.tab, options.seconds)
     finally:

@@ -27,6 +27,7 @@ from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from browsing.lessons import open_lesson
 from lessons.course import COURSE, load_lesson
+from lessons.scenes.run_spec import RunSpec
 
 GROWTH = 1.1
 
@@ -36,7 +37,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--switches", type=int, default=50)
     switches = parser.parse_args().switches
-    server = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=1)
     expect.set_options(timeout=SLOW)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)

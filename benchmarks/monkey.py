@@ -31,6 +31,7 @@ from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 
 STRICT = ("himpc", "hiqp", "nhimpc")
@@ -202,7 +203,7 @@ class Monkey:
         if learner.failure is not None:
             self.found.blame(f"the simulation: {learner.failure}")
         if learner.ready is not None:
-            self.found.scenes.add(learner.choice.name)
+            self.found.scenes.add(learner.choice.run.scene)
         if learner.lecture is not None:
             self.found.lessons.add(learner.lecture.exercise.lesson)
         learner.read(self._judge)
@@ -242,7 +243,7 @@ class Monkey:
 
     def _where(self) -> str:
         ready, settings = self.learner.ready, self.learner.settings
-        return f"{ready.choice.name if ready else '?'} with {settings.controller if settings else '?'}"
+        return f"{ready.choice.run.scene if ready else '?'} with {settings.controller if settings else '?'}"
 
     def _is_alive(self, learner: Learner) -> None:
         status, now = learner.status, time.monotonic()
@@ -311,7 +312,7 @@ def main() -> int:
     parser.add_argument("--scene", default="iiwa14-hold")
     given = parser.parse_args()
     with StandardError() as said, sync_playwright() as playwright:
-        server = PageServer(SceneChoice(given.scene), port=0, max_sessions=1)
+        server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=1)
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
         try:
             found = walk(browser, server, given.minutes, given.seed, said.read)

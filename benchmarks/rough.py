@@ -34,6 +34,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
 
 LONG = 60.0  # s
 UPLOAD = 40_000_000  # bytes
@@ -65,7 +66,7 @@ def treat(kills: int, stops: int) -> dict[str, object]:
     """Everything in a row; see the module."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
     before, there = _memory_left(), set(psutil.Process().children(recursive=True))
-    server = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=3)
+    server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=3)
     counts: dict[str, str] = {}
     treated = recovered = 0
     try:
@@ -134,7 +135,7 @@ def _hurt(learner: Learner, number: signal.Signals) -> None:
 def _hang(learner: Learner) -> None:
     """A scene is asked for that will never be there: its process stops while it loads."""
     _hurt(learner, signal.SIGSTOP)
-    learner.load(SceneChoice("panda-hold"))
+    learner.load(SceneChoice(RunSpec("panda-hold")))
 
 
 def _recovers(learner: Learner, page: Wire, harm: Callable[[Learner], None], by_reset: bool) -> bool:

@@ -33,6 +33,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
 from benchmarks.learners import LONG, Viewers, simulated
+from lessons.scenes.run_spec import RunSpec
 
 FILL = 10.0  # minutes
 EVERY = 5.0  # s
@@ -65,7 +66,7 @@ def main() -> int:
     parser.add_argument("--scene", default="iiwa14-hold")
     parser.add_argument("--json", choices=["-"], default=None)
     options = parser.parse_args()
-    server = PageServer(SceneChoice(options.scene), port=0, max_sessions=options.clients)
+    server = PageServer(SceneChoice(RunSpec(options.scene)), port=0, max_sessions=options.clients)
     try:
         with Viewers(server.url, "--clients", str(options.clients)) as viewers:
             assert wait_until(lambda: len(server.sessions.learners) == options.clients, LONG), "not let in"

@@ -25,6 +25,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Load
 from app.link.process import wait_until
 from app.server.server import PageServer
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 
 SCENES = ("planar3-hold", "iiwa14-hold", "planar3-circle", "panda-hold")
@@ -38,7 +39,7 @@ def main() -> int:
     parser.add_argument("--switches", type=int, default=50)
     parser.add_argument("--warm-up", type=int, default=8)
     options = parser.parse_args()
-    server = PageServer(SceneChoice(SCENES[-1]), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec(SCENES[-1])), port=0, max_sessions=1)
     client = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.client", server.url], stdout=subprocess.DEVNULL
     )
@@ -67,7 +68,7 @@ def switch(learner: Learner, count: int) -> None:
         learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
         assert wait_until(lambda: learner.ghost is not None and runs(learner.ghost), LONG), "no ghost"
     changed = learner.changed
-    learner.send(Load(SceneChoice(SCENES[count % len(SCENES)])))
+    learner.send(Load(SceneChoice(RunSpec(SCENES[count % len(SCENES)]))))
     assert wait_until(lambda: learner.changed > changed and runs(learner), LONG), "no scene"
     if count % 4 == 1:
         learner.stop_ghost()

@@ -34,6 +34,7 @@ from app.link.process import wait_until
 from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, find_chromium
 from browsing.wire import camera, messages_of, nothing_kept, pack
+from lessons.scenes.run_spec import RunSpec
 
 PROTOCOL: Any = [f"viser-v{__version__}"]
 LONG = 60.0
@@ -53,7 +54,7 @@ _FOREIGN = """async ([url, protocol]) => {
 
 def serve(pipe: Any) -> None:
     """The server's process: answers what it has seen until it is told to end."""
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=3, grace=600.0)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=3, grace=600.0)
     pipe.send(server.url)
     while pipe.recv() == "seen":
         pipe.send(

@@ -19,6 +19,7 @@ from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from lessons.course import COURSE, load_lesson
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Lesson, Step
 
 ROOT = Path(__file__).parents[1]
@@ -73,7 +74,7 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     expect.set_options(timeout=SLOW)
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)

@@ -189,6 +189,33 @@ def test_the_controller_cannot_peek() -> None:
     assert not truth
 
 
+KIND = re.compile(r"(Torque|Velocity)(Scene|Settings|Session|Run|Face)|SESSIONS")
+MAY_ASK = ("lessons/scenes/catalog.py", "lessons/session/torque.py", "lessons/session/velocity.py")
+
+
+def test_who_tells_torque_from_velocity() -> None:
+    """Only the catalog and the two sessions ask of which kind something is; else there is one table."""
+    asking = {str(path.relative_to(ROOT)) for path in sources("lessons", "app") if asks_for_kind(path)}
+    assert "lessons/scenes/catalog.py" in asking, "the test sees nothing any more"
+    assert asking <= set(MAY_ASK)
+
+
+def asks_for_kind(path: Path) -> bool:
+    """Whether a class of one kind is tested for, compared with, or matched."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        about: list[ast.AST] = []
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("isinstance", "issubclass"):
+            about = [node.args[1]]
+        elif isinstance(node, ast.Compare):
+            about = [node]
+        elif isinstance(node, ast.MatchClass):
+            about = [node.cls]
+        named = (name for each in about for name in ast.walk(each))
+        if any(KIND.fullmatch(getattr(n, "id", getattr(n, "attr", ""))) for n in named):
+            return True
+    return False
+
+
 def test_files_stay_readable() -> None:
     """No file of the packages is longer than 300 lines."""
     long = {

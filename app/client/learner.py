@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import replace
 from queue import Empty, Queue
 from typing import TYPE_CHECKING
 
@@ -117,7 +116,7 @@ class Learner(Simulation):
         match report:
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
-                self.choice = replace(SceneChoice.of_lesson(lecture.exercise), seed=self.choice.seed)
+                self.choice = self.choice.at(lecture.exercise)
             case Told():
                 with self._lock:
                     if self._asking:

@@ -54,14 +54,14 @@ def serve(
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
         raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
-    own = SceneChoice.starting(scene or ("hold" if urdf else FIRST.name), urdf, tip, controller)
+    own = SceneChoice.starting(scene or ("hold" if urdf else FIRST.run.scene), urdf, tip, controller)
     if lesson is not None:
         choice = SceneChoice.opening(lesson).admitting(own)
     elif state is not None:
         from lessons.replay.state import decode
 
         found = decode(state)
-        found = replace(found, run=replace(found.run, files=own.controllers))
+        found = replace(found, run=replace(found.run, files=own.run.files))
         choice = SceneChoice.of_state(found).admitting(own)
     else:
         choice = own

@@ -8,7 +8,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,6 @@ from app.client.learner import Learner
 from app.client.progress import Notebook
 from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
-from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.inlet import Inlet
 from app.panels.widgets.command import add_command
@@ -63,7 +61,7 @@ class Page:
         self._event_loop = loop
         self._notebook = notebook
         self._phone = False
-        self._seen: tuple[SceneChoice, str] | None = None  # what the camera was last turned to
+        self._seen: tuple[str | None, ...] | None = None  # what the camera was last turned to
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
@@ -211,7 +209,8 @@ class Page:
                 self._phone,
             )
             add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
-            seen = (replace(ready.choice, exercise=None, set=()), ready.robot.name)
+            run = ready.choice.run
+            seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # a restart leaves the learner's view as it was
                 aim(self._client.camera, ready.robot, self._phone, ready.room)
                 self._seen = seen

@@ -25,10 +25,11 @@ from app.server.door import Door, as_origin, names_of_this_machine, new_token
 from app.server.guard import Guard
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
-FIRST = SceneChoice("iiwa14-hold")
+FIRST = SceneChoice(RunSpec("iiwa14-hold"))
 """What the page shows if nothing else is asked for."""
 
 
@@ -200,7 +201,7 @@ def _check_choice(choice: SceneChoice) -> None:
     if not choice.known:
         from app.worker.reports.start import start
 
-        start(choice.scene(), choice.seed)
+        start(choice.scene(), choice.run.seed)
 
 
 def _load(choice: SceneChoice) -> None:

@@ -14,6 +14,7 @@ from app.link.wire import Wire, packed
 from app.worker.follower import follow
 from app.worker.pacing import Pacer
 from app.worker.simulation import Body
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 POSE_PERIOD = 1 / 60  # s
@@ -28,7 +29,7 @@ _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
 def rehearse() -> None:
     """Both kinds of controllers run for a moment: what is loaded on first use is there afterwards."""
     for scene in _USUAL:
-        body = Body(SceneChoice(scene))
+        body = Body(SceneChoice(RunSpec(scene)))
         body.tick(3)
         packed(body.ready())
         packed(body.status())

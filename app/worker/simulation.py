@@ -53,7 +53,7 @@ class Body:
         self._enter(self._loaded(choice, self._load_scene(choice)))
 
     def _loaded(self, choice: SceneChoice, scene: Scene) -> Loaded:
-        run = start(scene, choice.seed)
+        run = start(scene, choice.run.seed)
         mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
         return Loaded(choice.resolved(), scene, run, self._lecturer(choice, run), mine)
 
@@ -65,7 +65,7 @@ class Body:
         return choice.scene()
 
     def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
-        return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.seed)
+        return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.run.seed)
 
     def _begin_anew(self, loaded: Loaded) -> None:
         """A lesson's robot stands still until its script begins."""
@@ -181,7 +181,7 @@ class Body:
         if self.lecturer is None:
             return
         settings: Any = self.lecturer.settings(own)
-        self.run = start(replace(self.scene, settings=settings), self.choice.seed)
+        self.run = start(replace(self.scene, settings=settings), self.choice.run.seed)
         self._fresh_start()
         self.running = self.lecturer.begin(self.session, fast)
         self.write_poses()

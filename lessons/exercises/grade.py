@@ -18,7 +18,7 @@ from lessons.own.files import Source, execute, read
 from lessons.own.kinds import law_of
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
-from lessons.scenes.catalog import prepared
+from lessons.scenes.catalog import as_torque_scene, prepared
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
@@ -163,9 +163,7 @@ def _measured(check: Check, path: str, recordings: dict[RunSpec, Recording | str
 
 
 def _scene(run: RunSpec, controller: str) -> TorqueScene:
-    scene = prepared(run.prepared(), controller, ())
-    assert isinstance(scene, TorqueScene)
-    return scene
+    return as_torque_scene(prepared(run.prepared(), controller, ()), "a controller of your own")
 
 
 def beside(scene: TorqueScene, path: str, duration: float) -> float:

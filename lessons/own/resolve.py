@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from types import ModuleType
@@ -16,12 +16,12 @@ from himpc.tasks import Task
 from lessons.own.files import Source, execute, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
-from lessons.scenes.catalog import admitted, load_scene
+from lessons.scenes.catalog import as_torque_scene, load_scene
 from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
 from robots import InputError, Robot
 
 if TYPE_CHECKING:
+    from lessons.scenes.torque_scene import TorqueScene
     from lessons.teaching.lesson import Lesson
 
 TASK_SCENE = "iiwa14-hold"
@@ -55,13 +55,6 @@ def scene_named(
     return replace(found, name=name)
 
 
-def with_controllers(scene: Scene, files: Iterable[str]) -> Scene:
-    """The scene, under whose controllers are now those of files as well, if it takes torques."""
-    if not isinstance(scene, TorqueScene):
-        return scene
-    return replace(scene, settings=admitted(scene.settings, files))
-
-
 def lesson_named(name: str) -> Lesson:
     """A lesson by its name or file. Raises InputError if there is none, or the file cannot be used."""
     from lessons.course import load_lesson
@@ -87,14 +80,13 @@ def task_in(name: str) -> Task:
     return found
 
 
-def with_task(scene: Scene, name: str) -> Scene:
+def with_task(scene: Scene, name: str) -> TorqueScene:
     """A scene with the task of a file as a level of its own, below the first one.
 
     Raises:
         InputError: the file cannot be used, the scene takes velocities, or the Jacobian is not the task's.
     """
-    if not isinstance(scene, TorqueScene):
-        raise InputError(f"scene '{scene.name}' takes velocities: a task of your own needs torques")
+    scene = as_torque_scene(scene, "a task of your own")
     source, task = read(name), task_in(name)
     _called(source, lambda: check_task(task, scene.robot, name))
     first, *others = scene.settings.levels

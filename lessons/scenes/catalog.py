@@ -72,12 +72,23 @@ def load_scene(
 
 def torque_scene(name: str, urdf: str | None = None, tip: str | None = None) -> TorqueScene:
     """A torque-level scene by its name. Raises InputError also for one of the other kind."""
-    scene = load_scene(name, urdf, tip)
+    return as_torque_scene(load_scene(name, urdf, tip), "this")
+
+
+def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
+    """The scene itself. Raises InputError if it is of the other kind; `what` needs torques."""
     if not isinstance(scene, TorqueScene):
         raise InputError(
-            f"scene '{name}' is driven by velocities; this takes torques: choose e.g. iiwa14-hold"
+            f"scene '{scene.name}' is driven by velocities; {what} takes torques: choose e.g. iiwa14-hold"
         )
     return scene
+
+
+def with_controllers(scene: Scene, files: Iterable[str]) -> Scene:
+    """The scene, under whose controllers are now those of files as well, if it takes torques."""
+    if not isinstance(scene, TorqueScene):
+        return scene
+    return replace(scene, settings=admitted(scene.settings, files))
 
 
 def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:

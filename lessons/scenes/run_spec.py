@@ -40,16 +40,21 @@ class RunSpec:
 
     def loaded(self) -> Scene:
         """The scene without controller and assignments. Raises InputError if it cannot be loaded."""
-        from lessons.own.resolve import scene_named, with_controllers
+        from lessons.own.resolve import scene_named
+        from lessons.scenes.catalog import with_controllers
 
         return with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
 
     def prepared(self) -> Scene:
         """The scene with everything in place but the seed. Raises InputError, one sentence, for what cannot
         be."""
-        from lessons.scenes.catalog import prepared
+        return self.applied_to(self.loaded())
 
-        scene = prepared(self.loaded(), self.controller, self.set)
+    def applied_to(self, scene: Scene) -> Scene:
+        """The scene, however it was loaded, with all that the run says besides."""
+        from lessons.scenes.catalog import prepared, with_controllers
+
+        scene = prepared(with_controllers(scene, self.files), self.controller, self.set)
         if self.events is not None:
             scene = replace(scene, events=self.events)
         return scene if self.duration is None else replace(scene, duration=self.duration)

@@ -9,6 +9,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Load, Loading, Quit, Tell, Told
 from app.link.wire import Wire
 from lessons.kinds import find_scene
+from lessons.scenes.run_spec import RunSpec
 
 
 def warm(say: Callable[[str], None]) -> None:
@@ -16,17 +17,17 @@ def warm(say: Callable[[str], None]) -> None:
 
 
 def main(wire: Wire) -> None:
-    choice = SceneChoice("planar3-hold")
+    choice = SceneChoice(RunSpec("planar3-hold"))
     settings = find_scene("planar3-hold").settings
     while True:
         command = wire.recv()
         match command:
-            case Load(choice) if choice.name == "asleep":
+            case Load(choice) if choice.run.scene == "asleep":
                 time.sleep(1e6)
-            case Load(choice) if choice.name == "busy":
+            case Load(choice) if choice.run.scene == "busy":
                 while True:
                     pass
-            case Load(choice) if choice.name == "loads":
+            case Load(choice) if choice.run.scene == "loads":
                 wire.send(Loading())
                 time.sleep(1e6)
             case Tell():

@@ -15,6 +15,7 @@ from app.link.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed,
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TRUTH_TICKS
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
@@ -22,7 +23,7 @@ from robots import InputError
 
 @pytest.fixture
 def body() -> Iterator[Body]:
-    made = Body(SceneChoice("iiwa14-hold"))
+    made = Body(SceneChoice(RunSpec("iiwa14-hold")))
     yield made
     made.close()
 
@@ -114,23 +115,23 @@ def test_reset_keeps_settings_and_reset_all_does_not(body: Body) -> None:
 def test_another_scene_or_a_sentence(body: Body) -> None:
     kept = body.session
     for choice in (
-        SceneChoice("hold", urdf="/nowhere/robot.urdf"),
-        SceneChoice("hold", urdf_text="<robot><broken"),
-        SceneChoice("hold", urdf="panda", tip="no_such_link"),
-        SceneChoice("no-such-scene"),
+        SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")),
+        SceneChoice(RunSpec("hold"), urdf_text="<robot><broken"),
+        SceneChoice(RunSpec("hold", urdf="panda", tip="no_such_link")),
+        SceneChoice(RunSpec("no-such-scene")),
     ):
         answer = body.handle(Load(choice))
         assert isinstance(answer, Refused) and answer.sentence and "Traceback" not in answer.sentence
         assert body.session is kept
     old = body.block
-    answer = body.handle(Load(SceneChoice("planar3-hold")))
+    answer = body.handle(Load(SceneChoice(RunSpec("planar3-hold"))))
     assert isinstance(answer, Ready) and answer.robot.n == 3 and body.block is not old
     body.tick(10)
 
 
 def test_a_scene_that_cannot_be_loaded_at_all() -> None:
     with pytest.raises(InputError):
-        Body(SceneChoice("hold", urdf="/nowhere/robot.urdf"))
+        Body(SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")))
 
 
 def test_history_keeps_spikes_and_counts_bounds(body: Body) -> None:
@@ -186,7 +187,9 @@ def test_pacer_owes_simulated_time_but_never_piles_it_up() -> None:
 
 def test_a_choice_may_bring_settings_and_a_seed() -> None:
     """What a state code says is the scene as it was first loaded: "Reset all" goes back to it."""
-    made = Body(SceneChoice("planar3-hold", set=("order=posture,position,orientation", "horizon=3"), seed=4))
+    made = Body(
+        SceneChoice(RunSpec("planar3-hold", set=("order=posture,position,orientation", "horizon=3"), seed=4))
+    )
     made.handle(Post(Set("horizon", 9)))
     made.tick(2)
     assert made.session.settings.horizon == 9
@@ -194,13 +197,13 @@ def test_a_choice_may_bring_settings_and_a_seed() -> None:
     assert made.session.settings.horizon == 3
     assert made.session.settings.levels[0].name == "posture"
     assert made.session.seed == 4
-    refused = made.handle(Load(SceneChoice("planar3-hold", set=("horizn=3",))))
+    refused = made.handle(Load(SceneChoice(RunSpec("planar3-hold", set=("horizn=3",)))))
     assert isinstance(refused, Refused) and "horizon" in refused.sentence
     made.close()
 
 
 def test_late_torques_are_counted() -> None:
-    made = Body(SceneChoice("planar3-hold", set=("deadline_ms=0.5", "horizon=5")))
+    made = Body(SceneChoice(RunSpec("planar3-hold", set=("deadline_ms=0.5", "horizon=5"))))
     made.tick(3)
     made.handle(Post(Set("horizon", 6)))
     made.tick(4)

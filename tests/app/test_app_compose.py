@@ -21,7 +21,7 @@ LONG = 60.0
 
 @pytest.fixture
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=1, grace=2.0)
+    running = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=1, grace=2.0)
     yield running
     running.close()
 

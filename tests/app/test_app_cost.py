@@ -16,6 +16,7 @@ from app.link.process import wait_until
 from app.panels.widgets.chart import _TOP, _axis
 from app.server.server import PageServer
 from benchmarks.client import Second, Viewer
+from lessons.scenes.run_spec import RunSpec
 
 LONG = 240.0  # s: the first start of a checkout compiles
 TORQUE, STEP = "Torque, % of bound", "Control step, ms"
@@ -23,7 +24,7 @@ TORQUE, STEP = "Torque, % of bound", "Control step, ms"
 
 @pytest.fixture(scope="module")
 def circling() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("planar3-circle"), port=0, max_sessions=1, grace=0.0)
+    running = PageServer(SceneChoice(RunSpec("planar3-circle")), port=0, max_sessions=1, grace=0.0)
     yield running
     running.close()
 

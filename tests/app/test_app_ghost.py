@@ -21,6 +21,7 @@ from app.server.sessions import WORKER
 from app.worker.follower import GhostBody
 from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 
 LONG = 60.0  # s
@@ -33,7 +34,7 @@ def rings() -> int:
 
 @pytest.fixture
 def body() -> Iterator[Body]:
-    made = Body(SceneChoice("planar3-hold"))
+    made = Body(SceneChoice(RunSpec("planar3-hold")))
     yield made
     made.close()
 
@@ -97,9 +98,9 @@ def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
     body.handle(ResetAll())
     begin = script_of(body).begin
     assert begin is not None and begin.settings.horizon == 5
-    body.handle(Load(SceneChoice("panda-hold")))
+    body.handle(Load(SceneChoice(RunSpec("panda-hold"))))
     begin = script_of(body).begin
-    assert begin is not None and begin.choice.name == "panda-hold"
+    assert begin is not None and begin.choice.run.scene == "panda-hold"
     body.handle(Lead(False))
     body.tick()
     assert body.leader.script(body.session) is None and not body.leader.waits(1e9)
@@ -110,7 +111,7 @@ def start() -> Iterator[Callable[[str], Learner]]:
     spares, started = Spares(WORKER), list[Learner]()
 
     def run(scene: str) -> Learner:
-        learner = Learner("token", SceneChoice(scene), spares)
+        learner = Learner("token", SceneChoice(RunSpec(scene)), spares)
         started.append(learner)
         assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
         return learner
@@ -170,7 +171,7 @@ def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Lea
     """Ready is on its way while the learner leaves: nobody else would free the memory it brings."""
     learner = start("planar3-hold")
     learner.close()
-    late = Body(SceneChoice("planar3-hold"))
+    late = Body(SceneChoice(RunSpec("planar3-hold")))
     here, there = (Wire(end) for end in socket.socketpair())
     there.send(late.ready())
     ready = here.recv()
@@ -186,15 +187,15 @@ def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], Learner]) ->
     learner = start("planar3-hold")
     learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
     ghost = learner.ghost
-    learner.send(Load(SceneChoice("iiwa14-hold")))
+    learner.send(Load(SceneChoice(RunSpec("iiwa14-hold"))))
     assert wait_until(
         lambda: (
             ghost is not None
             and ghost.ready is not None
-            and ghost.ready.choice.name == "iiwa14-hold"
+            and ghost.ready.choice.run.scene == "iiwa14-hold"
             and ghost.status is not None
             and ghost.status.t > 0.3
         ),
         LONG,
     )
-    assert learner.ghost is ghost and learner.choice.name == "iiwa14-hold"
+    assert learner.ghost is ghost and learner.choice.run.scene == "iiwa14-hold"

@@ -29,6 +29,7 @@ from app.server.door import Door
 from app.server.guard import FIRST_WORD, Guard, GuardedConnection
 from app.server.server import PageServer
 from browsing.wire import camera, pack
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 PROTOCOL: Any = [f"viser-v{__version__}"]
@@ -37,7 +38,7 @@ LONG = 60.0
 
 @pytest.fixture(scope="module")
 def plain() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=2, grace=60.0)
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, grace=60.0)
     yield running
     running.close()
 
@@ -45,7 +46,10 @@ def plain() -> Iterator[PageServer]:
 @pytest.fixture(scope="module")
 def tokened() -> Iterator[PageServer]:
     running = PageServer(
-        SceneChoice("planar3-hold"), port=0, max_sessions=1, trusted_origins=["https://lab.example.org"]
+        SceneChoice(RunSpec("planar3-hold")),
+        port=0,
+        max_sessions=1,
+        trusted_origins=["https://lab.example.org"],
     )
     yield running
     running.close()
@@ -292,14 +296,14 @@ def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.Monke
     monkeypatch.setattr(module, "Sessions", Sessions)
     monkeypatch.setattr(private, "open_server", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        PageServer(SceneChoice("planar3-hold"), port=0)
+        PageServer(SceneChoice(RunSpec("planar3-hold")), port=0)
     (sessions,) = made
     assert sessions.enter([]) is None and not sessions.learners
 
 
 def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
     """It has begun, and is still asked what it keeps."""
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     with dial(server) as page:
         page.send(pack(camera()))
         assert wait_until(lambda: server.guard.taken > 0, LONG)

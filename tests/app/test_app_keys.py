@@ -13,6 +13,7 @@ from app.link.exercise import Exercise
 from app.panels.widgets.command import CAMERA_KEYS
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
 
 
 def test_the_cameras_keys_are_those_of_viser() -> None:
@@ -25,8 +26,8 @@ def test_the_cameras_keys_are_those_of_viser() -> None:
 @pytest.mark.parametrize(
     "choice",
     [
-        SceneChoice("planar3-hold"),
-        SceneChoice("ridgeback-ur10-drag"),
+        SceneChoice(RunSpec("planar3-hold")),
+        SceneChoice(RunSpec("ridgeback-ur10-drag")),
         SceneChoice.of_lesson(Exercise("deadlines")),
     ],
     ids=["torque", "velocity", "lesson"],

@@ -188,7 +188,7 @@ def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
     solved = prepared(load_scene(run.scene, run.urdf), None, (*run.set, *challenge.solutions[0]))
     code = encode(state_of(replace(run, seed=3), solved.settings, lesson="deadlines", step=last))
     choice = SceneChoice.of_state(decode(code))
-    assert choice.exercise == Exercise("deadlines", last - 1) and choice.seed == 3
+    assert choice.exercise == Exercise("deadlines", last - 1) and choice.run.seed == 3
     body = Body(choice)
     assert body.session.settings == solved.settings and not body.running
     body.handle(RunStep(fast=True))

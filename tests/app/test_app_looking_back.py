@@ -25,12 +25,13 @@ from lessons.events import Push
 from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
 from lessons.recording.table import as_csv, as_npz, named
+from lessons.scenes.run_spec import RunSpec
 from robots import Plant, PlantSettings, load_robot
 
 
 @pytest.fixture(scope="module")
 def body() -> Iterator[Body]:
-    made = Body(SceneChoice("planar3-circle"))
+    made = Body(SceneChoice(RunSpec("planar3-circle")))
     yield made
     made.close()
 

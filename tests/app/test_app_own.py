@@ -121,9 +121,9 @@ def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(body:
     body.tick(1)
     assert "--controller FILE.py" in body.session.notices[0]
     with pytest.raises(InputError):
-        Body(SceneChoice("planar3-hold", set=(f"controller={file}",)))
+        Body(SceneChoice(RunSpec("planar3-hold", set=(f"controller={file}",))))
     with pytest.raises(InputError, match="scene"):
-        Body(SceneChoice(str(file)))
+        Body(SceneChoice(RunSpec(str(file))))
 
 
 def test_own_code_is_known_by_its_content(body: Body, file: Path) -> None:
@@ -154,8 +154,8 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
             assert page.shows("YOUR CODE")
             file.write_text(HOLDS + "\n")
             assert eventually(lambda: any("took over at t" in body for _, body in page.notices))
-            learner.load(SceneChoice("planar3-circle"))
-            assert eventually(lambda: learner.choice.name == "planar3-circle")
+            learner.load(SceneChoice(RunSpec("planar3-circle")))
+            assert eventually(lambda: learner.choice.run.scene == "planar3-circle")
             assert learner.settings is not None
             assert str(file) in learner.settings.controllers
     finally:

@@ -19,6 +19,7 @@ from app.link.process import wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Sessions
 from lessons.events import MoveTarget, Set
+from lessons.scenes.run_spec import RunSpec
 
 LONG = 30.0  # s
 
@@ -35,7 +36,7 @@ def start(spares: Spares) -> Iterator[Callable[[str], Learner]]:
     started: list[Learner] = []
 
     def run(scene: str) -> Learner:
-        learner = Learner(f"token{len(started)}", SceneChoice(scene), spares)
+        learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), spares)
         started.append(learner)
         assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
         return learner
@@ -125,7 +126,7 @@ def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], Learner
 
 
 def test_a_bad_scene_is_a_sentence_and_the_process_waits(spares: Spares) -> None:
-    learner = Learner("token", SceneChoice("hold", urdf="/nowhere/robot.urdf"), spares)
+    learner = Learner("token", SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")), spares)
     refusals: list[str] = []
     try:
         assert wait_until(lambda: bool(refusals.extend(learner.take_messages()[0]) or refusals), LONG)
@@ -149,7 +150,7 @@ def rings() -> int:
 
 
 def test_sessions_resume_end_and_are_limited() -> None:
-    sessions = Sessions(SceneChoice("planar3-hold"), max_sessions=2, grace=1.0)
+    sessions = Sessions(SceneChoice(RunSpec("planar3-hold")), max_sessions=2, grace=1.0)
     try:
         one, two = sessions.enter([]), sessions.enter([])
         assert one is not None and two is not None and one is not two

@@ -27,6 +27,7 @@ from app.link.spares import Spares
 from app.server.sessions import WORKER
 from benchmarks.rough import treat
 from lessons.events import MoveTarget
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 
 LONG = 60.0  # s
@@ -43,7 +44,7 @@ def start() -> Iterator[Start]:
     def run(scene: str, worker: str = WORKER, own: bool = False) -> Learner:
         if own or not made:
             made.append(Spares(worker))
-        learner = Learner(f"token{len(started)}", SceneChoice(scene), made[-1])
+        learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
         started.append(learner)
         return learner
 
@@ -189,7 +190,7 @@ def test_a_child_that_goes_on_is_no_trouble_any_more(start: Start) -> None:
 def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     learner = start("planar3-hold", "stubborn")
     pid = born(learner)
-    learner.send(Load(SceneChoice("loads")))
+    learner.send(Load(SceneChoice(RunSpec("loads"))))
     assert wait_until(lambda: learner.trouble() is not None, LONG)
     said = learner.trouble()
     assert (
@@ -202,7 +203,7 @@ def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.Mo
     assert not gone(pid)  # the machine may only be slow: people decide
     learner.restart()
     assert wait_until(lambda: gone(pid), LONG)
-    assert learner.choice.name == "planar3-hold"
+    assert learner.choice.run.scene == "planar3-hold"
     assert learner.ask() is not None
 
 
@@ -218,9 +219,9 @@ def test_what_is_pressed_before_a_death_is_known_is_done(start: Start, scene: st
         if scene is None:
             learner.reset_all()
         else:
-            learner.load(SceneChoice(scene))
+            learner.load(SceneChoice(RunSpec(scene)))
     assert wait_until(lambda: learner.ready is not ready and running(learner), LONG)
-    assert learner.choice.name == (scene or "planar3-hold") and learner.failure is None
+    assert learner.choice.run.scene == (scene or "planar3-hold") and learner.failure is None
     os.kill(born(learner), signal.SIGKILL)  # what was done is not done twice
     assert wait_until(lambda: learner.failure is not None, LONG)
 
@@ -273,12 +274,14 @@ import sys, time, os, signal
 sys.path[:0] = {paths!r}
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
+from lessons.scenes.run_spec import RunSpec
 from app.link.process import wait_until
 from app.link.spares import Spares
 spares = Spares("stubborn")
 if {spawn}:
     spares._forks = False
-learners = [Learner(name, SceneChoice(name), spares) for name in ("asleep", "busy", "idle", "stopped")]
+names = ("asleep", "busy", "idle", "stopped")
+learners = [Learner(name, SceneChoice(RunSpec(name)), spares) for name in names]
 assert wait_until(lambda: all(each.pid for each in learners), 60.0)
 print(*(each.pid for each in learners), *([] if {spawn} else [spares.server.pid]), flush=True)
 time.sleep(1e6)
@@ -352,8 +355,8 @@ def test_files_arrive_with_their_message(start: Start) -> None:
     assert wait_until(lambda: running(learner), LONG)
     open_before = len(os.listdir("/proc/self/fd"))
     for _ in range(5):
-        learner.send(Load(SceneChoice("panda-hold")))
-        learner.send(Load(SceneChoice("planar3-hold")))
+        learner.send(Load(SceneChoice(RunSpec("panda-hold"))))
+        learner.send(Load(SceneChoice(RunSpec("planar3-hold"))))
     learner.send(Play(False))
     assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
     assert len(os.listdir("/proc/self/fd")) <= open_before

@@ -18,6 +18,7 @@ from viser import _messages
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer, serve
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -25,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def plain() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     yield running
     running.close()
 
@@ -53,9 +54,9 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
     with pytest.raises(InputError, match="Port 70000"):
         serve(port=70_000, open_browser=False)
     with pytest.raises(InputError, match="iiwa14-hold"):
-        serve(SceneChoice("iiwa14-hodl"), open_browser=False)
+        serve(SceneChoice(RunSpec("iiwa14-hodl")), open_browser=False)
     with pytest.raises(InputError):
-        serve(SceneChoice("hold", "/nowhere.urdf"), open_browser=False)
+        serve(SceneChoice(RunSpec("hold", "/nowhere.urdf")), open_browser=False)
     with pytest.raises(InputError, match="1 or more"):
         serve(max_sessions=0, open_browser=False)
 

@@ -22,6 +22,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
 from browsing.wire import camera, pack
+from lessons.scenes.run_spec import RunSpec
 
 PAGE = Path(__file__).parents[2] / "docs" / "serving.md"
 NAME = "lab.example.org"
@@ -58,7 +59,9 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
         capture_output=True,
     )
     origin = f"https://{NAME}:{port}"
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1, trusted_origins=[origin])
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, trusted_origins=[origin]
+    )
     printed = re.findall(r"```nginx\n(.*?)```", PAGE.read_text(), re.DOTALL)
     assert len(printed) == 1
     site = printed[0]

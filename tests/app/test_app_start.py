@@ -11,6 +11,7 @@ import pytest
 from app.client.trouble import trouble_of
 from app.link.choice import SceneChoice
 from app.link.process import Process
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -19,6 +20,7 @@ NUMERICS = ("scipy", "pinocchio", "mujoco", "numba", "trimesh", "placo", "coal",
 LISTEN = f"""
 import sys, urllib.request
 from app.link.choice import SceneChoice
+from lessons.scenes.run_spec import RunSpec
 from app.server import server
 server._load = lambda choice: None  # what follows once it listens
 running = server.PageServer({{choice}}, port=0)
@@ -33,9 +35,10 @@ finally:
 SHOWN = """
 import sys
 from app.link.choice import SceneChoice
+from lessons.scenes.run_spec import RunSpec
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
-running = PageServer(SceneChoice("{scene}"), port=0)
+running = PageServer(SceneChoice(RunSpec("{scene}")), port=0)
 try:
     with Wire(running.url) as page:
         assert eventually(lambda: page.shows("RUNNING"), 110.0)
@@ -47,7 +50,11 @@ finally:
 
 @pytest.mark.parametrize(
     "choice",
-    ["SceneChoice('iiwa14-hold')", "SceneChoice('ridgeback-ur10-square')", "SceneChoice.opening('one-task')"],
+    [
+        "SceneChoice(RunSpec('iiwa14-hold'))",
+        "SceneChoice(RunSpec('ridgeback-ur10-square'))",
+        "SceneChoice.opening('one-task')",
+    ],
 )
 def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None:
     """viser itself needs NumPy; all else comes while the browser opens."""
@@ -71,10 +78,13 @@ def test_the_process_of_the_pages_compiles_nothing(scene: str) -> None:
 
 
 def test_names_are_judged_without_loading_and_files_by_loading() -> None:
-    assert SceneChoice("iiwa14-hold").known and SceneChoice("ridgeback-ur10-delivery", seed=3).known
-    assert not SceneChoice("hold").known and not SceneChoice("iiwa14-hodl").known
-    assert not SceneChoice("hold", "mine.urdf").known
-    assert not SceneChoice("iiwa14-hold", set=("horizon=0",)).known
+    assert (
+        SceneChoice(RunSpec("iiwa14-hold")).known
+        and SceneChoice(RunSpec("ridgeback-ur10-delivery", seed=3)).known
+    )
+    assert not SceneChoice(RunSpec("hold")).known and not SceneChoice(RunSpec("iiwa14-hodl")).known
+    assert not SceneChoice(RunSpec("hold", "mine.urdf")).known
+    assert not SceneChoice(RunSpec("iiwa14-hold", set=("horizon=0",))).known
     with pytest.raises(InputError, match="'one-task'"):
         SceneChoice.opening("one-tsak")
 

@@ -13,6 +13,7 @@ from app.adapter import private
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
 
 LONG = 60.0
 PART = 500_000
@@ -21,7 +22,7 @@ LARGE = 40_000_000
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=8, grace=1.0)
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=8, grace=1.0)
     yield running
     running.close()
 

@@ -15,6 +15,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
 
 VALUES: tuple[Any, ...] = (
     None, True, False, 0, -1, 3.7, math.nan, math.inf, -math.inf, 1e308, -1e308, 2**63 - 1, "", "word",
@@ -31,8 +32,8 @@ NAMES = (
 @pytest.mark.parametrize(
     "choice",
     [
-        SceneChoice("planar3-hold"),
-        SceneChoice("ridgeback-ur10-drag"),
+        SceneChoice(RunSpec("planar3-hold")),
+        SceneChoice(RunSpec("ridgeback-ur10-drag")),
         SceneChoice.of_lesson(Exercise("deadlines")),
     ],
     ids=["torque", "velocity", "lesson"],

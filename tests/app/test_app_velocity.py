@@ -17,10 +17,11 @@ from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
 from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
+from lessons.scenes.run_spec import RunSpec
 
 
 def opened(scene: str) -> Iterator[Body]:
-    made = Body(SceneChoice(scene))
+    made = Body(SceneChoice(RunSpec(scene)))
     yield made
     made.close()
 

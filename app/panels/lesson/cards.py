@@ -14,11 +14,12 @@ from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from lessons.course import COURSE, load_lesson
+from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Lesson
 
 Choose = Callable[[SceneChoice], None]
 
-LABORATORY = SceneChoice("iiwa14-hold")
+LABORATORY = SceneChoice(RunSpec("iiwa14-hold"))
 """Where the free laboratory begins."""
 
 

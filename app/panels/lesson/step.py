@@ -179,7 +179,7 @@ class LessonPanel:
             self._go(self._exercise.place - 1)
 
     def _go(self, place: int) -> None:
-        self._choose(SceneChoice.of_lesson(Exercise(self._exercise.lesson, place)))
+        self._choose(self._learner.choice.at(Exercise(self._exercise.lesson, place)))
 
     # ---------------------------------------------------------------- showing
 

@@ -60,17 +60,17 @@ class ExportPanel:
         return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
 
     def _name(self, ending: str) -> str:
-        return f"{self._learner.choice.name}-{self._settings().controller}.{ending}"
+        return f"{self._learner.choice.run.scene}-{self._settings().controller}.{ending}"
 
     def _npz(self) -> tuple[str, bytes] | None:
         run = self._rows(self._learner)
         if run is None:
             return None
-        choice, gap = self._learner.choice, np.diff(run["t"][:, 0])
+        spec, gap = self._learner.choice.run, np.diff(run["t"][:, 0])
         how = {
-            "scene": choice.name,
-            "urdf": choice.urdf,
-            "tip": choice.tip,
+            "scene": spec.scene,
+            "urdf": spec.urdf,
+            "tip": spec.tip,
             "rows_per_second": float(1 / np.median(gap)),
         }
         return self._name("npz"), as_npz(named(run.layout, run.rows, self._settings(), how))

@@ -10,6 +10,7 @@ from app.html.palette import BAD, DAMPING, GOOD, LEVELS
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG
 
 _KINDS = {"repaired": LEVELS[0], "filled": LEVELS[1], "fixed": LEVELS[3], "refused": BAD, "note": DAMPING}
@@ -33,15 +34,13 @@ class RobotPanel:
         gui.add_html(
             block(
                 f"<b>{esc(robot.name)}</b>: {robot.n} joints, hand at <b>{esc(robot.tip)}</b>, "
-                f"scene <b>{esc(ready.choice.name)}</b>"
+                f"scene <b>{esc(ready.choice.run.scene)}</b>"
             )
         )
         self._answer = gui.add_html("", visible=False)
         with gui.add_folder("Scene"):
-            names = tuple(name for name in scenes if name != "hold")
-            scene = gui.add_dropdown(
-                "Scene", names, initial_value=ready.choice.name if ready.choice.name in names else names[0]
-            )
+            names, now = tuple(name for name in scenes if name != "hold"), ready.choice.run.scene
+            scene = gui.add_dropdown("Scene", names, initial_value=now if now in names else names[0])
             described = gui.add_html(block(esc(scenes[str(scene.value)])))
             load_scene = gui.add_button("Load scene")
         with gui.add_folder("Robot of the catalog"):
@@ -58,7 +57,7 @@ class RobotPanel:
 
                 @load_path.on_click
                 async def _(_: object) -> None:
-                    self._ask(SceneChoice("hold", urdf=path.value.strip(), tip=tip.value.strip() or None))
+                    self._ask(RunSpec("hold", path.value.strip(), tip.value.strip() or None))
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
             gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
@@ -74,24 +73,24 @@ class RobotPanel:
 
         @load_scene.on_click
         async def _(_: object) -> None:
-            self._ask(SceneChoice(str(scene.value)))
+            self._ask(RunSpec(str(scene.value)))
 
         @load_robot.on_click
         async def _(_: object) -> None:
             name = str(catalog.value)
-            self._ask(SceneChoice(f"{name}-hold") if f"{name}-hold" in scenes else SceneChoice("hold", name))
+            self._ask(RunSpec(f"{name}-hold") if f"{name}-hold" in scenes else RunSpec("hold", name))
 
         @upload.on_upload
         async def _(_: object) -> None:
             self._uploaded(upload.value.content, tip.value.strip() or None)
 
-    def _ask(self, choice: SceneChoice) -> None:
-        if choice.name == "hold" and choice.urdf == "":
+    def _ask(self, run: RunSpec, urdf_text: str | None = None) -> None:
+        if run.scene == "hold" and run.urdf == "":
             self.refuse("No file was named: write the path of a URDF file first.")
             return
         self._answer.visible = True
         self._answer.content = block("Loading …")
-        self._choose(choice)
+        self._choose(SceneChoice(run, urdf_text))
 
     def _uploaded(self, content: bytes, tip: str | None) -> None:
         if len(content) > MAX_UPLOAD:
@@ -102,7 +101,7 @@ class RobotPanel:
         except UnicodeDecodeError:
             self.refuse("The file is not text: upload the URDF file itself, not a mesh or an archive.")
             return
-        self._ask(SceneChoice("hold", tip=tip, urdf_text=text))
+        self._ask(RunSpec("hold", tip=tip), text)
 
     def refuse(self, sentence: str) -> None:
         """A scene or robot was not loaded; the one before goes on."""

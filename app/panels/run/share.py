@@ -75,7 +75,7 @@ class SharePanel:
     def _save(self, client: viser.ClientHandle, told: Told) -> None:
         choice = _from_a_name(told.choice)
         text = script(choice.run, told.log, told.t)
-        client.send_file_download(f"{choice.name}.py", text.encode(), save_immediately=True)
+        client.send_file_download(f"{choice.run.scene}.py", text.encode(), save_immediately=True)
 
 
 def _from_a_name(choice: SceneChoice) -> SceneChoice:

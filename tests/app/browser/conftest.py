@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, find_chromium, open_page, press, tab, wait_for_scene
+from lessons.scenes.run_spec import RunSpec
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +31,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("iiwa14-hold"), port=0, max_sessions=2, grace=2.0)
+    running = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=2, grace=2.0)
     yield running
     running.close()
 

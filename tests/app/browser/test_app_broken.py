@@ -19,6 +19,7 @@ from app.panels.widgets.in_view import AWAKE, LABEL
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
+from lessons.scenes.run_spec import RunSpec
 
 NEXT = Exercise("deadlines")
 
@@ -66,13 +67,13 @@ def answers(page: Wire) -> list[str]:
 
 
 def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Wire(server.url) as page:
             assert eventually(lambda: page.find("Playback") is not None)
             before = page.find("Playback")
             assert before is not None
-            server.sessions.learners[0].send(Load(SceneChoice("ridgeback-ur10-drag")))
+            server.sessions.learners[0].send(Load(SceneChoice(RunSpec("ridgeback-ur10-drag"))))
             assert eventually(lambda: page.find("Playback") not in (None, before))
             said = len(page.notices)
             told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
@@ -97,7 +98,7 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
         return works(self, *given)
 
     monkeypatch.setattr(owner, name, fails)
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Wire(server.url) as page:
             assert eventually(lambda: page.shows("no &lt;place&gt; for it"))

@@ -22,13 +22,14 @@ from app.server.classroom import STEERING, Classroom, Watcher
 from app.server.door import new_token
 from app.server.server import PageServer
 from browsing.hands import SELDOM, open_page, press, write
+from lessons.scenes.run_spec import RunSpec
 
 ROOT = Path(__file__).parents[3] / "app"
 
 
 @pytest.fixture(scope="module")
 def classroom() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("planar3-hold"), port=0, classroom=True)
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True)
     yield running
     running.close()
 
@@ -48,7 +49,7 @@ def test_watchers_change_nothing() -> None:
     watcher.reset_all()
     watcher.restart(cast(SceneChoice, "another scene"))
     watcher.stop_ghost()
-    watcher.load(SceneChoice("planar3-hold"))
+    watcher.load(SceneChoice(RunSpec("planar3-hold")))
     assert sent == []
     assert refused == [STEERING] * 5
     assert (watcher.choice, watcher.settings) == ("a scene", "settings")

@@ -19,6 +19,7 @@ from app.server.server import PageServer
 from browsing.hands import SELDOM, drag_target, eventually, open_page, press, set_number, tab
 from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
+from lessons.scenes.run_spec import RunSpec
 
 ARM = 0.08
 """m, where the gizmo of this small arm is taken hold of."""
@@ -26,7 +27,7 @@ ARM = 0.08
 
 @pytest.fixture(scope="module")
 def drawing() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("planar3-plane"), port=0, max_sessions=1, grace=2.0)
+    running = PageServer(SceneChoice(RunSpec("planar3-plane")), port=0, max_sessions=1, grace=2.0)
     yield running
     running.close()
 
@@ -177,7 +178,7 @@ def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
 
 
 def test_one_knot_is_a_click_away(browser: Browser) -> None:
-    server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     page = open_page(browser, server.url, 1300, 700, rest=SELDOM)
     try:
         tab(page, "Inside")

@@ -7,11 +7,12 @@ from playwright.sync_api import Browser
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from benchmarks.monkey import StandardError, walk
+from lessons.scenes.run_spec import RunSpec
 
 
 def test_a_minute_of_anything_breaks_nothing(browser: Browser) -> None:
     with StandardError() as said:
-        server = PageServer(SceneChoice("planar3-hold"), port=0, max_sessions=1)
+        server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
         try:
             found = walk(browser, server, minutes=1.0, seed=0, complaints=said.read)
         finally:

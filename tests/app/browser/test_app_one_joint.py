@@ -10,6 +10,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.hands import drag_target, eventually, open_page, press, target_position
+from lessons.scenes.run_spec import RunSpec
 
 ONE_JOINT = """<robot name="one"><link name="base"/><link name="arm"><inertial><origin xyz="0.1 0 0"/>
 <mass value="1"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -32,7 +33,7 @@ def joint(learner: Learner) -> float:
 )
 def test_one_joint_holds_is_dragged_and_runs(browser: Browser, kind: str, axis: str, there: float) -> None:
     """A hinge comes as near to the dragged target as it can, a slide comes to it."""
-    choice = SceneChoice("hold", urdf_text=ONE_JOINT.format(kind=kind, axis=axis))
+    choice = SceneChoice(RunSpec("hold"), urdf_text=ONE_JOINT.format(kind=kind, axis=axis))
     server = PageServer(choice, port=0, max_sessions=1)
     try:
         page = open_page(browser, server.url)

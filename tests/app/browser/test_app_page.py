@@ -37,6 +37,7 @@ from browsing.hands import (
     wait_for_scene,
     write,
 )
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 from robots import CATALOG
 
@@ -320,9 +321,9 @@ def test_other_scenes_and_the_phone(browser: Browser, server: PageServer) -> Non
     assert left < 1 and 389 <= right <= 391  # the sheet fills the screen
     tab(phone, "Robot")
     phone.get_by_role("button", name="Load robot").scroll_into_view_if_needed()
-    learner.send(Load(SceneChoice("iiwa14-circle")))
+    learner.send(Load(SceneChoice(RunSpec("iiwa14-circle"))))
     assert eventually(
-        phone, lambda: learner.ready is not None and learner.ready.choice.name == "iiwa14-circle"
+        phone, lambda: learner.ready is not None and learner.ready.choice.run.scene == "iiwa14-circle"
     )
     wait_for_scene(phone, "/reference/0")
     expect(phone.get_by_text("Watch the hand follow the curve")).to_be_visible()

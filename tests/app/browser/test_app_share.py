@@ -50,4 +50,4 @@ def test_a_code_brings_the_setting_back_and_a_script_repeats_the_run(page: Page,
     write(page, "Somebody's code", given)
     press(page, "Open it")
     assert eventually(page, lambda: horizon(learner) == before + 2)
-    assert learner.choice.set == (f"horizon={before + 2}",)
+    assert learner.choice.run.set == (f"horizon={before + 2}",)

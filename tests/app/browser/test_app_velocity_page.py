@@ -25,13 +25,14 @@ from browsing.hands import (
     tab,
     wait_for_scene,
 )
+from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice("ridgeback-ur10-drag"), port=0, max_sessions=1, grace=2.0)
+    running = PageServer(SceneChoice(RunSpec("ridgeback-ur10-drag")), port=0, max_sessions=1, grace=2.0)
     yield running
     running.close()
 
@@ -81,13 +82,13 @@ def at_rest(learner: Learner) -> bool:
 
 def load(page: Page, learner: Learner, scene: str) -> None:
     """By the menu of the Robot tab, unless it is there already."""
-    if learner.ready is not None and learner.ready.choice.name == scene:
+    if learner.ready is not None and learner.ready.choice.run.scene == scene:
         return
     tab(page, "Robot")
     row(page, "Scene").locator("input").first.click()
     page.get_by_role("option", name=scene, exact=True).click()
     press(page, "Load scene")
-    assert eventually(page, lambda: learner.ready is not None and learner.ready.choice.name == scene)
+    assert eventually(page, lambda: learner.ready is not None and learner.ready.choice.run.scene == scene)
     assert eventually(page, lambda: learner.status is not None and learner.status.mission is not None)
     wait_for_scene(page, "/goal/base")
 
