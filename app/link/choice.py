@@ -10,7 +10,6 @@ from lessons.course import COURSE
 from lessons.own.files import is_file
 from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
-from lessons.settings.assignments import assignment
 from robots.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -64,8 +63,13 @@ class SceneChoice:
     @classmethod
     def of_run(cls, run: RunSpec) -> SceneChoice:
         """What a run begins with; a page has no script and no end."""
-        told = () if run.controller is None else (assignment("controller", run.controller),)
-        return cls(replace(run, controller=None, set=(*told, *run.set), events=None, duration=None))
+        run = replace(run, events=None, duration=None)
+        if run.controller is None:
+            return cls(run)
+        from lessons.settings.assignments import assignment
+
+        told = assignment("controller", run.controller)
+        return cls(replace(run, controller=None, set=(told, *run.set)))
 
     @classmethod
     def of_state(cls, state: State) -> SceneChoice:
