@@ -22,6 +22,12 @@ _RESTING = """(() => {
   window.cancelAnimationFrame = (id) => window.clearTimeout(id);
 })()"""
 
+_PICTURES = """() => new Promise((done) => {
+  let left = 3;
+  const next = () => (left-- > 0 ? window.requestAnimationFrame(next) : done());
+  next();
+})"""
+
 _PROJECT = """([name, at]) => {
   const m = window.__viserMutable, node = m.nodeRefFromName[name];
   node.updateWorldMatrix(true, false); m.camera.updateMatrixWorld(true);
@@ -183,7 +189,7 @@ def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm:
     """Pulls the gizmo's arrow of a world axis by so many metres. arm: m, where the arrow is taken hold of."""
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
-    page.wait_for_timeout(4 * OFTEN)  # a camera that was turned is so from the next picture on
+    _see(page)  # a camera that was turned is so from the next picture on
     start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
     end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
     _drag(page, start, end)
@@ -200,7 +206,7 @@ def click_on(page: Page, node: str) -> None:
         node,
     )
     page.mouse.move(*page.evaluate(_PROJECT, [node, middle]))
-    page.wait_for_timeout(250)
+    _see(page)
     page.mouse.down()
     page.mouse.up()
     page.wait_for_timeout(BETWEEN)
@@ -217,10 +223,16 @@ def turn_target(page: Page, degrees: float) -> None:
     _drag(page, on_ring(45.0), on_ring(45.0 + degrees))
 
 
+def _see(page: Page) -> None:
+    """Waits until the next pictures are drawn, however long that takes, and at least a moment."""
+    page.evaluate(_PICTURES)
+    page.wait_for_timeout(250)
+
+
 def _drag(page: Page, start: list[float], end: list[float]) -> None:
     """In twelve steps, like a hand would."""
     page.mouse.move(*start)
-    page.wait_for_timeout(250)  # the arrow must have noticed the mouse
+    _see(page)  # the arrow must have noticed the mouse
     page.mouse.down()
     for k in range(1, 13):
         page.mouse.move(*(s + (e - s) * k / 12 for s, e in zip(start, end, strict=True)))
