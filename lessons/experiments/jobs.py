@@ -15,27 +15,21 @@ from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
+from lessons.session.session import Session
+from lessons.session.torque import TorqueSession
+from lessons.session.velocity import VelocitySession
 
 Array = NDArray[np.float64]
 
 TIMING_KEYS = ("step_ms", "real_time_factor")
 """Keys of a summary that differ from run to run; all others are the same to the bit."""
 
-_KEPT = (
-    "t",
-    "q",
-    "v",
-    "tau",
-    "tau_demand",
-    "tau_lower",
-    "tau_upper",
-    "v_limit",
-    "at_bound",
-    "delta_tau",
-    "step_us",
-)
-_KEPT_PER_TASK = ("x", "x_d", "error")
-_KEPT_PER_LEVEL = ("cost", "step")
+_KEPT = ("t", "q", "v", "tau", "v_limit", "at_bound", "tau_demand", "step_us", "x", "x_d", "error", "cost")
+_KEPT_BY: Mapping[type[Session], tuple[str, ...]] = {
+    TorqueSession: (*_KEPT, "tau_lower", "tau_upper", "delta_tau"),
+    VelocitySession: (*_KEPT, "step"),
+}
+"""What plots need of a run: fields, and beginnings of the fields per task and level."""
 
 
 @dataclass(frozen=True)
@@ -123,13 +117,9 @@ def _do(job: Job) -> Run:
 
 
 def _arrays(recording: Recording) -> dict[str, Array]:
-    layout = recording.layout
-    names = [
-        *_KEPT,
-        *(f"{field}/{task.name}" for task in layout.tasks for field in _KEPT_PER_TASK),
-        *(f"{field}/{level}" for level in layout.levels for field in _KEPT_PER_LEVEL),
-    ]
-    return {name: np.ascontiguousarray(recording[name]) for name in names if name in layout.fields}
+    kept = _KEPT_BY[type(recording.session)]
+    names = (name for name in recording.layout.fields if name.partition("/")[0] in kept)
+    return {name: np.ascontiguousarray(recording[name]) for name in names}
 
 
 def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = None) -> Results:

@@ -1,36 +1,50 @@
-"""A run's rows as named arrays: those of `himpc-lab run --npz`."""
+"""A run's rows as named arrays: those of `himpc-lab run --npz`, and of the page."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lessons.events import as_data
-from lessons.recording import torque, velocity
-from lessons.recording.recording import Recording
-from lessons.session.session import Session
-from lessons.session.torque import TorqueSession
-from lessons.session.velocity import VelocitySession
+from himpc.telemetry import Layout
+from lessons.events import Event, as_data
+from lessons.recording.constants import constants
+from lessons.settings.settings import Settings
+from lessons.settings.values import finite
+from robots import Robot
+
+if TYPE_CHECKING:
+    from lessons.recording.recording import Recording
+
+Array = NDArray[np.float64]
 
 _PER_JOINT = (
     *("q", "v", "q_measured", "v_measured", "tau_0", "tau", "tau_demand"),
     *("tau_lower", "tau_upper", "v_limit", "q_lower", "q_upper"),
 )
-_MORE = ("acceleration", "jerk")
-"""Per joint, where the kind has them."""
-_CONSTANTS: Mapping[type[Session], Callable[[Any], dict[str, Any]]] = {
-    TorqueSession: torque.constants,
-    VelocitySession: velocity.constants,
-}
 _PER_TASK = ("x", "x_d", "v_d", "a_d", "error")
 
 
 def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:
-    """One row per tick and field, and what reproduces the run. A field that the run's kind does not know is
-    NaN: no torque bounds at velocity level.
+    """A recording, see `named`; `how`: scene, URDF, seed and settings as given."""
+    session = recording.session
+    events = [(t, event) for t, event in session.log]
+    return named(session.robot, session.settings, recording.layout, recording.rows, how, events)
+
+
+def named(
+    robot: Robot,
+    settings: Settings,
+    layout: Layout,
+    rows: Array,
+    how: dict[str, Any],
+    events: Iterable[tuple[float, Event]] | None = None,
+) -> dict[str, Any]:
+    """Every field of telemetry by its name, and what reproduces the run. A field per joint that the run's
+    kind does not know is NaN: no torque bounds at velocity level.
 
     What an independent replay needs besides: `q_measured` and `v_measured` (what the controller was given),
     `tau_0` (the torque, at velocity level the command, that acted until the tick), the `tip`'s frame, `a_max`
@@ -39,24 +53,27 @@ def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:
     a_d at the next knot are those of the next row.
 
     Args:
-        recording: the run.
-        how: scene, URDF, seed and settings as given, to which the event log is added.
+        robot, settings: as they are at the end.
+        layout, rows: (k, size), and where its fields lie.
+        how: what is worth telling of where it came from.
+        events: (time in s, event) in order; None: not known.
     """
-    session, layout = recording.session, recording.layout
-    place = {level.name: index for index, level in enumerate(session.settings.levels, start=1)}
-    unknown = np.full((len(recording.rows), session.robot.n), np.nan)
-    data: dict[str, Any] = {"t": recording["t"][:, 0]}
-    for name in (*_PER_JOINT, *(name for name in _MORE if name in layout.fields)):
-        data[name] = recording[name] if name in layout.fields else unknown
+    data: dict[str, Any] = {name: rows[:, where] for name, where in layout.fields.items()}
+    together = {*_PER_JOINT, *(f"{name}/{task.name}" for task in layout.tasks for name in _PER_TASK)}
+    data = {
+        name: found[:, 0] if found.shape[1] == 1 and name not in together else found
+        for name, found in data.items()
+    }
+    unknown = np.full((len(rows), robot.n), np.nan)
+    data |= {name: unknown for name in _PER_JOINT if name not in data}
+    place = {level.name: index for index, level in enumerate(settings.levels, start=1)}
     for task in layout.tasks:
-        for name in _PER_TASK:
-            data[f"{name}/{task.name}"] = recording[f"{name}/{task.name}"]
-        level = f"level/{task.name}"
-        data[level] = recording[level][:, 0] if level in layout.fields else np.array(place[task.level])
-    data["joint_names"] = np.array(session.robot.joint_names)
-    data["tip"] = np.array(session.robot.tip)
-    data |= {name: np.array(value) for name, value in _CONSTANTS[type(session)](session).items()}
-    events = [{"t": t, **as_data(event)} for t, event in session.log]
-    told = {**how, "events": events, "in_force": session.settings.as_data()}
-    data["settings"] = np.array(json.dumps(told))
+        data.setdefault(f"level/{task.name}", np.array(place[task.level]))
+    data["joint_names"] = np.array(robot.joint_names)
+    data["tip"] = np.array(robot.tip)
+    data |= constants(robot, settings)
+    told = {**how, "in_force": settings.as_data()}
+    if events is not None:
+        told["events"] = [{"t": t, **as_data(event)} for t, event in events]
+    data["settings"] = np.array(json.dumps(finite(told)))
     return data

@@ -1,40 +1,16 @@
-"""Recorded rows as named arrays and as a table for a spreadsheet."""
+"""Recorded rows as files: compressed arrays, and a table for a spreadsheet."""
 
 from __future__ import annotations
 
 import io
-import json
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.telemetry import Layout
-from lessons.settings.settings import Settings
-from lessons.settings.values import finite
 
 Array = NDArray[np.float64]
-
-
-def named(layout: Layout, rows: Array, settings: Settings, how: dict[str, Any]) -> dict[str, Any]:
-    """Every field of telemetry by its name, and what the run was.
-
-    Args:
-        layout: of the rows.
-        rows: (k, size).
-        settings: in force at the end.
-        how: anything else that is worth telling.
-
-    Returns:
-        (k,) or (k, width) per field of the layout, with the names and units of `himpc-lab run --npz`;
-        `joint_names`; `settings`, a JSON text.
-    """
-    data: dict[str, Any] = {name: rows[:, where] for name, where in layout.fields.items()}
-    data = {name: found[:, 0] if found.shape[1] == 1 else found for name, found in data.items()}
-    data["joint_names"] = np.array(layout.joints)
-    told = {**how, "in_force": settings.as_data()}
-    data["settings"] = np.array(json.dumps(finite(told)))
-    return data
 
 
 def as_npz(data: dict[str, Any]) -> bytes:

@@ -7,12 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.limits import POSITION_MARGIN, reaction
 from himpc.telemetry import RUNGS
-from himpc.tick.kernel.constants import RETURN_RATE
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
-from lessons.session.torque import TorqueSession
 from lessons.settings.values import peak
 
 Array = NDArray[np.float64]
@@ -45,21 +42,6 @@ def _levels(recording: Recording) -> list[dict[str, Any]]:
     """Per enabled level its rows, and how many directions it gets where the robot ended."""
     found = recording.session.ranks()
     return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
-
-
-def constants(session: TorqueSession) -> dict[str, Any]:
-    """a_max (n,) rad/s², and what the bound on the way to a joint's limit counts with: margin (rad), reaction
-    (s) and return rate (1/s); NaN where that bound is not in force."""
-    settings = session.settings
-    margin, waits, rate = POSITION_MARGIN, reaction(settings.limits, settings.T_s), RETURN_RATE
-    if settings.limits.position != "viability":
-        margin = waits = rate = np.nan
-    return {
-        "a_max": session.robot.a_max,
-        "position_margin": margin,
-        "position_reaction": waits,
-        "position_return_rate": rate,
-    }
 
 
 def _average_cost(recording: Recording, level: str) -> float:

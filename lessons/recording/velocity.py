@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
-from lessons.session.velocity import VelocitySession
 from lessons.session.velocity_rows import RUNGS
 from lessons.settings.values import peak
 
@@ -53,12 +52,6 @@ def block(recording: Recording) -> dict[str, Any]:
         "completion_time_s": round(progress.completed[-1][1], 9) if progress.done else None,
         "mission": [{"task": name, "completed_s": round(t, 9)} for name, t in progress.completed],
     }
-
-
-def constants(session: VelocitySession) -> dict[str, Any]:
-    """a_max (n,) rad/s² (m/s²) in force; the velocity level has no bound of the torque level's kind."""
-    bound = dict.fromkeys(("position_margin", "position_reaction", "position_return_rate"), np.nan)
-    return {"a_max": session.bounds.a, **bound}
 
 
 def _mean(values: Array) -> float | None:

@@ -24,7 +24,10 @@ from himpc.telemetry import Layout
 from lessons.events import Push
 from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
-from lessons.recording.table import as_csv, as_npz, named
+from lessons.recording.arrays import arrays, named
+from lessons.recording.run import run as headless_run
+from lessons.recording.table import as_csv, as_npz
+from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import Plant, PlantSettings, load_robot
 
@@ -199,11 +202,15 @@ def run(body: Body) -> Recorded:
 
 
 def test_files_hold_what_was_recorded(body: Body, run: Recorded) -> None:
-    data = np.load(io.BytesIO(as_npz(named(run.layout, run.rows, body.session.settings, {"scene": "x"}))))
+    robot, now = body.session.robot, body.session.settings
+    data = np.load(io.BytesIO(as_npz(named(robot, now, run.layout, run.rows, {"scene": "x"}))))
     assert np.allclose(np.diff(data["t"]), 0.01) and len(data["t"]) == 30
     assert np.array_equal(data["q"], run["q"]) and data["q"].shape == (30, 3)
     settings = json.loads(str(data["settings"]))
     assert settings["scene"] == "x" and settings["in_force"]["horizon"] == body.session.settings.horizon
+    assert str(data["tip"]) == robot.tip and np.array_equal(data["a_max"], robot.a_max)
+    headless = arrays(headless_run(load_scene("planar3-circle"), 0.01), {})
+    assert {name: each.ndim for name, each in data.items()} == {n: np.ndim(a) for n, a in headless.items()}
     lines = list(csv.DictReader(io.StringIO(as_csv(run.layout, run.rows).decode())))
     assert len(lines) == 30
     joint, task = run.layout.joints[1], run.layout.tasks[0]

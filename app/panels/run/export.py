@@ -15,7 +15,8 @@ from app.client.simulation import Simulation
 from app.html.text import block
 from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
-from lessons.recording.table import as_csv, as_npz, named
+from lessons.recording.arrays import named
+from lessons.recording.table import as_csv, as_npz
 from lessons.settings.settings import Settings
 
 _MINUTE, _WHOLE = "the last minute", "all since the last reset"
@@ -63,17 +64,18 @@ class ExportPanel:
         return f"{self._learner.choice.run.scene}-{self._settings().controller}.{ending}"
 
     def _npz(self) -> tuple[str, bytes] | None:
-        run = self._rows(self._learner)
-        if run is None:
+        run, ready = self._rows(self._learner), self._learner.ready
+        if run is None or ready is None:
             return None
         spec, gap = self._learner.choice.run, np.diff(run["t"][:, 0])
         how = {
             "scene": spec.scene,
             "urdf": spec.urdf,
             "tip": spec.tip,
+            "seed": spec.seed,
             "rows_per_second": float(1 / np.median(gap)),
         }
-        return self._name("npz"), as_npz(named(run.layout, run.rows, self._settings(), how))
+        return self._name("npz"), as_npz(named(ready.robot, self._settings(), run.layout, run.rows, how))
 
     def _csv(self) -> tuple[str, bytes] | None:
         run = self._rows(self._learner)
