@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import final
 
 from app.client.simulation import Simulation
 from app.link.messages import Failed, Follow, Reached, Refused, Report, Script
@@ -15,9 +16,10 @@ LEAD = 0.2
 and the page says so: one that lagged behind would look like one that follows its target badly."""
 
 
+@final
 class Ghost(Simulation):
     """A process that follows. It begins where the first script says, and what it tells of the time it has
-    come to keeps its leader on the leash."""
+    come to tells its leader how far it may go."""
 
     who = "The ghost"
 
@@ -48,8 +50,7 @@ class Ghost(Simulation):
         """As `Simulation.quiet`; before it was told anything it has nothing to say."""
         return 0.0 if self._told_at is None else min(super().quiet, time.monotonic() - self._told_at)
 
-    def _hear(self, process: Process, report: Report) -> None:
-        super()._hear(process, report)
+    def _heard(self, process: Process, report: Report) -> None:
         match report:
             case Reached(t):
                 self._reached(t + LEAD)

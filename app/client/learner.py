@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from queue import Empty, Queue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
 from app.client.ghost import Ghost
 from app.client.simulation import Simulation, aside
@@ -15,7 +15,6 @@ from app.link.exercise import Lecture
 from app.link.messages import (
     Failed,
     Lead,
-    Leash,
     Load,
     Loading,
     Ready,
@@ -26,6 +25,7 @@ from app.link.messages import (
     Status,
     Tell,
     Told,
+    WaitAt,
 )
 from app.link.process import Process
 from app.link.spares import Spares
@@ -34,8 +34,11 @@ if TYPE_CHECKING:
     from lessons.teaching import lesson
 
 
+@final
 class Learner(Simulation):
     """The simulation of one browser tab, and the ghost that follows it, if there is one."""
+
+    who = "The simulation"
 
     def __init__(self, token: str, choice: SceneChoice, spares: Spares) -> None:
         self.token = token
@@ -108,8 +111,7 @@ class Learner(Simulation):
         with self._lock:
             return self.lecture if self.ready is ready else None
 
-    def _hear(self, process: Process, report: Report) -> None:
-        super()._hear(process, report)
+    def _heard(self, process: Process, report: Report) -> None:
         if process is not self._process:
             return
         self._acknowledge(report)
@@ -176,7 +178,7 @@ class Learner(Simulation):
                 return
             before = self.ghost
             self.ghost = Ghost(
-                words, own, self._spares, lambda until: self.send(Leash(until)), self._lost_ghost
+                words, own, self._spares, lambda until: self.send(WaitAt(until)), self._lost_ghost
             )
         if before is not None:
             aside(before.close)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
@@ -25,11 +26,11 @@ T = TypeVar("T")
 _COMPLAIN = 2.0  # s between two notices that commands are lost
 
 
-class Simulation:
+class Simulation(ABC):
     """Owns a process and knows what it told. Reports arrive on the process' thread; the page reads the fields
     from its own loop. `changed` counts scenes and restarts: the page rebuilds itself when it differs."""
 
-    who = "The simulation"
+    who: str
     """Begins the sentences about it."""
 
     def __init__(self, spares: Spares) -> None:
@@ -55,7 +56,12 @@ class Simulation:
     def _start(self) -> None:
         process = self._process = self._spares.take()
         self._loading = False
-        process.listen(lambda report: self._hear(process, report))
+
+        def hear(report: Report) -> None:
+            self._hear(process, report)
+            self._heard(process, report)
+
+        process.listen(hear)
 
     @property
     def pid(self) -> int | None:
@@ -104,6 +110,10 @@ class Simulation:
                     self.failure = sentence
                 case _:
                     pass
+
+    @abstractmethod
+    def _heard(self, process: Process, report: Report) -> None:
+        """What else a report leads to, whichever process it came from; on the thread of that process."""
 
     def _enter(self, ready: Ready) -> None:
         record, history = self.record, self._history

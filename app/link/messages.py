@@ -65,22 +65,22 @@ class Load:
 
 @dataclass(frozen=True)
 class Lead:
-    """Whether another process follows this one. On: the scene is reset, so that both begin together, and
-    `Script` reports tell what happens from there on."""
+    """Whether a ghost, another process, follows this one. On: the scene is reset, so that both begin
+    together, and `Script` reports tell what happens from there on."""
 
     on: bool
 
 
 @dataclass(frozen=True)
-class Leash:
-    """Simulated time, s, beyond which a leader waits for its follower."""
+class WaitAt:
+    """Simulated time, s, beyond which a leader waits for its ghost."""
 
     until: float
 
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """Where a follower begins: the leader's scene, and its settings at its last reset."""
+    """Where a ghost begins: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
     settings: Settings
@@ -88,7 +88,7 @@ class Begin:
 
 @dataclass(frozen=True, eq=False)
 class Follow:
-    """What a follower hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
+    """What a ghost hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
     they count where the script begins anew."""
 
     script: Script
@@ -113,7 +113,7 @@ Command = (
     | ResetAll
     | Load
     | Lead
-    | Leash
+    | WaitAt
     | Follow
     | Tell
     | Predict
@@ -235,7 +235,7 @@ class Failed:
 
 @dataclass(frozen=True, eq=False)
 class Script:
-    """What a leader's follower must hear.
+    """What a leader's ghost must hear.
 
     events: what the leader's log gained; t: the time the leader has come to, s; begin: begin anew from there
     before taking the events.
@@ -248,7 +248,7 @@ class Script:
 
 @dataclass(frozen=True)
 class Reached:
-    """The time a follower has come to, s."""
+    """The time a ghost has come to, s."""
 
     t: float
 

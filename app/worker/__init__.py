@@ -1,1 +1,1 @@
-"""The simulation's side: the body that runs, pacing, leader and follower."""
+"""The simulation's side: the body that runs, pacing, leader and ghost."""

@@ -1,4 +1,4 @@
-"""A simulation that another one follows: what the follower must hear, and how far it may be left behind."""
+"""A simulation that a ghost follows: what the ghost must hear, and how far it may be left behind."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from lessons.session.session import Session
 
 
 class Leader:
-    """Off until `begin`. Whoever follows hears everything that took effect since, in order."""
+    """Off until `begin`. Its ghost hears everything that took effect since, in order."""
 
     def __init__(self) -> None:
         self.on = False
-        self.leash = math.inf
+        self.until = math.inf
         self._begin: Begin | None = None
         self._told = 0
         self._t = math.nan
 
     def begin(self, choice: SceneChoice, session: Session) -> None:
-        """The session was just reset: followers begin here, and until one is there no time passes."""
-        self.on, self.leash = True, 0.0
+        """The session was just reset: its ghost begins here, and until it is there no time passes."""
+        self.on, self.until = True, 0.0
         self._begin = Begin(choice, session.settings)
         self._told = len(session.log)
 
     def end(self) -> None:
         """Nobody follows any more."""
-        self.on, self.leash = False, math.inf
+        self.on, self.until = False, math.inf
 
     def waits(self, t: float) -> bool:
-        """Whether going on to t (s) would leave the follower too far behind."""
-        return t > self.leash + 1e-9
+        """Whether going on to t (s) would leave the ghost too far behind."""
+        return t > self.until + 1e-9
 
     def script(self, session: Session) -> Script | None:
         """What is new since the last call, if anything is."""

@@ -11,7 +11,7 @@ import traceback
 from app.link.choice import SceneChoice
 from app.link.messages import Command, Failed, Follow, Load, Loading, Quit, Refused
 from app.link.wire import Wire, packed
-from app.worker.follower import follow
+from app.worker.ghost import follow
 from app.worker.pacing import Pacer
 from app.worker.simulation import Body
 from lessons.scenes.run_spec import RunSpec

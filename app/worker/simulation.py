@@ -4,7 +4,7 @@ tests drive it by hand."""
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from app.link.inside import Watch
 from app.link.messages import (
     Command,
     Lead,
-    Leash,
     Load,
     Play,
     Post,
@@ -28,13 +27,14 @@ from app.link.messages import (
     Step,
     Tell,
     Told,
+    WaitAt,
 )
 from app.link.ring import Block
 from app.worker.leader import Leader
 from app.worker.lesson.lecturer import Lecturer
 from app.worker.loaded import Loaded
 from app.worker.outlet import Outlet
-from app.worker.reports.start import Run, start
+from app.worker.reports.start import start
 from lessons.events import Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
@@ -43,29 +43,28 @@ from lessons.settings.settings import Settings
 from robots import InputError
 
 
+@final
 class Body:
     """A session, whether it plays and how fast, and the memory its telemetry goes to."""
 
-    def __init__(self, choice: SceneChoice) -> None:
-        """Raises InputError for a scene or robot that cannot be loaded."""
+    def __init__(self, choice: SceneChoice, scene: Scene | None = None, judged: bool = True) -> None:
+        """scene: instead of the choice's own; judged: a lesson's claims are, if it is a step of one. Raises
+        InputError for a scene or robot that cannot be loaded."""
+        self._judged = judged
         self.running, self.speed = True, 1.0
         self.resets, self.leader = 0, Leader()
-        self._enter(self._loaded(choice, self._load_scene(choice)))
+        self._enter(self._loaded(choice, scene or choice.scene()))
 
     def _loaded(self, choice: SceneChoice, scene: Scene) -> Loaded:
         run = start(scene, choice.run.seed)
         mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
-        return Loaded(choice.resolved(), scene, run, self._lecturer(choice, run), mine)
+        step = choice.exercise if self._judged else None
+        lecturer = None if step is None else Lecturer(step, run.session, choice.run.seed)
+        return Loaded(choice.resolved(), scene, run, lecturer, mine)
 
     def _enter(self, loaded: Loaded) -> None:
         self._outlet = Outlet(loaded.run.session)
         self._begin_anew(loaded)
-
-    def _load_scene(self, choice: SceneChoice) -> Scene:
-        return choice.scene()
-
-    def _lecturer(self, choice: SceneChoice, run: Run) -> Lecturer | None:
-        return None if choice.exercise is None else Lecturer(choice.exercise, run.session, choice.run.seed)
 
     def _begin_anew(self, loaded: Loaded) -> None:
         """A lesson's robot stands still until its script begins."""
@@ -157,8 +156,8 @@ class Body:
                 return Told(self.choice, self.session.settings_now, tuple(self.session.log), self.session.t)
             case Lead(on):
                 self._lead(on)
-            case Leash(until) if self.leader.on:
-                self.leader.leash = until
+            case WaitAt(until) if self.leader.on:
+                self.leader.until = until
             case _:
                 pass
         return None
@@ -188,7 +187,7 @@ class Body:
 
     def _load(self, choice: SceneChoice) -> Report | None:
         try:
-            loaded, before = self._loaded(choice, self._load_scene(choice)), self.block
+            loaded, before = self._loaded(choice, choice.scene()), self.block
             if loaded.looks_like(self.choice, self.session):
                 self._begin_anew(loaded)
                 return None

@@ -13,12 +13,12 @@ import pytest
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
-from app.link.messages import Lead, Leash, Load, Play, Post, ResetAll, Script
+from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
 from app.link.process import wait_until
 from app.link.spares import Spares
 from app.link.wire import Wire
 from app.server.sessions import WORKER
-from app.worker.follower import GhostBody
+from app.worker.ghost import GhostBody
 from app.worker.simulation import Body
 from lessons.events import Push, Reset, Set
 from lessons.scenes.run_spec import RunSpec
@@ -55,7 +55,7 @@ def untimed(body: Body) -> np.ndarray:
     return rows
 
 
-def test_a_shadow_has_the_rows_of_its_leader(body: Body) -> None:
+def test_a_ghost_has_the_rows_of_its_leader(body: Body) -> None:
     """From the moment of leading on, although much had been changed before."""
     body.tick(20)
     for event in (Set("horizon", 3), Set("controller", "hqp"), Set("controller", "himpc")):
@@ -72,21 +72,21 @@ def test_a_shadow_has_the_rows_of_its_leader(body: Body) -> None:
         body.handle(Post(Set("M_bar_scale", 2.0)))
         body.tick(13)
         script = script_of(body)
-        ghost.follower.hear(script.events, script.t)
+        ghost.driver.hear(script.events, script.t)
         while ghost.catch_up(0.0):
             pass
-        assert ghost.session.t == body.session.t
-        assert np.array_equal(untimed(body)[before:], untimed(ghost), equal_nan=True)
+        assert ghost.body.session.t == body.session.t
+        assert np.array_equal(untimed(body)[before:], untimed(ghost.body), equal_nan=True)
         assert body.leader.script(body.session) is None  # told once
     finally:
-        ghost.close()
+        ghost.body.close()
 
 
 def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
     body.handle(Lead(True))
     assert script_of(body).begin is not None
     assert body.leader.waits(0.001)
-    body.handle(Leash(0.5))
+    body.handle(WaitAt(0.5))
     assert not body.leader.waits(0.4) and body.leader.waits(0.6)
     body.tick(3)
     body.handle(Post(Reset()))
@@ -154,7 +154,7 @@ def test_a_ghost_begins_follows_and_ends(start: Callable[[str], Learner]) -> Non
     assert wait_until(lambda: rings() == before - 1, LONG)
     learner.send(Play(True))
     t = learner.look() or 0.0
-    assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)  # no leash is left
+    assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)  # nothing holds it back
 
 
 def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Callable[[str], Learner]) -> None:

@@ -13,7 +13,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Lead, Post, Refused
 from app.link.process import wait_until
 from app.server.server import PageServer
-from app.worker.follower import GhostBody
+from app.worker.ghost import GhostBody
 from app.worker.simulation import Body
 from browsing.wire import Wire, eventually
 from lessons.events import Reset, Set
@@ -103,11 +103,11 @@ def test_own_code_has_a_ghost_beside_it(body: Body, file: Path) -> None:
     assert begin is not None and begin.begin is not None
     for own in ("controller=himpc", f"controller={file}"):
         ghost = GhostBody(begin.begin, (own,))
-        ghost.follower.hear((), 0.1)
+        ghost.driver.hear((), 0.1)
         ghost.catch_up(np.inf)
-        assert ghost.session.settings.controller == own.partition("=")[2]
-        assert ghost.session.t == pytest.approx(0.1)
-        ghost.close()
+        assert ghost.body.session.settings.controller == own.partition("=")[2]
+        assert ghost.body.session.t == pytest.approx(0.1)
+        ghost.body.close()
 
 
 def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(body: Body, file: Path) -> None:

@@ -13,7 +13,7 @@ from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
 from app.panels.widgets.snapshot import Snapshot
-from lessons.session.follower import swapped
+from lessons.session.ghost import swapped
 from lessons.settings.presets import usual_settings
 from lessons.settings.settings import Settings
 from lessons.teaching.lesson import Ghost

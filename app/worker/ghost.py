@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import time
+from typing import final
 
-from app.link.choice import SceneChoice
 from app.link.messages import Begin, Command, Follow, Loading, Quit, Reached, Refused
 from app.link.wire import Wire
-from app.worker.reports.start import Run
 from app.worker.simulation import Body
-from lessons.scenes.scene import Scene
-from lessons.session.follower import Follower, followed
+from lessons.session.ghost import GhostDriver, ghost_scene
 from robots import InputError
 
 _POSES = 1 / 60  # s
@@ -19,27 +17,23 @@ _STATUS = 0.1  # s
 _CHUNK = 0.01  # s: the longest run before commands are looked at again
 
 
-class GhostBody(Body):
+@final
+class GhostBody:
     """A body whose session follows another's."""
 
     def __init__(self, begin: Begin, own: tuple[str, ...]) -> None:
         """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
-        self._leader, self._own = begin.settings, own
-        super().__init__(begin.choice)
-        self.follower = Follower(self.session, begin.settings, own)
-
-    def _load_scene(self, choice: SceneChoice) -> Scene:
-        return followed(super()._load_scene(choice), self._leader, self._own)
-
-    def _lecturer(self, choice: SceneChoice, run: Run) -> None:
-        """A lesson judges the robot, not its ghost."""
+        scene = ghost_scene(begin.choice.scene(), begin.settings, own)
+        # A lesson judges the robot, not its ghost.
+        self.body = Body(begin.choice, scene, judged=False)
+        self.driver = GhostDriver(self.body.session, begin.settings, own)
 
     def catch_up(self, until: float) -> bool:
         """Runs what is due, but not longer than to a moment of `perf_counter`; whether anything was."""
         ran = False
-        while self.follower.due and (not ran or time.perf_counter() < until):
-            self.tick()
-            self.follower.take()
+        while self.driver.due and (not ran or time.perf_counter() < until):
+            self.body.tick()
+            self.driver.take()
             ran = True
         return ran
 
@@ -58,29 +52,29 @@ def follow(wire: Wire, first: Follow) -> None:
                 if isinstance(command, Follow):
                     ghost = _hear(wire, ghost, command)
                     if command.script.begin is not None:
-                        reached = -1.0  # the leader waits to hear that its follower is there
+                        reached = -1.0  # the leader waits to hear that its ghost is there
             if ghost is None:
                 continue
             ran = ghost.catch_up(time.perf_counter() + _CHUNK)
-            news = ghost.news()
+            news = ghost.body.news()
             if news is not None:
                 wire.send(news)
             now = time.perf_counter()
             if now >= next_pose:
-                ghost.write_poses()
+                ghost.body.write_poses()
                 next_pose = now + _POSES
-            t = ghost.session.t
+            t = ghost.body.session.t
             if t != reached and now >= next_reached:
                 wire.send(Reached(t))
                 reached, next_reached = t, now + _REACHED
             if now >= next_status:
-                wire.send(ghost.status())
+                wire.send(ghost.body.status())
                 next_status = now + _STATUS
             if not ran:
                 wire.poll(_POSES)
     finally:
         if ghost is not None:
-            ghost.block.close()
+            ghost.body.block.close()
 
 
 def _hear(wire: Wire, ghost: GhostBody | None, command: Follow) -> GhostBody | None:
@@ -88,13 +82,13 @@ def _hear(wire: Wire, ghost: GhostBody | None, command: Follow) -> GhostBody | N
     if script.begin is not None:
         wire.send(Loading())
         if ghost is not None:
-            ghost.block.close()
+            ghost.body.block.close()
         try:
             ghost = GhostBody(script.begin, command.own)
         except InputError as error:
             wire.send(Refused(str(error)))
             return None
-        wire.send(ghost.ready())
+        wire.send(ghost.body.ready())
     if ghost is not None:
-        ghost.follower.hear(script.events, script.t)
+        ghost.driver.hear(script.events, script.t)
     return ghost

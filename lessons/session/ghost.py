@@ -1,4 +1,4 @@
-"""A second session that lives through what a first one lives through, with some settings of its own."""
+"""A ghost: a session that lives through what another one lives through, with some settings of its own."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _SAME = 1e-6
 """s: times closer than this are the same moment; ticks are further apart."""
 
 
-def followed(scene: Scene, leader: Settings, own: Sequence[str]) -> Scene:
-    """The scene that a follower runs.
+def ghost_scene(scene: Scene, leader: Settings, own: Sequence[str]) -> Scene:
+    """The scene that a ghost runs.
 
     Args:
         scene: as the leader loaded it.
@@ -33,10 +33,11 @@ def followed(scene: Scene, leader: Settings, own: Sequence[str]) -> Scene:
     return replace(_with(scene, leader, own), events=())
 
 
-class Follower:
-    """Runs up to where the leader is, and takes each event at the very tick at which the leader took it.
+class GhostDriver:
+    """Runs a ghost's session up to where the leader is, with each event at the tick at which the leader took
+    it.
 
-    The follower's settings are, at any time, the leader's with its own assignments on top: a leader that
+    The ghost's settings are, at any time, the leader's with its own assignments on top: a leader that
     changes what defines the difference changes nothing here, whatever else it changes is changed here, too.
     With no assignments the rows are the leader's to the last bit.
 
@@ -44,8 +45,8 @@ class Follower:
     """
 
     def __init__(self, session: Session, leader: Settings, own: Sequence[str]) -> None:
-        """session: of `followed`, fresh; leader: the leader's settings at the last reset, where both begin;
-        own: assignments."""
+        """session: of `ghost_scene`, fresh; leader: the leader's settings at the last reset, where both
+        begin; own: assignments."""
         self.session = session
         self._scene = session.scene
         self._leader = leader
@@ -68,7 +69,7 @@ class Follower:
 
     @property
     def due(self) -> bool:
-        """Whether the leader is at least one of the follower's control periods further."""
+        """Whether the leader is at least one of the ghost's control periods further."""
         return self.session.t + self.session.settings.T_s <= self._until + _SAME
 
     def take(self) -> None:
@@ -91,7 +92,7 @@ class Follower:
         settings = self._leader = before.after(event)
         try:
             found = _with(self._scene, settings, self._own).settings
-            # A leader that sets what it had already tells its controller all the same: so does a follower.
+            # A leader that sets what it had already tells its controller all the same: so does a ghost.
             if found != self.session.settings or settings == before:
                 self.session.adopt(found)
         except InputError as error:
@@ -99,15 +100,15 @@ class Follower:
 
 
 def swapped(settings: Settings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
-    """What leader and follower get when they change sides.
+    """What leader and ghost get when they change sides.
 
     Args:
         settings: the leader's.
-        own: the follower's assignments.
+        own: the ghost's assignments.
 
     Returns:
-        the follower's new assignments, with the leader's present values; and the events that give the leader
-        the follower's.
+        the ghost's new assignments, with the leader's present values; and the events that give the leader
+        the ghost's.
 
     Raises:
         InputError: an assignment sets more than one value, or fits nothing here.

@@ -1,4 +1,4 @@
-"""A follower lives through what its leader lives through: the same script, to the tick and to the bit."""
+"""A ghost lives through what its leader lives through: the same script, to the tick and to the bit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
-from lessons.session.follower import Follower, followed, swapped
+from lessons.session.ghost import GhostDriver, ghost_scene, swapped
 from lessons.session.torque import TorqueSession
 from robots import InputError
 
@@ -19,14 +19,14 @@ def scene() -> TorqueScene:
 
 
 class Pair:
-    """A leader that is told of events, and a follower that only hears what the leader's log says."""
+    """A leader that is told of events, and a ghost that only hears what the leader's log says."""
 
     def __init__(self, scene: TorqueScene, *own: str) -> None:
         self.leader = TorqueSession(scene)
-        other = followed(scene, scene.settings, own)
+        other = ghost_scene(scene, scene.settings, own)
         assert isinstance(other, TorqueScene)
         session = TorqueSession(other)
-        self.follower = Follower(session, scene.settings, own)
+        self.ghost = GhostDriver(session, scene.settings, own)
         self.rows: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
         self._told = 0
 
@@ -35,17 +35,17 @@ class Pair:
 
     def tell(self) -> None:
         log = self.leader.log
-        self.follower.hear(log[self._told :], self.leader.t)
+        self.ghost.hear(log[self._told :], self.leader.t)
         self._told = len(log)
 
     def follow(self) -> None:
         self.tell()
-        while self.follower.due:
+        while self.ghost.due:
             self.step()
 
     def step(self) -> None:
-        self.rows[1].append(self.follower.session.tick().copy())
-        self.follower.take()
+        self.rows[1].append(self.ghost.session.tick().copy())
+        self.ghost.take()
 
     def post(self, *events: Event) -> None:
         for event in events:
@@ -95,7 +95,7 @@ def test_equal_settings_give_equal_rows_whatever_happens(scene: TorqueScene) -> 
     led, followed = pair.compare()
     assert len(led) > 200 and pair.leader.log and not pair.leader.notices
     assert np.array_equal(led, followed, equal_nan=True)
-    assert pair.follower.session.settings == pair.leader.settings and pair.follower.behind == 0.0
+    assert pair.ghost.session.settings == pair.leader.settings and pair.ghost.behind == 0.0
 
 
 def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: TorqueScene) -> None:
@@ -110,18 +110,18 @@ def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: Torque
         pair.post(event)
         pair.lead(3)
         pair.follow()
-    own, leader = pair.follower.session.settings, pair.leader.settings
+    own, leader = pair.ghost.session.settings, pair.leader.settings
     assert own.controller == "weighted" and leader.controller == "osf"
     Q = {level.name: level.Q for level in own.levels}
     assert Q == {"position": 50, "orientation": 120, "posture": 120}
     assert own.horizon == 4 and [level.name for level in own.levels] == [
         level.name for level in leader.levels
     ]
-    assert pair.follower.session.t == pair.leader.t
+    assert pair.ghost.session.t == pair.leader.t
 
 
 def test_a_change_of_the_difference_itself_is_not_even_noticed(scene: TorqueScene) -> None:
-    """The leader turns N up and down: a follower with its own N runs as if nothing had happened."""
+    """The leader turns N up and down: a ghost with its own N runs as if nothing had happened."""
     moved, left = Pair(scene, "horizon=2"), Pair(scene, "horizon=2")
     for N in (7, 9, 3):
         moved.post(Set("horizon", N))
@@ -137,33 +137,33 @@ def test_another_period_runs_to_the_same_time_and_takes_events_then(scene: Torqu
     pair.post(Push(scene.robot.joint_names[3], (0.0, 40.0, 0.0), seconds=0.01))
     pair.lead(8)
     pair.follow()
-    assert pair.follower.session.t == pytest.approx(0.014)
-    assert [t for t, _ in pair.follower.session.log] == pytest.approx([0.008])
+    assert pair.ghost.session.t == pytest.approx(0.014)
+    assert [t for t, _ in pair.ghost.session.log] == pytest.approx([0.008])
     pair.lead(1)
     pair.follow()
-    assert pair.follower.session.t == pytest.approx(0.016) and pair.follower.behind == 0.0
+    assert pair.ghost.session.t == pytest.approx(0.016) and pair.ghost.behind == 0.0
 
 
 def test_it_never_runs_ahead_and_a_reset_brings_it_back_at_once(scene: TorqueScene) -> None:
     pair = Pair(scene)
-    assert not pair.follower.due
+    assert not pair.ghost.due
     pair.lead(50)
     pair.tell()
-    assert pair.follower.behind == pytest.approx(0.05)
+    assert pair.ghost.behind == pytest.approx(0.05)
     for _ in range(10):
-        assert pair.follower.due
+        assert pair.ghost.due
         pair.step()
     pair.post(Set("horizon", 8), Reset())
     pair.lead(4)
     pair.follow()
-    assert len(pair.rows[1]) == 14 and pair.follower.session.settings.horizon == 8
+    assert len(pair.rows[1]) == 14 and pair.ghost.session.settings.horizon == 8
     led, followed = pair.compare()
     assert np.array_equal(led[-4:], followed[-4:], equal_nan=True)
 
 
 def test_own_settings_that_do_not_fit_are_refused(scene: TorqueScene) -> None:
     with pytest.raises(InputError, match="horizon"):
-        followed(scene, scene.settings, ("horizn=3",))
+        ghost_scene(scene, scene.settings, ("horizn=3",))
 
 
 def test_changing_sides_gives_each_what_the_other_had(scene: TorqueScene) -> None:
@@ -174,8 +174,8 @@ def test_changing_sides_gives_each_what_the_other_had(scene: TorqueScene) -> Non
     for event in events:
         session.post(event)
     session.drain()
-    other = followed(scene, scene.settings, own).settings
+    other = ghost_scene(scene, scene.settings, own).settings
     assert session.settings == other and not session.notices
-    assert followed(scene, session.settings, kept).settings == scene.settings
+    assert ghost_scene(scene, session.settings, kept).settings == scene.settings
     with pytest.raises(InputError, match="level"):
         swapped(scene.settings, ("levels.position.K_p=3",))
