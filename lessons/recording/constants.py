@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from himpc.htmpc.settings import bounds
-from himpc.limits.rows import POSITION_MARGIN, reaction
+from himpc.limits import POSITION_MARGIN, reaction
 from himpc.tick.kernel.constants import RETURN_RATE
 from lessons.settings.settings import Settings
 from lessons.settings.torque import TorqueSettings
