@@ -27,5 +27,4 @@ VELOCITY_CONTROLLERS: dict[str, str] = {
 """Velocity level."""
 
 Route = Literal["compiled", "explicit"]
-ROUTES: tuple[Route, ...] = ("compiled", "explicit")
 """How a tick is computed: by the kernel, or with all rows as printed."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@final
 class Configuration:
     """Frames and Jacobians at the measured q_k and at the knots q*_{k+j|k−1}, j = 1 … N−1.
 
@@ -34,6 +35,8 @@ class Configuration:
         v: measured joint velocities, (n,).
         knots: predicted joint positions at knots 1 … N−1, (N−1, n); empty for N = 1.
         previews: references by task, for tasks whose coordinates depend on where their target is.
+        jacobians, placed: by a frame's name its Jacobians (N, 6, n), or its placement at q_k, of whoever
+            knows them already.
     """
 
     def __init__(
@@ -44,6 +47,9 @@ class Configuration:
         v: Array,
         knots: Array | Sequence[Array] = (),
         previews: Mapping[str, Preview] = MappingProxyType({}),
+        *,
+        jacobians: Callable[[str], Array] | None = None,
+        placed: Callable[[str], pin.SE3] | None = None,
     ) -> None:
         self.robot = robot
         self.q = q
@@ -52,11 +58,14 @@ class Configuration:
         self.previews = previews
         self.horizon = len(knots) + 1
         self._data = data
+        self._known, self._placed = jacobians, placed
         self._jacobians: dict[str, Array] = {}
         self._placements: dict[str, list[pin.SE3]] = {}
 
     def frame_jacobians(self, frame: str = "") -> Array:
         """(N, 6, n) frame Jacobians, linear over angular, world axes, at the frame's origin."""
+        if self._known is not None:
+            return self._known(frame)
         found = self._jacobians.get(frame)
         if found is None:
             model, data = self.robot.model, self._data
@@ -74,7 +83,7 @@ class Configuration:
 
     def placement(self, frame: str = "") -> pin.SE3:
         """Placement of a frame in the world at the measured state."""
-        return self.placements(frame)[0]
+        return self.placements(frame)[0] if self._placed is None else self._placed(frame)
 
     def placements(self, frame: str = "") -> list[pin.SE3]:
         """Placements of a frame in the world at every knot; the first is the measured state's."""

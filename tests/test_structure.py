@@ -216,6 +216,61 @@ def asks_for_kind(path: Path) -> bool:
     return False
 
 
+EXTENDED = ("himpc/controllers/himpc.py:HIMPC", "himpc/htmpc/htmpc.py:HTMPC")
+"""The papers tell their relatives (HIQP, NHIMPC, …; STMPC, HTMPC_WPT) by what they change in them."""
+
+
+def test_classes_are_abstract_or_final() -> None:
+    """Who is subclassed here lacks a method, or says that it is a base; nothing else is extended."""
+    classes = {(path, each.name): each for path in sources(*ORDER[:-1]) for each in classes_of(path)}
+    lines: dict[tuple[Path, str], list[tuple[Path, str]]] = {}
+    for path, name in classes:
+        modules = origins(path)
+        for word in words_of(classes[path, name].bases):
+            own = [key for key in classes if key[1] == word and (key[0] == path or word not in modules)]
+            far = [key for key in classes if key[1] == word and stands_in(key[0], modules.get(word, ""))]
+            lines.setdefault((path, name), []).extend(far or [key for key in own if key[0] == path])
+    extended = {base for bases in lines.values() for base in bases}
+    assert len(extended) > 10, "the test sees nothing any more"
+
+    def missing(key: tuple[Path, str]) -> set[str]:
+        body = classes[key].body
+        own = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
+        abstract = {name for name, each in own.items() if "abstractmethod" in words_of(each.decorator_list)}
+        return {m for base in lines.get(key, ()) for m in missing(base) if m not in own} | abstract
+
+    concrete = {
+        f"{path.relative_to(ROOT)}:{name}"
+        for path, name in extended
+        if not missing((path, name)) and not {"ABC", "Protocol"} & set(words_of(classes[path, name].bases))
+    }
+    assert concrete == set(EXTENDED)
+    said = {path for path in sources(*ORDER[:-1]) if "NotImplementedError" in path.read_text()}
+    assert said == set()
+
+
+def classes_of(path: Path) -> list[ast.ClassDef]:
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ClassDef)]
+
+
+def words_of(nodes: list[ast.expr]) -> list[str]:
+    """The last word of each name, subscripts left out."""
+    plain = [node.value if isinstance(node, ast.Subscript) else node for node in nodes]
+    return [str(getattr(node, "id", getattr(node, "attr", ""))) for node in plain]
+
+
+def origins(path: Path) -> dict[str, str]:
+    """Where the names of a file come from."""
+    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)]
+    return {alias.asname or alias.name: str(node.module) for node in nodes for alias in node.names}
+
+
+def stands_in(path: Path, module: str) -> bool:
+    """Whether a file is that module, or one that the package of that name hands on."""
+    dotted = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    return bool(module) and within(dotted, module)
+
+
 def test_files_stay_readable() -> None:
     """No file of the packages is longer than 300 lines."""
     long = {

@@ -16,7 +16,6 @@ UNICYCLE = (
     "base is 'unicycle': its G(q) depends on the heading, and the condensed prediction needs G = I; "
     "describe a holonomic base by two prismatic joints and one revolute joint instead"
 )
-BASES: tuple[Base, ...] = ("holonomic", "unicycle")
 
 
 def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:

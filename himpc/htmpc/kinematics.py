@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import pinocchio as pin
@@ -61,38 +60,22 @@ class Knots:
         return found
 
     @cached_property
-    def _path(self) -> Path:
-        return Path(self._robot, self._data, self._q, self._frame)
+    def _path(self) -> Configuration:
+        """All knots as one configuration; only Jacobians are asked of it."""
+        robot, data, q = self._robot, self._data, self._q
+        return Configuration(robot, data, q[0], q[0], q[1:], jacobians=lambda frame: self._frame(frame).J)
 
     @cached_property
-    def _knots(self) -> list[Knot]:
+    def _knots(self) -> list[Configuration]:
+        """One configuration per knot; only positions are asked of them."""
         every = enumerate(self._q)
-        return [Knot(self._robot, self._data, q, self._frame, k) for k, q in every]
+        return [
+            Configuration(self._robot, self._data, q, q, placed=partial(self._placement, k)) for k, q in every
+        ]
 
-
-class Path(Configuration):
-    """All knots as one configuration; only Jacobians are asked of it."""
-
-    def __init__(self, robot: Robot, data: pin.Data, q: Array, frame: Callable[[str], Frames]) -> None:
-        super().__init__(robot, data, q[0], q[0], q[1:])
-        self._frame = frame
-
-    def frame_jacobians(self, frame: str = "") -> Array:
-        return self._frame(frame).J
-
-
-class Knot(Configuration):
-    """One knot; only positions are asked of it."""
-
-    def __init__(
-        self, robot: Robot, data: pin.Data, q: Array, frame: Callable[[str], Frames], place: int
-    ) -> None:
-        super().__init__(robot, data, q, q)
-        self._frame, self._place = frame, place
-
-    def placement(self, frame: str = "") -> pin.SE3:
+    def _placement(self, knot: int, frame: str) -> pin.SE3:
         found = self._frame(frame)
-        return pin.SE3(found.R[self._place], found.p[self._place])
+        return pin.SE3(found.R[knot], found.p[knot])
 
 
 def desired_values(task: Task, preview: Preview, N: int) -> Desired:

@@ -18,12 +18,8 @@ class JointState(NamedTuple):
     v: Array
     a: Array
 
-    def free_velocity(self, N: int, T_s: float) -> Array:
-        """q̇ at knots 1 … N for Δτ = 0, (N, n): (18) then keeps q̈ constant."""
-        return self.v + self.gained_velocity(N, T_s)
-
     def gained_velocity(self, N: int, T_s: float) -> Array:
-        """q̇ at knots 1 … N minus q̇_k, for Δτ = 0, (N, n)."""
+        """q̇ at knots 1 … N minus q̇_k, for Δτ = 0, (N, n): (18) then keeps q̈ constant."""
         return _steps(N, T_s) * self.a
 
     def free_position(self, N: int, T_s: float) -> Array:

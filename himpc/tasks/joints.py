@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, final
 
 import numpy as np
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Joints(Task):
-    """x = some joint positions (level 3 of Table IV: q₁). J is a constant selection matrix.
+class OnJoints(Task):
+    """x = some joint positions. J is a constant selection matrix.
 
     Attributes:
         joints: joint names; empty means all of them (a posture task).
@@ -34,20 +34,31 @@ class Joints(Task):
     def value(self, configuration: Configuration) -> Array:
         return configuration.q[configuration.joint_indices(self.joints)]
 
-    def error(self, value: Array, desired: Array) -> Array:
-        return value - desired
-
     def jacobian(self, configuration: Configuration) -> Array:
         return configuration.joint_jacobians(self.joints)
 
 
+@final
 @dataclass(frozen=True, kw_only=True)
-class Posture(Joints):
+class Joints(OnJoints):
+    """Some joints towards their values (level 3 of Table IV: q₁)."""
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return value - desired
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Posture(OnJoints):
     """All joints towards one posture."""
 
+    def error(self, value: Array, desired: Array) -> Array:
+        return value - desired
 
+
+@final
 @dataclass(frozen=True, kw_only=True)
-class Damping(Joints):
+class Damping(OnJoints):
     """All joints, K_p = 0: the residual of (4) is q̈ + K_v q̇, so what nothing else controls comes to rest.
 
     R in (31) weighs Δτ only: the torque of an untasked direction is frozen, not damped, and a push

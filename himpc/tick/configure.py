@@ -16,6 +16,7 @@ from himpc.references import Preview, Reference
 from himpc.references.curve import curve_of
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
 from himpc.tasks.frame import AXES, FrameTask
+from himpc.tasks.joints import OnJoints
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
@@ -173,7 +174,7 @@ def _write_task(
         kind = kinematics.ORIENTATION if isinstance(task, FrameOrientation) else kinematics.POSITION
         frame, part = frames.index(task.frame or robot.tip), [AXES.index(axis) for axis in task.axes]
     else:
-        assert isinstance(task, Joints)
+        assert isinstance(task, OnJoints)
         kind = kinematics.DAMPING if isinstance(task, Damping) else kinematics.JOINTS
         frame, part = 0, joint_indices(robot, task.joints)
     arena.i["task"][place] = kind, frame, span.start, span.stop - span.start

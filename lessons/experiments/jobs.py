@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,8 @@ _KEPT_BY: Mapping[type[Session], tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Job:
-    """One run. A subclass may run something else: see `do`.
+class Work(ABC):
+    """Something that ends in a run.
 
     Attributes:
         spec: what is run.
@@ -44,8 +45,17 @@ class Job:
     spec: RunSpec
     timed: bool = False
 
+    @abstractmethod
     def do(self) -> Run:
         """The run. Raises InputError for what cannot be."""
+
+
+@final
+@dataclass(frozen=True)
+class Job(Work):
+    """One run, as `himpc-lab run` does it."""
+
+    def do(self) -> Run:
         recording = run(self.spec.prepared(), None, self.spec.seed)
         return Run(self, summary(recording), _arrays(recording))
 
@@ -57,7 +67,7 @@ class Run:
     A run that failed has an `error`, an empty summary and no arrays; figures of it are NaN.
     """
 
-    job: Job
+    job: Work
     summary: Mapping[str, Any]
     arrays: Mapping[str, Array]
     error: str | None = None
@@ -109,10 +119,11 @@ class Run:
         return self.figure("tasks", place, measure, coordinate) if place >= 0 else float("nan")
 
 
-Results = Mapping[Job, Run]
+Results = Mapping[Any, Run]
+"""By the job."""
 
 
-def _do(job: Job) -> Run:
+def _do(job: Work) -> Run:
     return job.do()
 
 
@@ -122,7 +133,7 @@ def _arrays(recording: Recording) -> dict[str, Array]:
     return {name: np.ascontiguousarray(recording[name]) for name in names}
 
 
-def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = None) -> Results:
+def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None = None) -> Results:
     """Does jobs, equal ones once: on all cores, then the timed ones one after the other in this process.
 
     Args:
@@ -137,7 +148,7 @@ def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = 
     shared = [job for job in unique if not job.timed]
     timed = [job for job in unique if job.timed]
     total = sum(map(_work, unique))
-    found: dict[Job, Run] = {}
+    found: dict[Work, Run] = {}
     done = 0.0
     for batch, spread in ((shared, on_cores), (timed, one_by_one)):
         with closing(spread(_do, batch)) as outcomes:
@@ -150,7 +161,7 @@ def perform_all(jobs: Iterable[Job], progress: Callable[[float], None] | None = 
     return found
 
 
-def _work(job: Job) -> float:
+def _work(job: Work) -> float:
     """A guess of a job's cost, to order jobs and to show progress."""
     spec = job.spec
     horizons = [float(each.partition("=")[2]) for each in spec.set if each.startswith("horizon=")]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from lessons.experiments.jobs import Job, Results
+from lessons.experiments.jobs import Results, Work
 from lessons.plots.panels import Picture
 
 CLOSE = 0.10
@@ -157,18 +157,13 @@ class Item:
     name: str
     title: str
     source: str
-    jobs: Callable[[bool], tuple[Job, ...]]
+    jobs: Callable[[bool], tuple[Work, ...]]
     report: Callable[[Results, bool], Section]
 
 
 def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> Check:
     """The check that a value is at most a limit; NaN is not."""
     return Check(f"{text} ≤ {limit:g}", value, bool(value <= limit), band)
-
-
-def at_least(text: str, value: float, limit: float, band: float | None = CLOSE) -> Check:
-    """The check that a value is at least a limit; NaN is not."""
-    return Check(f"{text} ≥ {limit:g}", value, bool(value >= limit), band)
 
 
 def between(text: str, value: float, low: float, high: float, band: float | None = CLOSE) -> Check:

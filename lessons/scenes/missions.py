@@ -17,7 +17,6 @@ from lessons.settings.missions import (
     CLUTTER,
     ClutteredOptions,
     DeliveryOptions,
-    HandoverOptions,
     MissionOptions,
     SquareOptions,
     Stay,
@@ -69,7 +68,8 @@ def _among_people(scene: VelocityScene) -> VelocityScene:
 
 
 def _handover() -> VelocityScene:
-    """The ball is taken after 14 s; meanwhile the second person moves, and shifts the hand later on."""
+    """Every ball waits until it is taken, the first one after 14 s; meanwhile the second person moves, and
+    shifts the hand later on."""
     events = (
         (8.0, MoveTarget("base 2", (-1.2, -0.4))),
         (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),
@@ -77,7 +77,8 @@ def _handover() -> VelocityScene:
         (17.5, MoveTarget("ee 2", (-1.9, -0.4, 1.0))),
         (24.0, Release("ee 2")),
     )
-    return _among_people(_ridgeback("ridgeback-ur10-handover", HandoverOptions(), 60.0, events))
+    options = DeliveryOptions(seats=(1, 3), rounds=1, hold_s=None)
+    return _among_people(_ridgeback("ridgeback-ur10-handover", options, 60.0, events))
 
 
 def _cluttered() -> VelocityScene:

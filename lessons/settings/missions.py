@@ -251,15 +251,6 @@ def _visit(role: str, number: int) -> str:
     return f"{role} {number}"
 
 
-@dataclass(frozen=True)
-class HandoverOptions(DeliveryOptions):
-    """The start of a delivery round in which every ball waits until it is taken (event Release)."""
-
-    seats: tuple[float, ...] = (1, 3)
-    rounds: Annotated[int, Range(1, MAX_VISITS)] = 1
-    hold_s: float | None = None
-
-
 CLUTTER: tuple[Obstacle, ...] = (
     Floor(),
     Box("table", (2.0, 0.95, 0.4), (1.2, 0.5, 0.8)),

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run, Work
 from lessons.papers.himpc_paper.effort import EffortJob
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET
 from lessons.papers.himpc_paper.planar import RT1
@@ -173,7 +173,7 @@ def _effort_job(effort: str, R: float, reference: str) -> EffortJob:
     )
 
 
-def _effort_jobs(quick: bool) -> tuple[Job, ...]:
+def _effort_jobs(quick: bool) -> tuple[EffortJob, ...]:
     return tuple(_effort_job(e, R, r) for e in _EFFORTS for R in _WEIGHTS[quick] for r in _REFERENCES)
 
 
@@ -241,7 +241,7 @@ def _section_4c(results: Results, quick: bool) -> Section:
 # -------------------------------------------------------------------------------- all
 
 
-def _jobs(quick: bool) -> tuple[Job, ...]:
+def _jobs(quick: bool) -> tuple[Work, ...]:
     return (
         *(_shorter(knots, timed) for knots in _SHORTER[quick] for timed in (False, True)),
         *(_period_job(scene, ms) for scene in _SCENES[quick] for ms in _PERIODS),

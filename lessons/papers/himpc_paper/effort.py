@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from himpc.configuration import Configuration
 from himpc.controllers.forms import StackForm, measure, stack_form
 from himpc.references import Preview
 from himpc.references.hold import still
-from lessons.experiments.jobs import Job, Run
+from lessons.experiments.jobs import Run, Work
 from lessons.scenes.catalog import prepared, torque_scene
 from robots import Plant
 
@@ -23,8 +23,9 @@ _LOST = 0.5
 """m or rad: an error above this is loss of control."""
 
 
+@final
 @dataclass(frozen=True)
-class EffortJob(Job):
+class EffortJob(Work):
     """A scene's tasks in one cost, one step ahead, no bounds, no priorities: the least the argument needs.
 
     min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental system and
@@ -41,7 +42,7 @@ class EffortJob(Job):
     hold_deg: tuple[float, ...] = ()
 
     def do(self) -> Run:
-        """The run; see `Job.do`."""
+        """The run; see `Work.do`."""
         scene = prepared(torque_scene(self.spec.scene), self.spec.controller, self.spec.set)
         robot, T_s = scene.robot, scene.settings.T_s
         form = stack_form(robot, scene.settings.levels, replace(scene.settings.for_controller(), horizon=1))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import gaussian_kde
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, Results, Run, Work
 from lessons.papers.htmpc_paper.runs import (
     EE_HOME,
     METHODS,
@@ -184,7 +184,7 @@ def _line(words: str, runs: list[Run], errors: tuple[Array, Array], authors: flo
     return (words, *(number(float(x)) for x in means), f"{1 - errors[1].mean() / authors:.0%}")
 
 
-def collinear(job: Job) -> bool:
+def collinear(job: Work) -> bool:
     """Whether peak, valley (the origin) and the EE's home lie on a line, as in the paper's Fig. 7."""
     peak = np.array(job.spec.set[0].partition("=")[2].strip("[]").split(","), float)
     a, b = peak - EE_HOME, -EE_HOME
