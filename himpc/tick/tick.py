@@ -121,6 +121,10 @@ class CompiledTick:
             by_row = np.broadcast_to(share, level.root_Q.shape)
             write_effects(self.arena, level.rows, by_row * level.root_Q, by_row[:, None] * level.weighted_C)
 
+    def take_M_bar(self, M_bar: Array) -> None:
+        """The diagonal of M̄ from now on, (n,) kg·m²."""
+        self.arena.f["M_bar"][:] = M_bar
+
     def problems(self) -> list[LevelProblem]:
         """The data of every level at the last tick, copied; none before the first one."""
         if not self._looked:
@@ -242,6 +246,7 @@ class CompiledTick:
             iterations=iterations,
             fill=self._fill,
             at_once=self._at_once,
+            M_bar=self.arena.f["M_bar"].copy() if self._settings.M_bar_adapt else None,
         )
 
     def _evidence(self, rungs: Sequence[tuple[Rung, float]]) -> Evidence:
