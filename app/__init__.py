@@ -6,7 +6,7 @@ A dragged target on its way down:
 2. `view/reachability`, on a thread of its own, finds what can be reached; `view/drag` posts a `MoveTarget`.
 3. `client/learner` puts it into `link/outbox`, which never waits; its thread writes to `link/wire`.
 4. `worker/main` reads it and hands it to `worker/simulation`, which puts it into the session's mailbox.
-5. The session empties its mailbox when the next tick begins.
+5. The session (`lessons/session/session.py`) empties its mailbox when the next tick begins.
 
 A row of telemetry on its way up:
 1. A tick of the session returns it; `worker/simulation` writes it into `link/ring`, memory of both sides.

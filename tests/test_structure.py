@@ -102,6 +102,19 @@ def test_the_way_through_app_names_files_that_are_there() -> None:
     assert {name for name in named if not (ROOT / "app" / f"{name}.py").exists()} == set()
 
 
+def test_contributing_names_what_is_there() -> None:
+    """Its walks and recipes are about files and functions of this tree."""
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    paths = {each for each in re.findall(r"`([\w./]+/[\w./]*)`", text) if "NAME" not in each}
+    paths |= set(re.findall(r"\btests/[\w/]+(?:\.py)?", text))
+    assert len(paths) > 20
+    assert {each for each in paths if not (ROOT / each).exists()} == set()
+    walks = re.findall(r"`([\w.]+)` in `([\w./]+)`", text)
+    assert walks
+    for name, file in walks:
+        assert f"def {name.rpartition('.')[2]}(" in (ROOT / file).read_text()
+
+
 @pytest.mark.parametrize("folder", APP)
 def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
     """commands → server → page → panels → view → client → link ← worker, never back and never across."""
@@ -114,6 +127,48 @@ def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
         if within(name, "app") and name.split(".")[1] not in (folder, *APP[folder])
     }
     assert not wrong
+
+
+LESSONS = {
+    "events": (),
+    "settings": ("events",),
+    "scenes": ("settings", "events"),
+    "session": ("scenes", "settings", "events"),
+    "recording": ("session", "scenes", "settings", "events"),
+    "geometry": ("session",),
+    "teaching": ("recording", "scenes", "settings", "events", "parallel"),
+    "experiments": ("recording", "session", "scenes", "settings", "events", "parallel", "plots"),
+    "course": ("teaching", "events"),
+    "exercises": ("teaching", "recording", "session", "scenes", "events", "parallel"),
+    "replay": ("course", "scenes", "settings", "events"),
+    "papers": ("replay", "experiments", "scenes", "settings", "plots"),
+    "plots": (),
+    "parallel": (),
+}
+"""What each part of lessons/ may import beside itself and `own`: files of a learner's own stand in for
+settings, scenes, sessions and lessons alike, so that folder is on nobody's side."""
+
+
+@pytest.mark.parametrize("part", LESSONS)
+def test_lessons_are_built_in_one_direction(part: str) -> None:
+    """settings, events ← scenes ← session ← recording ← teaching, experiments ← course, papers."""
+    path = ROOT / "lessons" / f"{part}.py"
+    files = [path] if path.exists() else sources(f"lessons/{part}")
+    assert files
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, "lessons") and name.split(".")[1] not in (part, "own", *LESSONS[part])
+    }
+    assert not wrong
+
+
+def test_lessons_have_no_other_parts() -> None:
+    """Beside these there are only what is one's own, examples to begin with, and names of before."""
+    places = [each for each in (ROOT / "lessons").iterdir() if each.stem[0] not in "._"]
+    parts = {each.stem for each in places if each.is_dir() or each.suffix == ".py"}
+    assert parts - set(LESSONS) == {"own", "examples", "headless", "kinds", "mobile"}
 
 
 NO_PICTURE = ("worker", "link", "client", "html")

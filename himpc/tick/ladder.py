@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from time import perf_counter_ns
 
 import numpy as np
@@ -26,20 +25,8 @@ _ITERATIONS = 100
 """What DAQP may take then, at each of at most two attempts: together a matter of milliseconds."""
 
 
-@dataclass
-class Asks:
-    """How often the printed QP may still be asked in this tick."""
-
-    left: int = 3
-
-    @property
-    def spared(self) -> bool:
-        """Whether so few were needed that all levels may be solved once more."""
-        return self.left >= 2
-
-
 def solve_levels(
-    arena: Arena, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None], asks: Asks
+    arena: Arena, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None]
 ) -> list[tuple[Rung, float]]:
     """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
     on and its time, microseconds.
@@ -51,7 +38,6 @@ def solve_levels(
         arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.
         kinds: of the rows.
         damped: the increments of the damping level alone under torque rows.
-        asks: of this tick; what is asked is taken off.
     """
     found: list[tuple[Rung, float]] = []
     calm: list[Array | None] = []
@@ -65,7 +51,7 @@ def solve_levels(
     for place in range(int(arena.i["sizes"][4])):
         started = perf_counter_ns()
         solved = solve(*arena.arguments, place, 0.0)
-        rung = "solve" if solved else _climb_down(arena, place, kinds, damped_once, asks)
+        rung = "solve" if solved else _climb_down(arena, place, kinds, damped_once)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = RUNGS.index(rung), time_us
         found.append((rung, time_us))
@@ -73,11 +59,11 @@ def solve_levels(
 
 
 def _climb_down(
-    arena: Arena, place: int, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None], asks: Asks
+    arena: Arena, place: int, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None]
 ) -> Rung:
     f = arena.f
     rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
-    point = _as_printed(arena, place, rows, asks)
+    point = _as_printed(arena, place, rows)
     if point is not None:
         _put(arena, place, point)
         return "solve"
@@ -92,7 +78,7 @@ def _climb_down(
     if widened is not None:
         _write(arena, widened)
         solved = bool(solve(*arena.arguments, place, 0.0))
-        point = None if solved else _as_printed(arena, place, widened, asks)
+        point = None if solved else _as_printed(arena, place, widened)
         if point is not None:
             _put(arena, place, point)
         if solved or point is not None:
@@ -106,12 +92,11 @@ def _climb_down(
     return rung
 
 
-def _as_printed(arena: Arena, place: int, rows: Rows, asks: Asks) -> Point | None:
-    """The level's optimum by the printed route, if that is a small matter and not done too often already."""
+def _as_printed(arena: Arena, place: int, rows: Rows) -> Point | None:
+    """The level's optimum by the printed route, if that is a small matter."""
     N, n = arena.f["U"][place].shape
-    if N * n > _SMALL or asks.left <= 0:
+    if N * n > _SMALL:
         return None
-    asks.left -= 1
     alone = bool(arena.i["level"][place, ALONE])
     upper = [] if alone else [printed_problem(arena, p).B for p in range(place)]
     U_above = np.zeros((N, n)) if alone or not place else arena.f["U"][place - 1]
