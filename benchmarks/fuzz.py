@@ -107,6 +107,7 @@ def event(rng: np.random.Generator, session: TorqueSession) -> Event:
         Set("horizon", int(rng.integers(1, max(2, min(30, _KNOTS // robot.n))))),
         Set("T_s", float(10.0 ** rng.uniform(-4, -1.7))),
         Set("M_bar_scale", size),
+        Set("M_bar_adapt", chance < 0.7),
         Set("Q", 200.0 * size),
         Set("R", 10.0 * size),
         Set(f"levels.{level}.enabled", chance < 0.5),

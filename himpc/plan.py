@@ -74,6 +74,7 @@ class Plan:
         fill: writes what it knows into a row of telemetry at once, references included; returns False if it
             cannot. None: field by field.
         at_once: what the levels do now, from the numbers at hand; None: see `levels`.
+        M_bar: diagonal of the M̄ it was made with, (n,) kg·m²; None: the one that was set.
     """
 
     tau: Array
@@ -86,6 +87,7 @@ class Plan:
     notice: str | None = None
     fill: Callable[[Array, Layout], bool] | None = None
     at_once: Callable[[], AtOnce] | None = None
+    M_bar: Array | None = None
 
     def freeze(self) -> Plan:
         """The same plan, whose numbers are its own from now on."""

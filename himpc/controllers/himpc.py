@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from time import perf_counter_ns
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.adaptation import Adaptation, measured
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
 from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, stack_form, usable
 from himpc.controllers.memory import Memory
+from himpc.controllers.period import Found, Tick
 from himpc.controllers.settings import Settings
 from himpc.limits import Limits, LimitsInForce, Rows, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
@@ -31,26 +32,6 @@ Array = NDArray[np.float64]
 ENABLE_SECONDS = 0.5
 _FAINTEST = 1e-8
 """A task switched on starts with this share of its Q and gains decades at a constant rate."""
-
-
-class Tick(NamedTuple):
-    """What one control period starts from; `values` and `errors` are filled while it is solved."""
-
-    state: JointState
-    memory: Memory
-    previews: Mapping[str, Preview]
-    rows: Rows
-    values: dict[str, Array]
-    errors: dict[str, Array]
-
-
-class Found(NamedTuple):
-    """What one control period found: levels, ẋ_k of all rows, q at knots 0 … N, how many cascades it took."""
-
-    solutions: list[LevelSolution]
-    x_dot: Array
-    predicted_q: Array
-    iterations: int = 1
 
 
 class HIMPC:
@@ -91,14 +72,18 @@ class HIMPC:
             self.kernel.forget()
         unbounded = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
         self._limits = unbounded
+        self._adaptation: Adaptation | None = None
         self._weight: dict[str, float] = {}
 
     def configure(self, settings: Settings) -> None:
         """Takes new settings at once. If they do not fit the robot: InputError, and nothing changes."""
         before = [about(task) for task in self._form.tasks]
+        same = settings.M_bar == self._settings.M_bar and settings.T_s == self._settings.T_s
+        measured_so_far = self._adaptation if same and settings.M_bar_adapt else None
         if self.kernel is not None:
             self._memory = self.kernel.memory
         self._apply(settings)
+        self._adaptation = measured_so_far
         if self.kernel is not None and self._memory is not None:
             self.kernel.recall(self._memory, self._memory.q, self._memory.v)
         self._weight = {name: weight for name, weight in self._weight.items() if weight < 1.0}
@@ -109,7 +94,8 @@ class HIMPC:
 
     def _apply(self, settings: Settings) -> None:
         self._form, self._idle, self._off = prepare(self.robot, settings)
-        self._M_bar = np.array(settings.M_bar)
+        self._M_bar_set = np.array(settings.M_bar)
+        self._M_bar = self._M_bar_set
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
         # No joint gives more: a reading beyond it is wrong, and must not pass for a bound to come down from.
@@ -142,6 +128,8 @@ class HIMPC:
         settings, T_s, N = self._settings, self._settings.T_s, self._settings.horizon
         if not usable(q) or not usable(v):
             return self._hold(q, started)
+        if settings.M_bar_adapt:
+            self._adapt(v)
         if self.kernel is not None:
             return self._step_compiled(self.kernel, q, v, previews, started)
         memory = self._memory or Memory.start(q, v, T_s)
@@ -173,6 +161,7 @@ class HIMPC:
             unsolved=sum(solution.rung != "solve" for solution in solutions),
             find_evidence=lambda: evidence,
             iterations=found.iterations,
+            M_bar=self._M_bar if settings.M_bar_adapt else None,
         )
         self._tau_0 = tau
         return plan
@@ -197,6 +186,14 @@ class HIMPC:
             return self._hold(q, started)
         self._tau_0 = plan.tau
         return plan
+
+    def _adapt(self, v: Array) -> None:
+        """M̄ from what the last period's torque did."""
+        before = self._adaptation or Adaptation.start(v, self._tau_0)
+        self._adaptation = measured(before, v, self._tau_0, self._settings.T_s, self._M_bar_set)
+        self._M_bar = self._adaptation.factor * self._M_bar_set
+        if self.kernel is not None:
+            self.kernel.take_M_bar(self._M_bar)
 
     def _search(self, tick: Tick) -> Found | None:
         """The plan along the previous prediction (30); None if the state's consequences are not finite."""
@@ -276,7 +273,7 @@ class HIMPC:
     def _hold(self, q: Array, started: int) -> Plan:
         """The plan for a tick without a usable state: keep the torque, forget the memory."""
         N, n = self._settings.horizon, self.robot.n
-        self._memory = None
+        self._memory = self._adaptation = None
         if self.kernel is not None:
             self.kernel.forget()
         limits: LimitsInForce = self._limits

@@ -107,6 +107,8 @@ class OneStepController(ABC):
         self._adopt(settings)
         self._form, self._idle, self._off = prepared
         self._goal = in_force(self.robot, settings.limits)
+        most = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
+        self._reach = most if self.clips else np.full(self.robot.n, np.inf)
         known = all(is_built_in(task) for task in (*self._form.tasks, *self._off))
         self._kinematics = Kinematics(self.robot, self._form, self._off) if known else None
         self._settings = settings
@@ -138,7 +140,8 @@ class OneStepController(ABC):
         """
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):
-            self._tau_0 = np.array(tau_applied, float)
+            # Where torque is bounded, a reading beyond what a joint gives is wrong, see `HIMPC`.
+            self._tau_0 = np.minimum(np.maximum(tau_applied, -self._reach), self._reach)
         if not (usable(q) and usable(v)):
             return self._hold(q, "state not finite", started)
         T_s = self._settings.T_s

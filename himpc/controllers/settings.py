@@ -26,6 +26,8 @@ class Settings:
         horizon: N ≥ 1 knots; 1 is HIQP.
         T_s: control period, s.
         M_bar: diagonal of M̄, one per joint, kg·m².
+        M_bar_adapt: himpc, hiqp, nhimpc and weighted raise M̄ by a factor that they find from measured Δτ and
+            Δq̈, see `himpc.adaptation`.
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (all rows as printed).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
@@ -36,6 +38,7 @@ class Settings:
 
     stack: Stack
     M_bar: Annotated[tuple[float, ...], Range(0.0, above=True)]
+    M_bar_adapt: bool = False
     horizon: Horizon = 5
     T_s: Period = 1e-3
     limits: Limits = field(default_factory=Limits)

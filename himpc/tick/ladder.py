@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from time import perf_counter_ns
 
 import numpy as np
@@ -25,8 +26,20 @@ _ITERATIONS = 100
 """What DAQP may take then, at each of at most two attempts: together a matter of milliseconds."""
 
 
+@dataclass
+class Asks:
+    """How often the printed QP may still be asked in this tick."""
+
+    left: int = 3
+
+    @property
+    def spared(self) -> bool:
+        """Whether so few were needed that all levels may be solved once more."""
+        return self.left >= 2
+
+
 def solve_levels(
-    arena: Arena, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None]
+    arena: Arena, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None], asks: Asks
 ) -> list[tuple[Rung, float]]:
     """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
     on and its time, microseconds.
@@ -38,6 +51,7 @@ def solve_levels(
         arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.
         kinds: of the rows.
         damped: the increments of the damping level alone under torque rows.
+        asks: of this tick; what is asked is taken off.
     """
     found: list[tuple[Rung, float]] = []
     calm: list[Array | None] = []
@@ -51,7 +65,7 @@ def solve_levels(
     for place in range(int(arena.i["sizes"][4])):
         started = perf_counter_ns()
         solved = solve(*arena.arguments, place, 0.0)
-        rung = "solve" if solved else _climb_down(arena, place, kinds, damped_once)
+        rung = "solve" if solved else _climb_down(arena, place, kinds, damped_once, asks)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = RUNGS.index(rung), time_us
         found.append((rung, time_us))
@@ -59,11 +73,11 @@ def solve_levels(
 
 
 def _climb_down(
-    arena: Arena, place: int, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None]
+    arena: Arena, place: int, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None], asks: Asks
 ) -> Rung:
     f = arena.f
     rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
-    point = _as_printed(arena, place, rows)
+    point = _as_printed(arena, place, rows, asks)
     if point is not None:
         _put(arena, place, point)
         return "solve"
@@ -78,7 +92,7 @@ def _climb_down(
     if widened is not None:
         _write(arena, widened)
         solved = bool(solve(*arena.arguments, place, 0.0))
-        point = None if solved else _as_printed(arena, place, widened)
+        point = None if solved else _as_printed(arena, place, widened, asks)
         if point is not None:
             _put(arena, place, point)
         if solved or point is not None:
@@ -92,11 +106,12 @@ def _climb_down(
     return rung
 
 
-def _as_printed(arena: Arena, place: int, rows: Rows) -> Point | None:
-    """The level's optimum by the printed route, if that is a small matter."""
+def _as_printed(arena: Arena, place: int, rows: Rows, asks: Asks) -> Point | None:
+    """The level's optimum by the printed route, if that is a small matter and not done too often already."""
     N, n = arena.f["U"][place].shape
-    if N * n > _SMALL:
+    if N * n > _SMALL or asks.left <= 0:
         return None
+    asks.left -= 1
     alone = bool(arena.i["level"][place, ALONE])
     upper = [] if alone else [printed_problem(arena, p).B for p in range(place)]
     U_above = np.zeros((N, n)) if alone or not place else arena.f["U"][place - 1]

@@ -11,7 +11,7 @@ from himpc.limits.rows import Rows
 from himpc.tick.kernel.arena import Arena, Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.solve import solve
-from himpc.tick.ladder import solve_levels
+from himpc.tick.ladder import Asks, solve_levels
 from himpc.tick.tables import LevelTable, budget_of, sizes, write_effects, write_levels
 
 
@@ -23,7 +23,7 @@ def solve_problems(
 ) -> list[LevelSolution]:
     """`solve_cascade` by the kernel; arguments as there."""
     arena = arena_of(problems, rows, previous)
-    rungs = solve_levels(arena, rows.kinds, lambda torque: increments_of(damping(), torque))
+    rungs = solve_levels(arena, rows.kinds, lambda torque: increments_of(damping(), torque), Asks())
     conclude(*arena.arguments, False)
     return solutions([problem.name for problem in problems], arena.found(), rungs)
 

@@ -24,7 +24,7 @@ from himpc.tick.given import GivenRows
 from himpc.tick.kernel.arena import NOW, Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
-from himpc.tick.ladder import solve_levels
+from himpc.tick.ladder import Asks, solve_levels
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, budget_of, write_effects
 from robots import Robot
@@ -121,6 +121,10 @@ class CompiledTick:
             by_row = np.broadcast_to(share, level.root_Q.shape)
             write_effects(self.arena, level.rows, by_row * level.root_Q, by_row[:, None] * level.weighted_C)
 
+    def take_M_bar(self, M_bar: Array) -> None:
+        """The diagonal of M̄ from now on, (n,) kg·m²."""
+        self.arena.f["M_bar"][:] = M_bar
+
     def problems(self) -> list[LevelProblem]:
         """The data of every level at the last tick, copied; none before the first one."""
         if not self._looked:
@@ -156,7 +160,7 @@ class CompiledTick:
         self._take(q, v, previews, tau_0, limits)
         arena = self.arena
         rungs: list[tuple[Rung, float]] = []
-        change, iterations = math.inf, 0
+        change, iterations, asks = math.inf, 0, Asks()
         arena.f["budget"][:] = self._budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
@@ -169,15 +173,15 @@ class CompiledTick:
             if not look(*arena.arguments):
                 return None
             self._looked = True
-            rungs = solve_levels(arena, self._kinds, damped) if self._levels else []
+            rungs = solve_levels(arena, self._kinds, damped, asks) if self._levels else []
             iterations += 1
             once = self._most == 1
             if not conclude(*arena.arguments, once):
                 return None
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
-            if any(rung != "solve" for rung, _ in rungs):
-                break  # what is no optimum leads to none by being solved again
+            if not asks.spared or any(rung != "solve" for rung, _ in rungs):
+                break  # what is no optimum leads to none by being solved again; what is hard takes its time
         if self._most > 1:
             conclude(*arena.arguments, True)
         return self._plan(rungs, tau_0, limits, iterations, started)
@@ -242,6 +246,7 @@ class CompiledTick:
             iterations=iterations,
             fill=self._fill,
             at_once=self._at_once,
+            M_bar=self.arena.f["M_bar"].copy() if self._settings.M_bar_adapt else None,
         )
 
     def _evidence(self, rungs: Sequence[tuple[Rung, float]]) -> Evidence:

@@ -128,6 +128,12 @@ class TorqueSession(Session):
             )
         return found
 
+    @property
+    def M_bar(self) -> Array:
+        """Diagonal of the M̄ in force, (n,) kg·m²."""
+        found = None if self.plan is None else self.plan.M_bar
+        return np.array(self.settings.M_bar) * self.settings.M_bar_scale if found is None else found
+
     def target(self, task: str) -> Target | None:
         """The draggable target of a task, None if its reference is a fixed motion."""
         reference = self.references.get(task)
@@ -204,8 +210,8 @@ class TorqueSession(Session):
         row[at.t] = t
         row[at.q], row[at.v] = q, v
         row[at.q_measured], row[at.v_measured] = state.q, state.v
-        row[at.truth] = self._true(plan, q, ahead)
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
+        row[at.truth] = self._true(plan, q, ahead)
         if plan.notice is not None:
             self.failure = plan.notice
         late = settings.is_late(1e-3 * plan.step_us)
@@ -223,7 +229,6 @@ class TorqueSession(Session):
         """What only the plant's M can tell: the honest leak and the gauge of M̄, held between refreshes."""
         if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
-            M_bar = np.array(self.settings.M_bar) * self.settings.M_bar_scale
             done = None
             if plan.at_once is not None:
                 done = plan.at_once()
@@ -231,7 +236,7 @@ class TorqueSession(Session):
                 here = Configuration(self.robot, self._data, q, q, previews=ahead)
                 done = at_once(plan, self.settings.levels, here)
             leak = math.nan if done is None or len(done.increments) < 2 else dynamic_leak(M, done)
-            self._truth = (leak, *convergence_gauge(M, M_bar))
+            self._truth = (leak, *convergence_gauge(M, self.M_bar))
         return self._truth
 
     def _is_wild(self, q: Array, v: Array) -> bool:

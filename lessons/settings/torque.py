@@ -60,6 +60,7 @@ class TorqueSettings(Settings):
         levels: the stack.
         M_bar: diagonal of M̄ before scaling.
         M_bar_scale: factor on all of it.
+        M_bar_adapt: let the controller raise it, see `himpc.adaptation`.
         nominal: what model-based controllers believe the plant to be.
         deadline_ms: a torque that is found later than this after its tick began acts one tick later; see
             `lessons.session.deadline`. 0: lockstep, time stands still while the controller computes.
@@ -77,6 +78,7 @@ class TorqueSettings(Settings):
     M_bar: Annotated[tuple[float, ...], Range(0.0, above=True)]
     controller: str = "himpc"
     M_bar_scale: Annotated[float, Range(0.0, above=True)] = 1.0
+    M_bar_adapt: bool = False
     horizon: Horizon = 5
     T_s: Period = 1e-3
     R_on: Literal["torque", "acceleration"] = "torque"
@@ -103,6 +105,7 @@ class TorqueSettings(Settings):
         return ControllerSettings(
             stack=self.levels,
             M_bar=tuple(float(value) * self.M_bar_scale for value in self.M_bar),
+            M_bar_adapt=self.M_bar_adapt,
             horizon=self.horizon,
             T_s=self.T_s,
             limits=self.limits,

@@ -271,3 +271,27 @@ def test_a_hostile_state_costs_no_more_than_the_budget_of_a_tick(controller: str
     # What is begun is ended: one change of rows is far less than a tenth.
     assert max(spent) <= 1.1 * BUDGET
     assert max(spent) > 0.0
+
+
+def test_nhimpc_asks_the_printed_route_a_few_times_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten iterations of three levels that the kernel gives up could ask thirty times, a millisecond or more
+    each (seen in `benchmarks.fuzz`: 24 times, 33 ms)."""
+    asked: list[str] = []
+
+    def counted(*given: Any) -> Any:
+        asked.append("printed")
+        return solves(*given)
+
+    solves = ladder.solve_explicit
+    monkeypatch.setattr(ladder, "solve_explicit", counted)
+    scene = torque_scene("iiwa14-circle-paper")
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=3, controller="nhimpc")))
+    rng, most = np.random.default_rng(0), 0
+    for _ in range(80):
+        asked.clear()
+        q = session.plant.q + 0.1 * rng.normal(size=7)
+        v = 2.0 * session.robot.v_limit * rng.normal(size=7)
+        outlook = Outlook(session.references, session.t, 1e-3, 3)
+        session.controller.step(q, v, outlook, session.plant.tau)
+        most = max(most, len(asked))
+    assert 0 < most <= 3

@@ -29,6 +29,7 @@ def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
         "horizon=12": Set("horizon", 12),
         "M_bar_scale=0.5": Set("M_bar_scale", 0.5),
         "M_bar_scale=2": Set("M_bar_scale", 2),
+        "M_bar_adapt": Set("M_bar_adapt", True),
         "M_bar": Set("M_bar", M_bar),
         "Q": Set("Q", 2000),
         "R": Set("R", 0.5),

@@ -45,3 +45,17 @@ def test_torques_are_those_of_pinocchio_s_kinematics(
         for task, value in compiled.values.items():
             np.testing.assert_allclose(value, printed.values[task], atol=1e-12)
             np.testing.assert_allclose(compiled.errors[task], printed.errors[task], atol=1e-9)
+
+
+def test_a_wild_torque_reading_does_not_raise_the_limit_of_hqp() -> None:
+    """A first state that is none, beside a sensor that reads thirteen times what the robot gives: the torque
+    that is held, and the ones after it, stay within the robot's limit (seen in `benchmarks.fuzz`)."""
+    scene = torque_scene("iiwa14-hold")
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, controller="hqp")))
+    limit = session.robot.tau_limit
+    previews = {name: each.preview(0.0, 1e-3, 1) for name, each in session.references.items()}
+    state = session.plant.measure(1e-3)
+    for q in (np.full(7, np.nan), state.q, state.q):
+        plan = session.controller.step(q, state.v, previews, 13.0 * limit)
+        assert (np.abs(plan.tau) <= limit).all()
+        assert (plan.limits.tau_upper <= limit).all() or not np.isfinite(q).all()

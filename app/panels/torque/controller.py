@@ -43,7 +43,7 @@ class ControllerPanel:
         self._deadline = DeadlineFolder(gui, controls)
         with gui.add_folder("Inertia guess M̄"):
             self._gauge = gui.add_html("")
-            controls.add("M_bar_scale")
+            controls.add("M_bar_scale", "M_bar_adapt")
             self.spectrum = SpectrumPicture(client, in_view)
             controls.add_elements("M_bar", robot.joint_names, "Per joint, kg·m²")
         with gui.add_folder("Limits"):

@@ -89,4 +89,4 @@ class TorqueRun(Run):
         session = self.session
         if not np.isfinite(session.plant.q).all():
             return None
-        return session.plant.mass_matrix(), np.array(session.settings.M_bar) * session.settings.M_bar_scale
+        return session.plant.mass_matrix(), session.M_bar

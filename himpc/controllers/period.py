@@ -1,0 +1,37 @@
+"""What one control period starts from and what it finds, on the printed route."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import LevelSolution
+from himpc.controllers.memory import Memory
+from himpc.limits import Rows
+from himpc.prediction.joint import JointState
+from himpc.references import Preview
+
+Array = NDArray[np.float64]
+
+
+class Tick(NamedTuple):
+    """What one control period starts from; `values` and `errors` are filled while it is solved."""
+
+    state: JointState
+    memory: Memory
+    previews: Mapping[str, Preview]
+    rows: Rows
+    values: dict[str, Array]
+    errors: dict[str, Array]
+
+
+class Found(NamedTuple):
+    """What one control period found: levels, ẋ_k of all rows, q at knots 0 … N, how many cascades it took."""
+
+    solutions: list[LevelSolution]
+    x_dot: Array
+    predicted_q: Array
+    iterations: int = 1
