@@ -13,11 +13,12 @@ from himpc.adaptation import Adaptation, measured
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
+from himpc.controllers.base import TorqueController
 from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, stack_form, usable
 from himpc.controllers.memory import Memory
 from himpc.controllers.period import Found, Tick
 from himpc.controllers.settings import Settings
-from himpc.limits import Limits, LimitsInForce, Rows, build_rows, in_force, ramp
+from himpc.limits import LimitsInForce, Rows, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
@@ -25,7 +26,6 @@ from himpc.stack import DAMPING_LEVEL, about
 from himpc.tick.problems import increments_of
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
-from robots import Robot
 
 Array = NDArray[np.float64]
 
@@ -34,26 +34,13 @@ _FAINTEST = 1e-8
 """A task switched on starts with this share of its Q and gains decades at a constant rate."""
 
 
-class HIMPC:
+class HIMPC(TorqueController):
     """Reads geometry and limits of the robot, never a mass: time-delay estimation is the model.
 
     One `step` per period T_s. What it remembers between steps is the torque that was applied (τ₀), the
     previous velocities (for q̈ and ẍ by backward difference) and the previous plan (for the Jacobians
     along the prediction). `configure` changes settings and keeps all of it.
     """
-
-    def __init__(self, robot: Robot, settings: Settings) -> None:
-        """Raises InputError if the settings name frames or joints that the robot does not have."""
-        self.robot = robot
-        self._data = robot.model.createData()
-        self._settings = settings
-        self._apply(settings)
-        self.reset(np.zeros(robot.n))
-
-    @property
-    def settings(self) -> Settings:
-        """The settings in use."""
-        return self._settings
 
     @property
     def problems(self) -> list[LevelProblem]:
@@ -65,13 +52,11 @@ class HIMPC:
 
     def reset(self, tau_0: Array) -> None:
         """Forgets plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
-        self._tau_0 = np.array(tau_0, float)
+        super().reset(tau_0)
         self._memory: Memory | None = None
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
-        unbounded = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
-        self._limits = unbounded
         self._adaptation: Adaptation | None = None
         self._weight: dict[str, float] = {}
 

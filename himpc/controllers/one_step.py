@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from time import perf_counter_ns
 from typing import NamedTuple, Protocol
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from himpc.cascade.level import NO_ROWS, LevelSolution
 from himpc.configuration import Configuration
+from himpc.controllers.base import TorqueController
 from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.controllers.settings import Settings
-from himpc.limits import Limits, LimitsInForce, Rows, in_force, ramp
+from himpc.limits import LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
 from himpc.tasks import Damping
 from himpc.tick.configure import is_built_in
 from himpc.tick.kinematics import Kinematics
-from robots import Robot
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Law(NamedTuple):
     levels: list[LevelSolution]
 
 
-class OneStepController(ABC):
+class OneStepController(TorqueController):
     """State, settings and their bumpless change for OSF, TDEOSF and HQP; a subclass gives the law.
 
     A change of settings is bumpless: the difference it makes to the torque at once is taken back and fades
@@ -74,24 +74,10 @@ class OneStepController(ABC):
     incremental: bool = False
     """Whether the bias is counted from τ₀: it then carries the torque over, and only the rest can jump."""
 
-    def __init__(self, robot: Robot, settings: Settings) -> None:
-        """Raises InputError if the settings name frames or joints that the robot does not have."""
-        self.robot = robot
-        self._data = robot.model.createData()
-        self._settings = settings
-        self._apply(settings)
-        self.reset(np.zeros(robot.n))
-
-    @property
-    def settings(self) -> Settings:
-        """The settings in use."""
-        return self._settings
-
     def reset(self, tau_0: Array) -> None:
         """Forgets its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""
-        self._tau_0 = np.array(tau_0, float)
+        super().reset(tau_0)
         self._before: tuple[Array, float] | None = None
-        self._limits = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
         self._offset = np.zeros(self.robot.n)
         self._share = 0.0
         self._lead = np.zeros(self.robot.n)

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
 from himpc.controllers.answers import OwnFault, checked, next_cost, no_rows, solution
+from himpc.controllers.base import TorqueController
 from himpc.controllers.forms import StackForm, measure, prepare, usable
 from himpc.controllers.one_step import leak as leak_of
 from himpc.controllers.settings import Settings
 from himpc.controllers.view import Bounds, LevelView, View, read_only
-from himpc.limits import Limits, LimitsInForce, in_force, ramp, viability_bounds
+from himpc.limits import LimitsInForce, in_force, ramp, viability_bounds
 from himpc.limits.rows import reaction
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
@@ -41,7 +42,7 @@ _NUDGE = 1e-4
 """rad or m: how far the joints are moved to both sides to see the Jacobians change."""
 
 
-class OwnController:
+class OwnController(TorqueController):
     """Runs code from outside and does everything else: what it sees, bounds in force, evidence.
 
     The answer of the law is a torque (n,) N·m, or one row per level (r, n), the torque that the levels down
@@ -56,24 +57,15 @@ class OwnController:
     ) -> None:
         """make: a fresh law, without memory; where: its file and line. Raises InputError if the settings do
         not fit the robot."""
-        self.robot = robot
-        self._data, self._elsewhere = robot.model.createData(), robot.model.createData()
+        self._elsewhere = robot.model.createData()
         self._make, self._call, self._where = make, call, where
-        self._settings = settings
-        self._apply(settings)
-        self.reset(np.zeros(robot.n))
-
-    @property
-    def settings(self) -> Settings:
-        """The settings in use."""
-        return self._settings
+        super().__init__(robot, settings)
 
     def reset(self, tau_0: Array) -> None:
         """Forgets everything, a fault too; τ₀ (n,) N·m is the torque acting now."""
-        self._tau_0 = np.array(tau_0, float)
+        super().reset(tau_0)
         self._before: tuple[Array, Array, float] | None = None
         self._x_dot: Array | None = None
-        self._limits = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
         self._law: Law | None = None
         self._failed = False
         self._share = 1.0
