@@ -41,6 +41,7 @@ class Wire:
         commands: by identity, what the palette holds.
         made: every control there ever was, in the order they came.
         notices: (title, body) of every notification.
+        eye: m, where the page last told the browser to look from.
     """
 
     def __init__(self, url: str) -> None:
@@ -49,6 +50,7 @@ class Wire:
         self.commands: dict[str, dict[str, Any]] = {}
         self.made: list[dict[str, Any]] = []
         self.notices: list[tuple[str, str]] = []
+        self.eye: tuple[float, ...] = ()
         self._socket = connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None)
         self.say(camera())
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -105,6 +107,8 @@ class Wire:
             case "NotificationShowMessage" | "NotificationUpdateMessage":
                 props = message.get("props", message)
                 self.notices.append((str(props.get("title")), str(props.get("body"))))
+            case "SetCameraPositionMessage":
+                self.eye = tuple(message["position"])
             case "GuiRemoveMessage":
                 self.controls.pop(message["uuid"], None)
             case "GuiUpdateMessage" if message["uuid"] in self.controls:

@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from app.link.choice import SceneChoice
+from app.link.messages import Post
+from app.server.server import PageServer
 from app.view.follow import FollowBase
+from browsing.wire import Wire, eventually
+from lessons.events import MoveTarget
+from lessons.scenes.run_spec import RunSpec
 
 
 def test_the_camera_keeps_its_place_beside_the_base() -> None:
@@ -28,3 +34,24 @@ def test_the_camera_keeps_its_place_beside_the_base() -> None:
     follower.follow(np.array([9.0, 9.0, 0.0]), on=False)
     follower.follow(np.array([9.0, 9.0, 0.0]), on=True)
     np.testing.assert_array_equal(camera.position, before)
+
+
+def test_the_page_of_a_mobile_robot_goes_along_once_it_is_asked() -> None:
+    server = PageServer(SceneChoice(RunSpec("ridgeback-ur10-drag")), port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.find("Camera follows the base") is not None and page.eye != ())
+            learner = server.sessions.learners[0]
+
+            def base() -> np.ndarray:
+                found = learner.read(lambda _, history: history.latest[history.layout.fields["x/base"]])
+                return np.full(2, np.nan) if found is None else found.copy()
+
+            assert eventually(lambda: bool(np.isfinite(base()).all()))
+            start, eye = base(), np.array(page.eye)
+            page.write(page.find("Camera follows the base") or "", value=True)
+            learner.send(Post(MoveTarget("base", (float(start[0]), float(start[1]) - 1.0))))
+            assert eventually(lambda: bool(np.linalg.norm(base() - start) > 0.8))
+            assert eventually(lambda: np.allclose((np.array(page.eye) - eye)[:2], base() - start, atol=0.03))
+    finally:
+        server.close()
