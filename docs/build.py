@@ -12,7 +12,10 @@ import shutil
 import sys
 from pathlib import Path
 
+from docs import films
 from docs.pages import api, examples, exercises, lessons, texts
+from docs.record import FOLDER
+from lessons.course import COURSE, load_lesson
 
 ROOT = Path(__file__).parents[1]
 
@@ -28,9 +31,18 @@ def write_sources(folder: Path) -> None:
         path = folder / f"{name}.md"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
-    shutil.copy(ROOT / "docs" / "page.png", folder / "page.png")
+    shutil.copy(ROOT / "docs" / "page.webp", folder / "page.webp")
     for picture in sorted((ROOT / "docs" / "lessons").glob("*.webp")):
         shutil.copy(picture, folder / "lessons" / picture.name)
+
+
+def write_films(folder: Path) -> None:
+    """The player and a scene per lesson, beside the pages: Sphinx has no part in them."""
+    folder.mkdir(parents=True)
+    (folder / "player.html").write_text(films.player(), encoding="utf-8")
+    for name in COURSE:
+        motion = films.motion_of(FOLDER / f"{name}.json")
+        (folder / f"{name}.js").write_text(films.film(load_lesson(name), motion), encoding="utf-8")
 
 
 def build(out: Path) -> int:
@@ -41,6 +53,7 @@ def build(out: Path) -> int:
     write_sources(source)
     shutil.rmtree(out, ignore_errors=True)
     sys.path.insert(0, str(ROOT))
+    write_films(out / "films")
     return build_main(
         ["-q", "-W", "--keep-going", "-b", "html", "-d", str(source / "_build"), str(source), str(out)]
     )

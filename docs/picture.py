@@ -1,23 +1,28 @@
-"""Takes the README's picture: docs/page.png, the page with a lesson's step after its run.
+"""Takes the README's picture, which moves: docs/page.webp, a lesson's step as the page plays it back.
 
 python -m docs.picture
 """
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
-from playwright.sync_api import expect, sync_playwright
+from PIL import Image
+from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.server.server import PageServer
-from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
+from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page
 from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step
 
-OUT = Path(__file__).parents[1] / "docs" / "page.png"
+OUT = Path(__file__).parents[1] / "docs" / "page.webp"
 EXERCISE = Exercise("a-redundant-arm", 2)
+SIZE = (1080, 675)
+EVERY, LAST = 100, 1500
+"""ms that a picture stands; the last one longer, to be read."""
 
 
 def main() -> None:
@@ -32,12 +37,34 @@ def main() -> None:
             if isinstance(part, Step) and part.prediction is not None:
                 predict(page, part.prediction)
             run(page)
-            page.mouse.move(700, 850)  # or a hint would cover something
-            page.wait_for_timeout(3000)
-            page.screenshot(path=OUT)
+            pictures = played_back(page, part.duration)
             browser.close()
     finally:
         server.close()
+    pictures[0].save(
+        OUT,
+        save_all=True,
+        append_images=pictures[1:],
+        duration=[EVERY] * (len(pictures) - 1) + [LAST],
+        loop=0,
+        quality=60,
+        method=6,
+    )
+    print(f"{OUT}: {len(pictures)} pictures, {OUT.stat().st_size / 1e6:.2f} MB")
+
+
+def played_back(page: Page, seconds: float) -> list[Image.Image]:
+    """The run once more by looking back at it: whatever the machine's pace, a tenth of a second each."""
+    page.mouse.move(700, 850)  # or a hint would cover something
+    for _ in range(round(seconds) + 1):
+        key(page, "Shift+J")
+    pictures = []
+    for _ in range(round(10 * seconds)):
+        page.wait_for_timeout(3 * SELDOM)
+        shown = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+        pictures.append(shown.resize(SIZE, Image.Resampling.LANCZOS))
+        key(page, "k")
+    return pictures
 
 
 if __name__ == "__main__":

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
+from docs.further import further
+from docs.further.kit import Further
+from docs.pages.curves import figure
+from docs.record import FOLDER
 from lessons.course import COURSE, load_lesson
 from lessons.exercises import exercises_of
 from lessons.teaching.claim import Claim
@@ -15,6 +20,9 @@ from lessons.teaching.prediction import Choice
 
 MEASURED = "docs/site/measured.json"
 """What `himpc-lab lessons --check --json docs/site/measured.json` found."""
+
+RECORDED = FOLDER.relative_to(Path(__file__).parents[2])
+"""What `python -m docs.record` kept."""
 
 Checks = dict[tuple[str, str], dict[str, Any]]
 
@@ -26,7 +34,8 @@ def pages(root: Path) -> dict[str, str]:
     for number, name in enumerate(COURSE, start=1):
         lesson = load_lesson(name)
         picture = (root / "docs" / "lessons" / f"{name}.webp").exists()
-        found[f"lessons/{name}"] = page(lesson, known.get(name, {}), picture)
+        film = json.loads((root / RECORDED / f"{name}.json").read_text(encoding="utf-8"))
+        found[f"lessons/{name}"] = page(lesson, known.get(name, {}), film, further(name), picture)
         card = lesson.card
         rows.append(f"| {number} | [{card.title}]({name}.md) | {cell(card.question)} | {card.minutes} |")
     listed = "\n".join(COURSE)
@@ -51,7 +60,7 @@ def measured(path: Path) -> dict[str, Checks]:
     }
 
 
-def page(lesson: Lesson, checks: Checks, picture: bool) -> str:
+def page(lesson: Lesson, checks: Checks, film: Mapping[str, Any], more: Further, picture: bool) -> str:
     """One lesson."""
     card = lesson.card
     parts = [
@@ -61,10 +70,14 @@ def page(lesson: Lesson, checks: Checks, picture: bool) -> str:
         f"`himpc-lab --lesson {lesson.name}` opens it, `himpc-lab lessons --check {lesson.name}` judges it.",
     ]
     for number, step in enumerate(lesson.steps, start=1):
-        parts += step_parts(step, number, checks)
+        parts += step_parts(step, number, checks, film["steps"][number - 1])
+        if number - 1 == film["motion"]["step"]:
+            parts.append(watch(lesson.name, f"{card.title}: {step.title}", step, "../"))
     if lesson.challenge is not None:
         goals = lesson.challenge.goals
         parts += ["## Challenge", unindented(lesson.challenge.text), table(goals, "challenge", checks)]
+    parts += derivation(more)
+    parts += questions(more)
     if own := exercises_of(lesson.name):
         anchors = (f"[{each.card.title}](../exercises.md)" for each in own)
         parts += ["## Write it yourself", "Exercise: " + ", ".join(anchors)]
@@ -77,7 +90,37 @@ def page(lesson: Lesson, checks: Checks, picture: bool) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def step_parts(step: Step, number: int, checks: Checks) -> list[str]:
+def watch(name: str, title: str, step: Step, up: str) -> str:
+    """The place of a film that is loaded on a click; up: from the page to the site's root."""
+    ghost = f" Violet: the ghost, {escape(step.ghost.words)}." if step.ghost else ""
+    return (
+        f'<figure class="film"><button type="button" data-film="{up}films/player.html#{name}" '
+        f'title="{escape(title)}">▶ Watch it move in 3D</button>'
+        f"<figcaption>{escape(step.title)}, {step.duration:g} s, as recorded.{ghost} Turn it with the mouse."
+        "</figcaption></figure>"
+    )
+
+
+def derivation(more: Further) -> list[str]:
+    """Step by step, each equation on a line of its own."""
+    told = "\n\n".join(f"{line.words}\n\n$$\n{line.equation}\n$$" for line in more.derivation)
+    return ["## From the paper's equations", told]
+
+
+def questions(more: Further) -> list[str]:
+    """With answers to unfold."""
+    parts = ["## On paper"]
+    for number, each in enumerate(more.questions, start=1):
+        parts += [
+            f"**{number}.** {each.asked}",
+            "<details><summary>Answer</summary>",
+            each.answered,
+            "</details>",
+        ]
+    return parts
+
+
+def step_parts(step: Step, number: int, checks: Checks, film: Mapping[str, Any]) -> list[str]:
     """One idea."""
     parts = [f"## {number}. {step.title}", unindented(step.text)]
     if step.prediction is not None:
@@ -85,6 +128,7 @@ def step_parts(step: Step, number: int, checks: Checks) -> list[str]:
         if isinstance(step.prediction, Choice):
             asked.append("\n".join(f"- {option.text}" for option in step.prediction.options))
         parts += asked
+    parts.append(figure(film, step.ghost.words if step.ghost else None))
     parts += ["**What the run shows**", table(step.claims, step.title, checks)]
     parts += ["<details><summary>Why</summary>", unindented(step.why), "</details>"]
     parts.append(f"**Then, by hand**: {unindented(step.do)}")

@@ -30,6 +30,8 @@ def pages(root: Path) -> dict[str, str]:
     """Name and Markdown of each."""
     readme = (root / "README.md").read_text(encoding="utf-8")
     found = {name: f"# {title}\n\n{section(readme, part)}" for name, (title, part) in FROM_README.items()}
+    title, rest = found["start"].split("\n\n", 1)
+    found["start"] = f"{title}\n\n{set_up(readme)}\n{rest}"
     found["start"] += "\n## What you can do\n\n" + section(readme, "What you can do")
     if "## Systems" in readme:
         found["start"] += "\n## Systems\n\n" + section(readme, "Systems")
@@ -44,6 +46,11 @@ def pages(root: Path) -> dict[str, str]:
         f"# How to cite\n\nThis file stands in the repository as `CITATION.cff`.\n\n```yaml\n{citation}```\n"
     )
     return {name: relinked(text) for name, text in found.items()}
+
+
+def set_up(readme: str) -> str:
+    """The line that sets everything up, as the README's first screen has it."""
+    return readme[readme.index("```sh") :].split("```\n", 1)[0] + "```\n"
 
 
 def section(text: str, title: str) -> str:

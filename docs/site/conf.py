@@ -12,6 +12,7 @@ html_title = "himpc-lab"
 html_math_renderer = "mathml"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["film.js"]
 html_show_sphinx = False
 html_copy_source = False
 html_show_sourcelink = False

@@ -1,0 +1,95 @@
+"""A redundant arm: what the null space is, and how large."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, measured, planar
+
+STRAIGHT = planar(np.zeros(3))[1]
+ELBOW = measured("a-redundant-arm", "Joint 3 turns by more than 20°.")
+
+
+def _difference(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    q, v, h = rng.normal(size=3), rng.normal(size=3), 1e-6
+    return (planar(q + h * v)[0] - planar(q - h * v)[0]) / (2 * h), planar(q)[1] @ v
+
+
+def _all_solutions(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    J, x, z = rng.normal(size=(6, 7)), rng.normal(size=6), rng.normal(size=7)
+    inverse = np.linalg.pinv(J)
+    return J @ (inverse @ x + (np.eye(7) - inverse @ J) @ z), x
+
+
+def _freedoms(rng: np.random.Generator) -> tuple[float, float]:
+    J = rng.normal(size=(6, 7))
+    J[5] = J[4]  # a coordinate that says nothing new
+    return float(np.trace(np.eye(7) - np.linalg.pinv(J) @ J)), 7.0 - np.linalg.matrix_rank(J)
+
+
+def _torques(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    J, z, M_bar = rng.normal(size=(6, 7)), rng.normal(size=7), np.diag(rng.uniform(0.01, 1.0, 7))
+    free = M_bar @ (np.eye(7) - np.linalg.pinv(J) @ J) @ z
+    return J @ np.linalg.inv(M_bar) @ free, np.zeros(6)
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            "The hand is where the joints put it, $x = f(q)$ (2). The chain rule gives its velocity (3):",
+            r"\dot x = \frac{\partial f}{\partial q}\,\dot q = J(q)\,\dot q",
+            _difference,
+            1e-6,
+        ),
+        Line(
+            "Let $J^+$ be the pseudoinverse. If $J$ has full rank, every velocity of the form",
+            r"\dot q = J^+ \dot x + (I - J^+ J)\,z \quad\Rightarrow\quad J \dot q = \dot x",
+            _all_solutions,
+        ),
+        Line(
+            r"makes the hand move as asked, whatever $z$ is. $I - J^+ J$ projects onto the null space. Its "
+            "trace is the number of motions that are left over; a coordinate that repeats another one costs "
+            "none:",
+            r"\operatorname{tr}(I - J^+ J) = n - \operatorname{rank} J",
+            _freedoms,
+        ),
+        Line(
+            r"The controller decides on torques. By (13) a change of torque moves the hand by $J \bar M^{-1} "
+            r"\Delta\tau$, so what leaves the hand alone is",
+            r"\Delta\tau = \bar M (I - J^+ J)\,z \quad\Rightarrow\quad J \bar M^{-1} \Delta\tau = 0",
+            _torques,
+        ),
+    ),
+    questions=(
+        Question(
+            "A seven-joint arm holds a glass: its place counts, and that it stands upright, but not how "
+            "it is turned about its own axis. How many motions are left over? And if *upright* is asked "
+            "for twice, on two levels?",
+            "Three coordinates and two: $7 - 5 = 2$. Asked for twice it still takes away two: what counts is "
+            "the rank of all rows together, not their number.",
+        ),
+        Question(
+            "The planar arm has three links of 0.3 m. It lies straight along $x$. What is its Jacobian, what "
+            "its rank, and which joint velocities leave the hand at rest?",
+            r"No joint moves the hand along $x$; sideways the levers are ⟨l1⟩, ⟨l2⟩ and ⟨l3⟩ m. The rank is "
+            "⟨rank⟩, so two motions are free, one more than in any bent pose: for example the velocities "
+            "$(1, -⟨back⟩, 0)$ and $(1, 0, -⟨far⟩)$.",
+            {
+                "l1": (STRAIGHT[1, 0], ".1f"),
+                "l2": (STRAIGHT[1, 1], ".1f"),
+                "l3": (STRAIGHT[1, 2], ".1f"),
+                "rank": (float(np.linalg.matrix_rank(STRAIGHT)), ".0f"),
+                "back": (STRAIGHT[1, 0] / STRAIGHT[1, 1], ".1f"),
+                "far": (STRAIGHT[1, 0] / STRAIGHT[1, 2], ".0f"),
+            },
+        ),
+        Question(
+            "In *Drag the elbow*, joint 3 is asked to turn by 60°. How far does it get, and what happened to "
+            "the rest of the wish?",
+            "It turns by ⟨turn⟩°, ⟨share⟩ % of the wish. The posture asks all joints to stay except joint "
+            "3, and that is seven wishes for one free motion: level 3 goes along it as far as this makes "
+            "the sum of the seven errors smaller. There what it wants is perpendicular to what it may do.",
+            {"turn": (ELBOW, ".0f"), "share": (100 * ELBOW / 60, ".0f")},
+        ),
+    ),
+)

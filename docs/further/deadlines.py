@@ -1,0 +1,111 @@
+"""Deadlines: what one tick of delay does to time-delay estimation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question
+
+MU = 0.1
+
+
+def _run(mu: float, ticks: int, late: int) -> np.ndarray:
+    """Error of acceleration at each tick, if the torque of tick k acts from k + 1 + late on; M = 1, M̄ = μ."""
+    wanted = 1.0
+    torque = [0.0] * (ticks + 2)
+    for k in range(ticks - late):
+        torque[k + 1 + late] = torque[k] + mu * (wanted - torque[k])
+    return np.array(torque[:ticks]) - wanted
+
+
+def _in_time(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    mu = rng.uniform(0.05, 1.9)
+    return _run(mu, 30, 0), -((1 - mu) ** np.arange(30))
+
+
+def _late(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    mu = rng.uniform(0.05, 1.9)
+    return _run(mu, 30, 1), -((1 - mu) ** (np.arange(30) // 2.0))
+
+
+def _bought(rng: np.random.Generator) -> tuple[float, float]:
+    mu = rng.uniform(0.01, 0.3)
+    return (1 - mu) ** 2 - (1 - 2 * mu), mu**2
+
+
+def _cliff(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Whether errors die out, in time and late, below and above μ = 2."""
+    alive = [[abs(_run(mu, 4000, late)[-1]) < 1e-3 for late in (0, 1)] for mu in (1.98, 2.02)]
+    return np.array(alive, float), np.array([[1.0, 1.0], [0.0, 0.0]])
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"Take one mode of *No model needed* with the eigenvalue $\mu$ of $M^{-1} \bar M$, and a "
+            r"constant wish. In time, each torque corrects what the one before it did:",
+            r"\varepsilon_{k+1} = (1 - \mu)\,\varepsilon_k \quad\Rightarrow\quad "
+            r"\varepsilon_k = (1 - \mu)^k\, \varepsilon_0",
+            _in_time,
+        ),
+        Line(
+            r"One tick late, $\tau_{k+2} = \tau_k + \bar M (a - \ddot q_k)$: it corrects what the last "
+            r"but one did. The even "
+            "and the odd ticks are two sequences that know nothing of each other:",
+            r"\varepsilon_{k+2} = (1 - \mu)\,\varepsilon_k \quad\Rightarrow\quad "
+            r"\varepsilon_k = (1 - \mu)^{\lfloor k/2 \rfloor}\, \varepsilon_0",
+            _late,
+        ),
+        Line(
+            r"This is a loop of half the rate. With $2 \bar M$ two ticks remove $2\mu$, and two ticks in "
+            r"time would have removed almost the same:",
+            r"(1 - \mu)^2 - (1 - 2\mu) = \mu^2",
+            _bought,
+        ),
+        Line(
+            r"But the edge is where it was, at $\mu = 2$, in time and late, and doubling $\bar M$ goes "
+            r"half of the way to it:",
+            r"\varepsilon_k \to 0 \quad\Leftrightarrow\quad 0 < \mu < 2",
+            _cliff,
+        ),
+    ),
+    questions=(
+        Question(
+            r"A mode with $\mu = 0.1$. After how many milliseconds is a hundredth (0.01) of an error "
+            r"left, in time and one "
+            "tick late?",
+            r"$(1 - 0.1)^k = 0.01$ at $k = ⟨k⟩$: ⟨k⟩ ms, and twice as long, ⟨late⟩ ms, one tick late.",
+            {
+                "k": (float(math.ceil(math.log(0.01) / math.log(1 - MU))), ".0f"),
+                "late": (2.0 * math.ceil(math.log(0.01) / math.log(1 - MU)), ".0f"),
+            },
+        ),
+        Question(
+            r"The same mode, one tick late, $\bar M$ doubled. How long now? And what does the doubling "
+            r"cost in the largest mode of this arm, if its $\mu$ is 0.8?",
+            r"$(1 - 0.1 - 0.1)^k = 0.01$ at $k = ⟨k⟩$, so ⟨ms⟩ ms: what was lost is back. The largest "
+            r"mode goes from $\mu = 0.8$ to $⟨mu⟩$: it now changes its sign at every correction, and "
+            r"there are $⟨room⟩$ left to the edge at 2.",
+            {
+                "k": (float(math.ceil(math.log(0.01) / math.log(1 - 2 * MU))), ".0f"),
+                "ms": (2.0 * math.ceil(math.log(0.01) / math.log(1 - 2 * MU)), ".0f"),
+                "mu": (2 * 0.8, ".1f"),
+                "room": (2 - 2 * 0.8, ".1f"),
+            },
+        ),
+        Question(
+            "A computer needs 0.1 ms for each knot. How many knots can it afford with 1 ms, 2 ms and 5 "
+            "ms? And one that needs 0.4 ms, with 1 ms?",
+            "⟨a⟩, ⟨b⟩ and ⟨c⟩; the slow one ⟨d⟩. Whether to spend them is another question: *How far "
+            "ahead* found little that a longer horizon gives, and here it costs half of the feedback.",
+            {
+                "a": (1 / 0.1, ".0f"),
+                "b": (2 / 0.1, ".0f"),
+                "c": (5 / 0.1, ".0f"),
+                "d": (float(math.floor(1 / 0.4)), ".0f"),
+            },
+        ),
+    ),
+)

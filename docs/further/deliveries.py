@@ -1,0 +1,108 @@
+"""Deliveries: what a window of two tasks saves, and where a base waits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, measured
+
+RATIO = measured("deliveries", "The round takes at most 0.6 times as long.")
+RADIUS = 1.2
+TURN = math.radians(40)
+
+
+def _serial(rng: np.random.Generator) -> tuple[float, float]:
+    drive, reach, wait = rng.uniform(1, 9, 3)
+    clock = 0.0
+    for _ in range(4):
+        for part in (drive, reach, wait):
+            clock += part
+    return clock, 4 * (drive + reach + wait)
+
+
+def _overlapped(rng: np.random.Generator) -> tuple[float, float]:
+    """Tasks as events: base and hand set out together; the next round begins when both are done."""
+    drive, reach, wait = rng.uniform(1, 9, 3)
+    ready = 0.0
+    for _ in range(4):
+        base, hand = ready + drive, ready + reach
+        ready = max(base, hand) + wait
+    return ready, 4 * (max(drive, reach) + wait)
+
+
+def _edge(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    hand, goal, rho = rng.normal(size=2), rng.normal(size=2) + 6.0, rng.uniform(0.5, 1.5)
+    angle = np.linspace(0, 2 * np.pi, 2_000_001)
+    ring = hand[:, None] + rho * np.array([np.cos(angle), np.sin(angle)])
+    tried = ring[:, np.argmin(np.hypot(*(ring - goal[:, None])))]
+    return tried, hand + rho * (goal - hand) / np.linalg.norm(goal - hand)
+
+
+def _along(rng: np.random.Generator) -> tuple[float, float]:
+    rho, turn = rng.uniform(0.5, 1.5), rng.uniform(0.1, 1.0)
+    angle = np.linspace(0, turn, 100_001)
+    steps = np.diff(rho * np.array([np.cos(angle), np.sin(angle)]), axis=1)
+    return float(np.hypot(*steps).sum()), rho * turn
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            "One task at a time, a round to $m$ people takes the sum of everything: driving $t_b$, "
+            "reaching $t_h$, waiting $t_w$,",
+            r"T_1 = m\,(t_b + t_h + t_w)",
+            _serial,
+        ),
+        Line(
+            "With a window of two, driving and reaching go on together. What is left is the longer of the "
+            "two, and the wait:",
+            r"T_2 = m\,(\max(t_b, t_h) + t_w)",
+            _overlapped,
+        ),
+        Line(
+            r"While the hand waits at $p$, the base may be anywhere within $\rho$ of it. For a goal $g$ "
+            r"beyond that, (12) leaves "
+            "as the best place",
+            r"p + \rho\, \frac{g - p}{\lVert g - p \rVert}",
+            _edge,
+            1e-5,
+        ),
+        Line(
+            r"If the goal moves, so does this place, along the edge: for a turn by $\varphi$ of the "
+            r"direction to the goal the base "
+            "drives",
+            r"s = \rho\, \varphi",
+            _along,
+            1e-6,
+        ),
+    ),
+    questions=(
+        Question(
+            "One round takes 41 s with one task at a time. How long does it take with two, by the ratio "
+            "that the first step measures? What factor is that, and what does the paper have over four "
+            "rounds?",
+            "The ratio is ⟨ratio⟩, so ⟨time⟩ s: a factor of ⟨factor⟩. The paper has 2.3 with its own "
+            "speeds and distances; the two first lines of the derivation say why such a factor depends on "
+            "them.",
+            {"ratio": (RATIO, ".2f"), "time": (41 * RATIO, ".0f"), "factor": (1 / RATIO, ".1f")},
+        ),
+        Question(
+            "By the two first lines, how large can the factor $T_1/T_2$ be if nobody waits ($t_w = 0$)? "
+            "Yet more has been seen. What have the lines left out?",
+            r"$(t_b + t_h)/\max(t_b, t_h)$ is at most 2, where both take equally long. They let the base "
+            r"drive all of its way; in "
+            "fact its task ends as soon as the hand can do the next one, so it neither goes to its place "
+            "in full nor stops there. That makes $t_b$ itself smaller.",
+        ),
+        Question(
+            "The base waits at the edge, $\\rho = 1.2$ m from the point below the hand, and the next "
+            "person moves so that the direction to them turns by 40°. How far does the base drive while "
+            "the hand stays?",
+            r"$\rho\,\varphi = ⟨way⟩$ m. None of it is lost: it is the part of the new way that can be "
+            r"done before the ball is taken.",
+            {"way": (RADIUS * TURN, ".2f")},
+        ),
+    ),
+)

@@ -1,0 +1,105 @@
+"""First hold, then reach: the model of HTMPC, a lexicographic minimum, and where the base must stop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg import expm
+
+from docs.further.kit import Further, Line, Question, measured
+
+STOPS = measured("first-hold-then-reach", "The base stops more than 1.5 m before its target.")
+LEFT = measured("first-hold-then-reach", "The hand pays")
+
+
+def _integrated(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """(4), (5) with G = I over one knot, by the matrix exponential."""
+    dt, q, v, u = 0.1, *rng.normal(size=3)
+    A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0.0]])  # of (q, v, u)
+    return (expm(A * dt) @ np.array([q, v, u]))[:2], np.array([q + v * dt + 0.5 * u * dt**2, v + u * dt])
+
+
+def _lexicographic(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """min J₂ on the minimisers of J₁, against a weighted sum with J₁ counting a million times."""
+    a, b = rng.normal(size=(1, 3)), rng.normal(size=(2, 3))
+    r, s = rng.normal(size=1), rng.normal(size=2)
+    rows = np.vstack([1e4 * a, b])
+    heavy = np.linalg.lstsq(rows, np.concatenate([1e4 * r, s]), rcond=None)[0]
+    first = np.linalg.pinv(a) @ r
+    Z = np.linalg.svd(a)[2][1:].T
+    strict = first + Z @ np.linalg.lstsq(b @ Z, s - b @ first, rcond=None)[0]
+    return heavy, strict
+
+
+def _held(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    J_b, J_a, v = rng.normal(size=(3, 3)), rng.normal(size=(3, 6)), rng.normal(size=3)
+    return J_b @ v + J_a @ (-np.linalg.pinv(J_a) @ J_b @ v), np.zeros(3)
+
+
+def _nearest(rng: np.random.Generator) -> tuple[float, float]:
+    """The least distance from the goal within the circle around the hand, by trying all of it."""
+    goal = np.array([3.5, 0.0])
+    reach = rng.uniform(1.0, 2.0)
+    r, angle = np.meshgrid(np.linspace(0, reach, 400), np.linspace(0, 2 * np.pi, 721))
+    tried = np.hypot(r * np.cos(angle) - goal[0], r * np.sin(angle) - goal[1])
+    return float(tried.min()), 3.5 - reach
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"The model (4), (5) is $\dot q = v$, $\dot v = u$ for a base that rolls in every direction "
+            r"($G = I$). With $u$ constant between knots (7b) is exact:",
+            r"q_{k+1} = q_k + v_k \Delta t + \tfrac12 u_k \Delta t^2, \qquad v_{k+1} = v_k + u_k \Delta t",
+            _integrated,
+        ),
+        Line(
+            r"The lexicographic minimum (7a) takes the smallest $\mathcal J_2$ among all plans that make "
+            r"$\mathcal J_1$ "
+            "smallest. For linear errors it is the limit of a weighted sum:",
+            r"\operatorname{lex\,min}\,[\mathcal J_1, \mathcal J_2] = \lim_{w \to \infty} "
+            r"\arg\min\, (w\, \mathcal J_1 + \mathcal J_2)",
+            _lexicographic,
+            1e-5,
+        ),
+        Line(
+            r"The hand's velocity is $J_b v_b + J_a \dot q_a$. As long as $J_a$ has full rank the arm can "
+            r"take back whatever "
+            "the base does:",
+            r"\dot q_a = -J_a^+ J_b v_b \quad\Rightarrow\quad J_b v_b + J_a \dot q_a = 0",
+            _held,
+        ),
+        Line(
+            r"That ends where the arm is stretched. While the hand rests, the base stays within a "
+            r"distance $\rho$ of it; the nearest such place to a goal at a distance $d > \rho$ leaves",
+            r"\min_{\lVert p \rVert \le \rho} \lVert p - p_{goal} \rVert = d - \rho",
+            _nearest,
+            1e-6,
+        ),
+    ),
+    questions=(
+        Question(
+            "The goal of *Out of reach* is 3.5 m from the hand, the arm reaches 1.86 m. How far before "
+            "its goal should the base stop? What is measured?",
+            "⟨expected⟩ m on the flat; the run stops ⟨seen⟩ m before it. The difference is geometry: the "
+            "hand is not at the shoulder's height, and the shoulder not in the middle of the base.",
+            {"expected": (3.5 - 1.86, ".2f"), "seen": (STOPS, ".2f")},
+        ),
+        Question(
+            "In the last step the tasks change places. How far is the hand off in the end, and why is it "
+            "the same number?",
+            "⟨left⟩ m. The distance between the two goals and the length of the arm are what they were; "
+            "only who bears the difference has changed.",
+            {"left": (LEFT, ".2f")},
+        ),
+        Question(
+            "In *Nine joints, two wishes* the base's goal is 0.5 m ahead and 0.4 m to the side. Why is "
+            "this called 64 cm, and how many freedoms are left over?",
+            r"$\sqrt{0.5^2 + 0.4^2} = ⟨way⟩$ m. Of nine joints, three coordinates of the hand and two of "
+            r"the base leave "
+            "⟨free⟩: the base may turn, and the arm may move its elbow and turn the hand.",
+            {"way": (math.hypot(0.5, 0.4), ".2f"), "free": (9.0 - 5, ".0f")},
+        ),
+    ),
+)

@@ -1,0 +1,127 @@
+"""How far ahead: the stacked prediction, why it is deadbeat, and when a horizon is worth something."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question
+from himpc.prediction.task import residual_model
+
+
+def effects(N: int, K_p: float = 100.0, K_v: float = 20.0) -> np.ndarray:
+    """c_l of (28) as a lower triangular matrix, (N, N), for T_s = 1 ms."""
+    return residual_model(np.array([K_p]), np.array([K_v]), N, 1e-3).C[:, 0, :]
+
+
+def first_left(N: int, Q: float, R: float, g: float) -> float:
+    """Share of a constant e that is left at the first knot, of one coordinate with gain g."""
+    C = g * effects(N)
+    U = -np.linalg.solve(Q * C.T @ C + R * np.eye(N), Q * C.T @ np.ones(N))
+    return 1.0 + float(C[0, 0] * U[0])
+
+
+def _printed(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """(15) with its own matrices, N times, against the sums of c_l."""
+    T, N, K_p, K_v = 1e-3, 6, 100.0, 20.0
+    A_11 = np.array([[1, T, 0], [0, 2, 0], [0, 0, 1.0]])
+    A_12 = np.diag([0.0, -1.0, 0.0])
+    A = np.block([[A_11, A_12], [np.eye(3), np.zeros((3, 3))]])
+    B, u = np.array([0, T, 1.0, 0, 0, 0]), rng.normal(size=N)
+    state, found = np.zeros(6), []
+    for each in u:
+        state = A @ state + B * each
+        found.append(np.array([K_p, K_v, 1.0]) @ state[:3])
+    return np.array(found), effects(N) @ u
+
+
+def _deadbeat(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    N, e = 20, rng.normal()
+    C = effects(N)
+    U = np.linalg.solve(C, -np.full(N, e))
+    return C[0, 0] * U[:1] + e, np.zeros(1)
+
+
+def _same_first(rng: np.random.Generator) -> tuple[float, float]:
+    e = rng.normal()
+    return float(np.linalg.solve(effects(20), -np.full(20, e))[0]), -e / effects(1)[0, 0]
+
+
+def _gradient(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    C, e, R, Q = effects(8), rng.normal(size=8), 5.0, 2.0
+    U = -np.linalg.solve(Q * C.T @ C + R * np.eye(8), Q * C.T @ e)
+    h, moved = 1e-6, []
+    for k in range(8):
+        d = np.zeros(8)
+        d[k] = h
+        costs = [Q * np.sum((e + C @ (U + s * d)) ** 2) + R * np.sum((U + s * d) ** 2) for s in (1, -1)]
+        moved.append((costs[0] - costs[1]) / (2 * h))
+    return np.array(moved), np.zeros(8)
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"Apply (15) $N$ times. Every $\Delta\tau$ acts on all later knots, with the numbers $c_l$ of "
+            r"*One task under MPC*, so the residuals of the whole horizon are",
+            r"\bar e = \bar e_{free} + C\, \bar u, \qquad C_{js} = c_{j-s} \;(s \le j), "
+            r"\qquad u_s = J \bar M^{-1} \Delta\tau_{k+s}",
+            _printed,
+        ),
+        Line(
+            r"The cost (32a) is a quadratic function of $U$ with its minimum at",
+            r"U^* = -(\bar C^\top \bar Q \bar C + \bar R)^{-1} \bar C^\top \bar Q\, \bar e_{free}",
+            _gradient,
+            1e-5,
+        ),
+        Line(
+            r"$C$ is triangular, and no entry of its diagonal is zero. If $R$ hardly counts, all "
+            r"residuals can be made zero, and the first one is made zero by the first increment alone:",
+            r"R \to 0: \quad C\, \bar u = -\bar e_{free} \quad\Rightarrow\quad e_{k+1} = 0",
+            _deadbeat,
+        ),
+        Line(
+            "This first increment is all that is applied. It does not depend on how many rows follow:",
+            r"u_0^{(N = 20)} = -e_{k+1}/c_0 = u_0^{(N = 1)}",
+            _same_first,
+        ),
+    ),
+    questions=(
+        Question(
+            r"$K_P = 100$, $K_V = 20$, $T_s = 1$ ms. Compute $c_0$, $c_4$ and $c_{19}$. What would the "
+            r"matrix $C$ be if "
+            "they were all 1?",
+            r"$⟨c0⟩$, $⟨c4⟩$ and $⟨c19⟩$. All 1: each $e$ would be the sum of the changes up to it, for "
+            r"what acts within "
+            "20 ms is nearly acceleration alone. Velocity and position hardly have the time to change.",
+            {f"c{k}": (effects(20)[k, 0], ".3f") for k in (0, 4, 19)},
+        ),
+        Question(
+            "Seven joints. How many unknowns has a level's QP with $N = 5$ and with $N = 20$, and how "
+            "many entries its Hessian? Compare with the times that the lesson names.",
+            "⟨n5⟩ and ⟨n20⟩ unknowns, ⟨h5⟩ and ⟨h20⟩ entries, ⟨ratio⟩ times as many. The measured times "
+            "are only ⟨times⟩ times as long: much of a step does not depend on $N$.",
+            {
+                "n5": (7.0 * 5, ".0f"),
+                "n20": (7.0 * 20, ".0f"),
+                "h5": ((7.0 * 5) ** 2, ".0f"),
+                "h20": ((7.0 * 20) ** 2, ".0f"),
+                "ratio": (16.0, ".0f"),
+                "times": (0.13 / 0.04, ".0f"),
+            },
+        ),
+        Question(
+            "One coordinate, $g = 1$, a constant $e$, and $R$ as dear as $Q$. Which share of $e$ is left "
+            "at the first knot with $N = 1$, and which with $N = 20$? Why? And with $g = 18$, as for "
+            "torques?",
+            "⟨one⟩ % and ⟨twenty⟩ %. A change of acceleration stays in force at all later knots: with $N "
+            "= 20$ it is paid for once and helps twenty times, so more of it is worth its price. With $g "
+            "= 18$ there is ⟨tiny⟩ % left for either: where the price does not count, nothing is gained "
+            "by sharing it out.",
+            {
+                "one": (100 * first_left(1, 1, 1, 1), ".0f"),
+                "twenty": (100 * first_left(20, 1, 1, 1), ".0f"),
+                "tiny": (100 * first_left(1, 1, 1, 18), ".1f"),
+            },
+        ),
+    ),
+)

@@ -1,0 +1,132 @@
+"""Inside the QP: optimum, line, touching ellipse and active bound of one tick with N = 1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, null_space
+
+Q, R = 200.0, 10.0
+ROW = np.array([[-0.3, -0.2]]) / 0.033
+ASKED = 12.0
+FIRST = -Q * ROW[0] * ASKED / (Q * float(ROW[0] @ ROW[0]) + R)
+WISH = np.array([0.05, 0.05])
+ALONG = null_space(ROW)[:, 0]
+SECOND = FIRST + ALONG * float(ALONG @ (WISH - FIRST))
+
+
+def _optimum(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    G, e = rng.normal(size=(1, 2)), rng.normal(size=1)
+    H = Q * G.T @ G + R * np.eye(2)
+    return -np.linalg.solve(H, Q * G.T @ e), -Q * G[0] * e / (Q * G[0] @ G[0] + R)
+
+
+def _level_2(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    G, root, slope = rng.normal(size=(1, 2)), rng.normal(size=(2, 2)), rng.normal(size=2)
+    H, Z, first = root @ root.T + np.eye(2), null_space(G), rng.normal(size=2)
+    s = -np.linalg.solve(Z.T @ H @ Z, Z.T @ (H @ first + slope))
+    return G, H, slope, Z, first, first + Z @ s
+
+
+def _line(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    G, _, _, _, first, second = _level_2(rng)
+    return G @ second, G @ first
+
+
+def _touching(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    _, H, slope, Z, _, second = _level_2(rng)
+    return Z.T @ (H @ second + slope), np.zeros(1)
+
+
+def _cut(rng: np.random.Generator) -> tuple[float, float]:
+    """What a little more room is worth to level 2, where one bound cuts the line before its optimum."""
+    _, H, slope, Z, first, second = _level_2(rng)
+    z = Z[:, 0]
+    joint = int(np.argmax(np.abs(z)))
+    sign = np.sign(second[joint] - first[joint])
+    bound = first[joint] + 0.5 * (second[joint] - first[joint])
+
+    def least(at: float) -> float:
+        x = first + z * (at - first[joint]) / z[joint]
+        return 0.5 * x @ H @ x + slope @ x
+
+    cut = first + z * (bound - first[joint]) / z[joint]
+    multiplier = -float(z @ (H @ cut + slope)) / (sign * z[joint])
+    assert multiplier > 0
+    h = 1e-6
+    return (least(bound + sign * h) - least(bound - sign * h)) / (2 * h), -multiplier
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"With $N = 1$ and one coordinate let $g = c_0 \bar M^{-1} J_1^\top$, a vector in the plane. "
+            r"The cost (31) of level 1 is $Q (e + g^\top \Delta\tau)^2 + R \lVert \Delta\tau \rVert^2$; "
+            r"its optimum lies on the normal of the "
+            "valley through zero:",
+            r"\Delta\tau_1^* = -(Q g g^\top + R I)^{-1} Q g\, e = -\frac{Q e}{Q \lVert g \rVert^2 + R}\; g",
+            _optimum,
+        ),
+        Line(
+            r"(33) leaves all $\Delta\tau_2 = \Delta\tau_1^* + z s$ with $z$ perpendicular to $g$, the "
+            r"orange line:",
+            r"g^\top \Delta\tau_2 = g^\top \Delta\tau_1^*",
+            _line,
+        ),
+        Line(
+            r"Level 2 has an ellipse through every point, $\tfrac12 x^\top H x + h^\top x$. Along the "
+            r"line it is least where "
+            "the ellipse touches the line, that is, where its gradient is perpendicular to it:",
+            r"z^\top (H \Delta\tau_2^* + h) = 0",
+            _touching,
+        ),
+        Line(
+            r"If a side of the box, $a^\top \Delta\tau \le b$, cuts the line before that point, level 2 "
+            r"stops at the cut. The "
+            "gradient then has a part along the line, and this part is the price of the bound:",
+            r"\lambda = -\frac{z^\top (H \Delta\tau + h)}{z^\top a} > 0, \qquad "
+            r"\frac{\partial \mathcal J_2^*}{\partial b} = -\lambda",
+            _cut,
+            1e-5,
+        ),
+    ),
+    questions=(
+        Question(
+            r"Two joints with $\bar M = 0.033$ kg·m², $J_1 = (-0.3, -0.2)$ m, $e = 12$ m/s², $Q = 200$, "
+            r"$R = 10$, $c_0 = 1$. "
+            "Where is the disc 1?",
+            r"$g = (⟨g1⟩, ⟨g2⟩)$, so $\Delta\tau_1^* = (⟨t1⟩, ⟨t2⟩)$ N·m: the larger lever does more, in "
+            r"proportion, and $R$ is "
+            "not to be seen in three digits.",
+            {
+                "g1": (ROW[0, 0], ".2f"),
+                "g2": (ROW[0, 1], ".2f"),
+                "t1": (FIRST[0], ".3f"),
+                "t2": (FIRST[1], ".3f"),
+            },
+        ),
+        Question(
+            r"Level 2 has circles for contours, around $(0.05, 0.05)$ N·m. In which direction is the "
+            r"line, and where is the "
+            "disc 2?",
+            r"Perpendicular to $g$, along $(⟨d1⟩, ⟨d2⟩)$ up to its length. For circles the nearest point "
+            r"of the line to their middle: $\Delta\tau_2^* = (⟨t1⟩, ⟨t2⟩)$ N·m. Check: $J_1 \bar "
+            r"M^{-1}\Delta\tau_2^* = ⟨same⟩$ m/s², as for the disc 1.",
+            {
+                "t1": (SECOND[0], ".3f"),
+                "t2": (SECOND[1], ".3f"),
+                "same": (float(ROW[0] @ SECOND), ".1f"),
+                "d1": (0.2, ".1f"),
+                "d2": (-0.3, ".1f"),
+            },
+        ),
+        Question(
+            "Now joint 1 has only 1.2 N·m left upwards. Which of the two discs feels that? What happens "
+            "to each?",
+            r"Neither of them if both lie below 1.2 N·m, and here they do: $⟨t1⟩$ and $⟨t2⟩$ N·m. A bound "
+            r"that is not met has the "
+            "multiplier zero and changes nothing, however close it is.",
+            {"t1": (FIRST[0], ".2f"), "t2": (SECOND[0], ".2f")},
+        ),
+    ),
+)

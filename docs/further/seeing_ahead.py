@@ -1,0 +1,113 @@
+"""Seeing ahead: what preview knows, what a gain does, and what accelerations allow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question
+
+V, A = 1.1, 2.5
+
+
+def shortest(d: float) -> float:
+    """s from rest to rest over d, m, with the base's speed and acceleration."""
+    return d / V + V / A if d >= V**2 / A else 2 * math.sqrt(d / A)
+
+
+def _preview(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Knots k = 1 … 10 whose own reference is already the new one, at t before the jump."""
+    before = np.round(rng.uniform(0.05, 1.0, 20), 3)
+    knots = np.arange(1, 11)
+    counted = [(8.0 - t + 0.1 * knots >= 8.0 - 1e-9).sum() for t in before]
+    return np.array(counted, float), 10.0 - np.ceil(before / 0.1 - 1e-9) + 1
+
+
+def _gain(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    K, e, h, t = rng.uniform(0.2, 2), rng.normal(), 1e-5, np.arange(1, 5) * 0.5
+    found, now, x = [], 0, e
+    for goal in t:
+        while now < round(goal / h):
+            x += h * (-K * x)
+            now += 1
+        found.append(x)
+    return np.array(found), e * np.exp(-K * t)
+
+
+def _stop(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    v, a = rng.uniform(0.5, 2, 2)
+    t = np.linspace(0, v / a, 100_001)
+    speed = v - a * t
+    return np.array([t[-1], np.trapezoid(speed, t)]), np.array([v / a, v**2 / (2 * a)])
+
+
+def _fastest(rng: np.random.Generator) -> tuple[float, float]:
+    d = rng.uniform(V**2 / A, 5.0)
+    t = np.linspace(0, shortest(d), 400_001)
+    speed = np.minimum(np.minimum(A * t, V), A * (t[-1] - t))
+    return float(np.trapezoid(speed, t)), d
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"Knot $k$ of a plan is compared with the reference of its own time, $e_k = f(q_k) - r(t + k "
+            r"\Delta t)$. At a time $s$ before a jump the new reference already counts at",
+            r"N + 1 - \lceil s / \Delta t \rceil \text{ of the knots } 1, \ldots, N",
+            _preview,
+        ),
+        Line(
+            r"HTIDKC asks for $\dot x = \dot r + K (r - x)$. If that is granted, the error obeys $\dot e "
+            r"= -K e$ and is",
+            r"e(t) = e(0)\, e^{-K t}",
+            _gain,
+            1e-4,
+        ),
+        Line(
+            r"A plan may use the acceleration there is. From $v$ it takes, to stop,",
+            r"t = \frac{v}{a}, \qquad d = \frac{v^2}{2a}",
+            _stop,
+            1e-6,
+        ),
+        Line(
+            r"and from rest to rest over a distance $d \ge v^2/a$ no less than",
+            r"t = \frac{d}{v} + \frac{v}{a}",
+            _fastest,
+            1e-6,
+        ),
+    ),
+    questions=(
+        Question(
+            "HTIDKC drives the base home with $K = 0.3$ 1/s, from 1.5 m away. How far is it from home "
+            "after 8 s, if its wish is always granted?",
+            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m: the lesson sees 15 cm. Limits on speed and acceleration "
+            r"cost the little that "
+            "is missing.",
+            {"left": (1.5 * math.exp(-0.3 * 8), ".2f")},
+        ),
+        Question(
+            "The base has a top speed of 1.1 m/s and brakes with 2.5 m/s². How long does it need to stop, "
+            "how far does it go, and how many knots of 0.1 s must a plan have to see that?",
+            "⟨t⟩ s and ⟨d⟩ m: ⟨N⟩ knots. A plan with $N = 2$ ends in the middle of the braking.",
+            {
+                "t": (V / A, ".2f"),
+                "d": (V**2 / (2 * A), ".2f"),
+                "N": (float(math.ceil(V / A / 0.1)), ".0f"),
+            },
+        ),
+        Question(
+            "What is the shortest time for 1.5 m from rest to rest, with 1.1 m/s and 2.5 m/s²? After "
+            "which time has HTIDKC with $K = 2$ 1/s one per cent (0.01) of it left?",
+            r"$1.5/1.1 + 1.1/2.5 = ⟨fast⟩$ s. $e^{-2t} = 0.01$ at $t = ⟨gain⟩$ s, but at the start such a "
+            r"gain wants ⟨wish⟩ m/s, "
+            "which the base does not have: a gain that is quick at the end asks for too much at the "
+            "beginning.",
+            {
+                "fast": (shortest(1.5), ".2f"),
+                "gain": (math.log(100) / 2, ".1f"),
+                "wish": (2 * 1.5, ".0f"),
+            },
+        ),
+    ),
+)

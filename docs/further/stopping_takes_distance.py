@@ -1,0 +1,117 @@
+"""Stopping takes distance: braking distances, and the speed from which one can stop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question
+from himpc.limits import Limits
+from himpc.limits.limits import POSITION_MARGIN
+from himpc.limits.rows import REACTION
+from himpc.limits.viability import viability_bounds
+
+T_S = 1e-3
+A = 20.0
+V = math.radians(57)
+REACTION_TIME = T_S + REACTION / Limits().velocity_approach
+
+
+def viable(d: float, t: float) -> float:
+    """The speed, rad/s, that stops within d, rad, if nothing happens for t, s."""
+    return A * (-t + math.sqrt(t**2 + 2 * d / A))
+
+
+def _distance(rng: np.random.Generator) -> tuple[float, float]:
+    v, a = rng.uniform(0.5, 5), rng.uniform(1, 30)
+    t = np.linspace(0, v / a, 200_001)
+    return float(np.trapezoid(v - a * t, t)), v**2 / (2 * a)
+
+
+def _seen_too_late(rng: np.random.Generator) -> tuple[float, float]:
+    v, N = rng.uniform(0.5, 2), 5
+    d = N * T_S * v
+    return v**2 / (2 * d), v / (2 * N * T_S)
+
+
+def _root(rng: np.random.Generator) -> tuple[float, float]:
+    t, d = rng.uniform(1e-3, 0.4), rng.uniform(0.01, 1.0)
+    v = viable(d, t)
+    return v * t + v**2 / (2 * A), d
+
+
+def _what_runs(rng: np.random.Generator) -> tuple[float, float]:
+    t, d, one = rng.uniform(1e-3, 0.4), rng.uniform(0.01, 1.0), np.ones(1)
+    ours = viability_bounds(0 * one, -9 * one, d * one, np.inf * one, A * one, t)[1, 0]
+    return float(ours), viable(d, t)
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            "With the deceleration $a$ a joint of speed $v$ needs the time $v/a$ to stop, and on the way "
+            "goes",
+            r"d = \int_0^{v/a} (v - a t)\, dt = \frac{v^2}{2a}",
+            _distance,
+            1e-6,
+        ),
+        Line(
+            r"Rows on the next $N$ positions (32d) say nothing until the limit is $N T_s v$ away. To stop "
+            r"within that "
+            "takes",
+            r"a = \frac{v^2}{2 N T_s v} = \frac{v}{2 N T_s}",
+            _seen_too_late,
+        ),
+        Line(
+            r"Turn the question round: which speed can still be stopped before $q_s$, if for a time $t$ "
+            r"nothing happens? It is the root of a quadratic equation:",
+            r"\dot q\, t + \frac{\dot q^2}{2a} = q_s - q \quad\Leftrightarrow\quad "
+            r"\dot q = a \left( -t + \sqrt{t^2 + 2 (q_s - q)/a} \right)",
+            _root,
+        ),
+        Line(
+            "and this bound on the speed is a row that the very next knot knows. What runs is",
+            r"\dot q_{k+1} \le a \left( -t + \sqrt{t^2 + 2 (q_s - q)/a} \right), \qquad "
+            r"t = T_s + \tfrac{5}{15}\,\mathrm s, \quad q_s = q_{\max} - 7\,\mathrm{mrad}",
+            _what_runs,
+        ),
+    ),
+    questions=(
+        Question(
+            "How many knots must the printed rows see for 20 rad/s² to suffice from 57°/s? What is that "
+            "in a QP of a seven-joint arm?",
+            r"$v/(2 N T_s) \le 20$ gives $N \ge ⟨N⟩$; braking all the way takes $v/(a T_s)$, ⟨all⟩ knots. "
+            r"With seven joints "
+            "the smaller one has ⟨size⟩ unknowns per level, five times as many as with $N = 5$.",
+            {
+                "N": (float(math.ceil(V / (2 * A * T_S))), ".0f"),
+                "all": (float(math.ceil(V / (A * T_S))), ".0f"),
+                "size": (7.0 * math.ceil(V / (2 * A * T_S)), ".0f"),
+            },
+        ),
+        Question(
+            r"A joint comes at 100°/s; $t = 0.33$ s, $a = 20$ rad/s². How far before $q_s$ does the bound "
+            r"on its speed begin to bite? And with $t = T_s$?",
+            r"At $v t + v^2/2a = ⟨far⟩$°, of which only ⟨brake⟩° are for braking: the reaction time is "
+            r"what costs. With $t = T_s$ at ⟨near⟩°.",
+            {
+                "far": (
+                    math.degrees(math.radians(100) * REACTION_TIME + math.radians(100) ** 2 / (2 * A)),
+                    ".0f",
+                ),
+                "brake": (math.degrees(math.radians(100) ** 2 / (2 * A)), ".1f"),
+                "near": (math.degrees(math.radians(100) * T_S + math.radians(100) ** 2 / (2 * A)), ".1f"),
+            },
+        ),
+        Question(
+            "Compute the two speeds that *A speed from which one can stop* quotes for 5° before the limit.",
+            r"Exact model, $t = T_s$, $q_s$ at the limit: ⟨exact⟩°/s. Ours, $t = 0.33$ s and $q_s$ lying "
+            r"0.4° before it: ⟨ours⟩°/s.",
+            {
+                "exact": (math.degrees(viable(math.radians(5), T_S)), ".0f"),
+                "ours": (math.degrees(viable(math.radians(5) - POSITION_MARGIN, REACTION_TIME)), ".1f"),
+            },
+        ),
+    ),
+)

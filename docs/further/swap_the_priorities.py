@@ -1,0 +1,98 @@
+"""Swap the priorities: how much (33) leaves in which order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, measured, null_space
+from lessons.course.swap_the_priorities import BENT
+from lessons.scenes.catalog import torque_scene
+from robots import Plant
+
+GONE = measured("swap-the-priorities", "In the end the hand is off by more than 10 cm.")
+
+
+def _between_hands() -> float:
+    """mm between the hand at home and with the posture that is asked for."""
+    scene = torque_scene("iiwa14-hold")
+    plant, places = Plant(scene.robot), []
+    for q in (scene.q_0, np.array(BENT)):
+        plant.reset(q)
+        places.append(plant.frame_pose(scene.robot.tip)[1].copy())
+    return 1e3 * float(np.linalg.norm(places[1] - places[0]))
+
+
+def _dimension(rng: np.random.Generator) -> tuple[float, float]:
+    stack = rng.normal(size=(6, 7))
+    return float(null_space(stack).shape[1]), 7.0 - np.linalg.matrix_rank(stack)
+
+
+def _all_taken(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    M_bar, first = np.diag(rng.uniform(0.01, 1.0, 7)), rng.normal(size=7)
+    # Solved for Δτ_i, as (33) reads with J_p = I.
+    return np.linalg.solve(np.linalg.inv(M_bar), np.linalg.solve(M_bar, first)), first
+
+
+def _at_rest(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    G = [rng.normal(size=(m, 7)) for m in (3, 3, 7)]
+    found = []
+    for order in ((0, 1, 2), (2, 0, 1), (1, 2, 0)):
+        at, Z = np.zeros(7), np.eye(7)
+        for level in order:
+            H, slope = 200 * G[level].T @ G[level] + 10 * np.eye(7), np.zeros(7)
+            at = at - Z @ np.linalg.solve(Z.T @ H @ Z + 1e-12 * np.eye(Z.shape[1]), Z.T @ (H @ at + slope))
+            Z = Z @ null_space(G[level] @ Z)
+            if not Z.size:
+                break
+        found.append(at)
+    return np.array(found), np.zeros((3, 7))
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"Level $i$ may choose among the $\Delta\tau_i$ that satisfy (33) for all levels $p$ above "
+            r"it. They are $\Delta\tau_{i-1}^*$ plus what all those $J_p \bar M^{-1}$ map to zero, and "
+            r"that has the dimension",
+            r"\dim = n - \operatorname{rank} \operatorname{col}(J_1, \ldots, J_{i-1})",
+            _dimension,
+        ),
+        Line(
+            r"A posture has $J = I$. Once it has had its turn, (33) reads $\bar M^{-1} \Delta\tau_p^* = "
+            r"\bar M^{-1} \Delta\tau_i$, and nothing is left to choose for whoever comes below:",
+            r"\Delta\tau_i = \Delta\tau_p^*",
+            _all_taken,
+        ),
+        Line(
+            r"The order enters nowhere else. In particular, where no task has an error ($e_i = 0$ for all "
+            r"$i$), every order has the same answer, to leave the torque as it is:",
+            r"e_1 = e_2 = e_3 = 0 \quad\Rightarrow\quad \Delta\tau^* = 0 \text{ in every order}",
+            _at_rest,
+        ),
+    ),
+    questions=(
+        Question(
+            "Seven joints, three levels: position (3 coordinates), orientation (3), posture (7). How many "
+            "motions does each level find free, in the order of the lesson, with the posture in the "
+            "middle, and with the posture first?",
+            "As in the lesson: 7, 4, 1. Posture in the middle: 7, 4, and then none, for the posture takes "
+            "all four. Posture first: 7, none, none.",
+        ),
+        Question(
+            "The posture asks the shoulder to go on by 25° and the elbow by 20°. Why is its error called "
+            "32°?",
+            r"The error of a level is the length of its vector: $\sqrt{25^2 + 20^2} = ⟨norm⟩$.",
+            {"norm": (math.hypot(25, 20), ".1f")},
+        ),
+        Question(
+            "With the posture first the hand ends off its target. Compute from the two postures alone how "
+            "far, and compare with what the lesson measures.",
+            "The forward kinematics of both postures put the hand ⟨apart⟩ mm apart; the run ends at "
+            "⟨seen⟩ mm. No controller is needed to know it: whoever comes below a posture that is reached "
+            "has no say.",
+            {"apart": (_between_hands(), ".0f"), "seen": (GONE, ".0f")},
+        ),
+    ),
+)

@@ -1,0 +1,110 @@
+"""Torque has a limit: bounds on a sum of changes, who may be limited by them, and what a bound costs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, measured, null_space
+from lessons.scenes.catalog import torque_scene
+from robots import Plant
+
+PEAK = math.radians(60) * (2 * math.pi / 8) ** 2
+NEED = measured("torque-has-a-limit", "prediction: Which share of the reduced limit")
+
+
+def _inertia() -> float:
+    """Of the planar arm about joint 1 where the circle begins, kg·m²."""
+    scene = torque_scene("planar3-circle")
+    plant = Plant(scene.robot, scene.settings.plant)
+    plant.reset(scene.q_0)
+    return float(plant.mass_matrix()[0, 0])
+
+
+def _rows(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    n, N = 3, 5
+    U, tau_0 = rng.normal(size=(N, n)), rng.normal(size=n)
+    lower = np.kron(np.tril(np.ones((N, N))), np.eye(n))
+    return (lower @ U.ravel()).reshape(N, n) + tau_0, tau_0 + np.cumsum(U, axis=0)
+
+
+def _inherited(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Level 3's candidate Δτ₂* against what levels 1 and 2 must keep."""
+    G_1, G_2, first = rng.normal(size=(2, 7)), rng.normal(size=(2, 7)), rng.normal(size=7)
+    second = first + null_space(G_1) @ rng.normal(size=5)
+    return np.concatenate([G_1 @ second, G_2 @ second]), np.concatenate([G_1 @ first, G_2 @ second])
+
+
+def _price(rng: np.random.Generator) -> tuple[float, float]:
+    Q, R, g = rng.uniform(0.5, 2, 3)
+    e = -5.0
+    free = -Q * g * e / (Q * g**2 + R)
+    b, h = 0.5 * free, 1e-5
+
+    def least(bound: float) -> float:
+        at = min(free, bound)
+        return Q * (e + g * at) ** 2 + R * at**2
+
+    multiplier = -(2 * Q * g * (e + g * b) + 2 * R * b)
+    return (least(b + h) - least(b - h)) / (2 * h), -multiplier
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"What is bounded is the torque, what is chosen are its changes. Stacked over the horizon "
+            r"(32f) are linear rows, with blocks $I$ on and below the diagonal:",
+            r"\tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} = \tau_0 + (L \otimes I)\, U \big|_j, "
+            r"\qquad L = \begin{bmatrix} 1 & & \\ 1 & 1 & \\ \vdots & & \ddots \end{bmatrix}",
+            _rows,
+        ),
+        Line(
+            r"As long as $\tau_0$ is within its limits $U = 0$ satisfies them, so level 1 always has a "
+            r"choice. And what level $i-1$ chose satisfies all that level $i$ must keep (Theorem 2), for "
+            r"$p < i$:",
+            r"J_p \bar M^{-1} \Delta\tau_{i-1}^* = J_p \bar M^{-1} \Delta\tau_p^*",
+            _inherited,
+        ),
+        Line(
+            r"So no level can make the one below it infeasible; it can only leave it nothing. A bound "
+            r"$\Delta\tau \le b$ that is active has a multiplier $\lambda \ge 0$, and this is what a "
+            r"little more torque would be worth:",
+            r"\frac{\partial \mathcal J^*}{\partial b} = -\lambda, \qquad "
+            r"\lambda = -\left( 2 Q g (e + g b) + 2 R b \right)",
+            _price,
+            1e-5,
+        ),
+    ),
+    questions=(
+        Question(
+            "The motors can do 4 N·m. How many N·m are allowed with a factor of 0.06, and how much of "
+            "that does *Enough for all* need?",
+            "⟨limit⟩ N·m; the run needs ⟨share⟩ % of it, ⟨used⟩ N·m.",
+            {"limit": (4 * 0.06, ".2f"), "share": (NEED, ".0f"), "used": (4 * 0.06 * NEED / 100, ".2f")},
+        ),
+        Question(
+            r"$\tau_0 = 0.10$ N·m, the limit is 0.16 N·m, $N = 5$. How large may the first $\Delta\tau$ "
+            r"be, and how "
+            "large the sum of all five?",
+            r"⟨room⟩ N·m in both cases: (32f) bounds every partial sum. The first one may use up all the "
+            r"room; the "
+            "others then add nothing, or take back.",
+            {"room": (0.16 - 0.10, ".2f")},
+        ),
+        Question(
+            "Joint 1 swings by 60°, one round in 8 s, a cosine. What is its largest acceleration, and "
+            "which torque does it take for the inertia alone that the arm has about joint 1 where the "
+            "circle begins?",
+            r"$60° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With $M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m, before "
+            r"friction, the "
+            "circle and the other joints want anything. Three per cent of 4 N·m are ⟨three⟩.",
+            {
+                "a": (PEAK, ".2f"),
+                "M": (_inertia(), ".2f"),
+                "tau": (_inertia() * PEAK, ".2f"),
+                "three": (0.03 * 4, ".2f"),
+            },
+        ),
+    ),
+)

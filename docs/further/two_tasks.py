@@ -1,0 +1,108 @@
+"""Two tasks, one arm: what a sum does, and what (33) leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, null_space
+
+SHARE = 50**2 / (200**2 + 50**2)
+
+
+def _problem(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    return rng.normal(size=(2, 3)), rng.normal(size=(1, 3)), rng.normal(size=2), rng.normal(size=1)
+
+
+def weighted(G_1: np.ndarray, G_2: np.ndarray, e_1: np.ndarray, e_2: np.ndarray, Q_1: float) -> np.ndarray:
+    """The optimum of the sum with Q₂ = R = 1, (3,)."""
+    H = Q_1 * G_1.T @ G_1 + G_2.T @ G_2 + np.eye(3)
+    return -np.linalg.solve(H, Q_1 * G_1.T @ e_1 + G_2.T @ e_2)
+
+
+def _stationary(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    G_1, G_2, e_1, e_2 = _problem(rng)
+    at = weighted(G_1, G_2, e_1, e_2, 200.0)
+    slope = 200 * G_1.T @ (e_1 + G_1 @ at) + G_2.T @ (e_2 + G_2 @ at) + at
+    return slope, np.zeros(3)
+
+
+def _between(rng: np.random.Generator) -> tuple[float, float]:
+    Q, K, z = rng.uniform(1, 9, 2), rng.uniform(1, 9, 2), rng.normal(size=2)
+    grid = np.linspace(-9, 9, 2_000_001)
+    cost = sum(Q[i] * (K[i] * (grid - z[i])) ** 2 for i in range(2))
+    return float(grid[np.argmin(cost)]), float((Q * K**2) @ z / (Q @ K**2))
+
+
+def _kept(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    G, first, s = rng.normal(size=(2, 3)), rng.normal(size=3), rng.normal(size=1)
+    return G @ (first + null_space(G) @ s), G @ first
+
+
+def _limit(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    G_1, G_2, e_1, e_2 = _problem(rng)
+    first = -np.linalg.pinv(G_1) @ e_1
+    Z = null_space(G_1)
+    H = G_2.T @ G_2 + np.eye(3)
+    s = -np.linalg.solve(Z.T @ H @ Z, Z.T @ (H @ first + G_2.T @ e_2))
+    return weighted(G_1, G_2, e_1, e_2, 1e9), first + Z @ s
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            r"Write $G_i = c_0 J_i \bar M^{-1}$ for what a change of torque does to $e_i$. The sum is "
+            r"smallest where "
+            "its gradient vanishes:",
+            r"\sum_i Q_i G_i^\top (e_i + G_i \Delta\tau) + R\, \Delta\tau = 0",
+            _stationary,
+        ),
+        Line(
+            r"Every task pulls at every other. Suppose both want the same coordinate, at $z_1$ and at "
+            r"$z_2$. At rest $e_i = K_{P,i}(z - z_i)$, and the sum settles between them",
+            r"z = \frac{Q_1 K_{P,1}^2 z_1 + Q_2 K_{P,2}^2 z_2}{Q_1 K_{P,1}^2 + Q_2 K_{P,2}^2}",
+            _between,
+            1e-4,
+        ),
+        Line(
+            r"with the gains as prices, too. A strict second level asks differently. Let the columns of "
+            r"$Z$ span what $J_1 \bar M^{-1}$ maps to zero. Then (33) holds for",
+            r"\Delta\tau_2 = \Delta\tau_1^* + Z s \quad\Rightarrow\quad "
+            r"J_1 \bar M^{-1} \Delta\tau_2 = J_1 \bar M^{-1} \Delta\tau_1^*",
+            _kept,
+        ),
+        Line(
+            r"with any $s$, and level 2 is a smaller problem in $s$ alone. A sum gets there only in the "
+            r"limit:",
+            r"\lim_{Q_1 \to \infty} \Delta\tau_{\mathrm{sum}} = \Delta\tau_1^* + Z s^*",
+            _limit,
+            1e-6,
+        ),
+    ),
+    questions=(
+        Question(
+            "Two wishes about one coordinate: at 0 with $K_P = 200$, at 1 with $K_P = 50$, and equal $Q$. "
+            "Where does a weighted controller come to rest?",
+            r"At $z = 50^2/(200^2 + 50^2) = ⟨z⟩$: what counts is the square of the gain, 16 to 1, though "
+            r"both were "
+            "said to be equally important.",
+            {"z": (SHARE, ".3f")},
+        ),
+        Question(
+            "How many times larger than $Q_2$ must $Q_1$ be there for $z$ to stay below 0.001, and below "
+            r"$10^{-6}$? What speaks against just taking it so?",
+            r"From $z = 50^2 Q_2/(200^2 Q_1 + 50^2 Q_2)$ it is $Q_1/Q_2 > ⟨much⟩$, and ⟨more⟩ for a "
+            r"millionth. Level 2 then weighs little beside $R$, so it is not followed even where it could "
+            r"be, and the Hessian holds "
+            "numbers so far apart that a solver loses digits.",
+            {"much": ((1 / 0.001 - 1) / 16, ".0f"), "more": ((1 / 1e-6 - 1) / 16, ",.0f")},
+        ),
+        Question(
+            "Three joints; level 1 has two coordinates, level 2 one. How many numbers does level 2 "
+            "choose? Why does "
+            r"it make no difference to level 1 whether $Q_2$ is 1 or 1000?",
+            r"One: $3 - 2$. $Q_2$ decides where along the line $\Delta\tau_1^* + Z s$ level 2 stops, and "
+            r"every point "
+            "of that line is the same to level 1.",
+        ),
+    ),
+)

@@ -1,0 +1,130 @@
+"""Runs every step of every lesson once and keeps what the site draws of it: `python -m docs.record [NAME …]`.
+
+docs/site/recorded/NAME.json holds, per step, the curves of its plots, of the run and of its ghost, and per
+lesson how the robot moved in one of its steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lessons.course import COURSE, load_lesson
+from lessons.recording.recording import Recording
+from lessons.recording.run import run
+from lessons.teaching.lesson import Lesson, Step
+
+FOLDER = Path(__file__).parents[1] / "docs" / "site" / "recorded"
+POINTS = 160
+"""Of a curve: more than its picture is wide in pixels is no use."""
+RATE = 25.0
+"""Pictures a second, at most, of a motion."""
+PLAYED = {"a-redundant-arm": 1, "no-model-needed": 1, "one-task": 1, "swap-the-priorities": 2, "two-tasks": 1}
+"""Which step of a lesson is seen moving; of the others the first."""
+
+Array = NDArray[np.float64]
+
+
+def recorded(lesson: Lesson) -> dict[str, Any]:
+    """What is kept of a lesson."""
+    steps, played = [], PLAYED.get(lesson.name, 0)
+    motion: dict[str, Any] = {}
+    for place, step in enumerate(lesson.steps):
+        runs = runs_of(lesson, step)
+        steps.append({"title": step.title, "plots": [plot(step, k, runs) for k in range(len(step.plots))]})
+        if place == played:
+            motion = {"step": place, **moved(lesson, step, runs)}
+    return {"steps": steps, "motion": motion}
+
+
+def runs_of(lesson: Lesson, step: Step) -> list[Recording]:
+    """The step's run and, if there is one, its ghost's."""
+    own = lesson.run_of(step)
+    wanted = [own] if step.ghost is None else [own, own.but(*step.ghost.set)]
+    return [run(each.prepared(), to_the_end=True) for each in wanted]
+
+
+def plot(step: Step, place: int, runs: list[Recording]) -> dict[str, Any]:
+    """One signal of all runs. An interval of time keeps its least and its greatest value, so that no peak is
+    lost: t and the values have two points per interval."""
+    signal = step.plots[place]
+    t = runs[0]["t"][:, 0]
+    curves = [signal.over(each) for each in runs]
+    times = thinned(t, t)[0]
+    return {
+        "words": signal.words,
+        "unit": signal.unit,
+        "t": rounded(times),
+        "curves": [rounded(thinned(each["t"][:, 0], y)[1]) for each, y in zip(runs, curves, strict=True)],
+    }
+
+
+def thinned(t: Array, y: Array) -> tuple[Array, Array]:
+    """At most POINTS values in time's order, extremes kept, and when they were."""
+    if len(t) <= POINTS:
+        return t, y
+    times, values = [], []
+    for part in np.array_split(np.arange(len(t)), POINTS // 2):
+        seen = part[np.isfinite(y[part])]
+        low, high = (seen[np.argmin(y[seen])], seen[np.argmax(y[seen])]) if len(seen) else (part[0], part[0])
+        times += [t[part[0]], t[part[len(part) // 2]]]
+        values += [y[min(low, high)], y[max(low, high)]]
+    return np.array(times), np.array(values)
+
+
+def moved(lesson: Lesson, step: Step, runs: list[Recording]) -> dict[str, Any]:
+    """How the joints and the targets moved: seconds, joint angles of each run, targets by task."""
+    own = runs[0]
+    T_s = own.session.settings.T_s
+    every = max(1, round(1.0 / (RATE * T_s)))
+    targets = {}
+    for task in own.layout.tasks:
+        x_d = own[f"x_d/{task.name}"]
+        if task.unit == "m" and x_d.shape[1] in (2, 3) and np.isfinite(x_d).any():
+            targets[task.name] = rounded(x_d[::every], 4)
+    return {
+        "period": every * T_s,
+        "words": [step.title, *([step.ghost.words] if step.ghost else [])],
+        "q": [rounded(each["q"][::every], 4) for each in runs],
+        "targets": targets,
+    }
+
+
+def rounded(values: Array, digits: int | None = None) -> list[Any]:
+    """As JSON takes it: four significant digits, or so many after the point; None for no number."""
+    if values.ndim > 1:
+        return [rounded(row, digits) for row in values]
+    return [
+        None if not np.isfinite(v) else float(f"{v:.4g}") if digits is None else round(float(v), digits)
+        for v in values
+    ]
+
+
+def write(name: str, folder: Path = FOLDER) -> Path:
+    """Runs one lesson and keeps it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.json"
+    told = json.dumps(recorded(load_lesson(name)), ensure_ascii=False, separators=(",", ":"))
+    path.write_text(
+        told.replace(',{"title"', ',\n{"title"').replace('"motion"', '\n"motion"') + "\n", "utf-8"
+    )
+    return path
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("names", nargs="*", default=list(COURSE))
+    for name in parser.parse_args().names:
+        path = write(name)
+        print(f"{name}: {path.stat().st_size / 1000:.0f} kB", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()
