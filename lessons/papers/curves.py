@@ -20,9 +20,14 @@ def curve(run: Run, field: str, k: int = 0, scale: float = 1.0, **how: object) -
     return Curve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
 
 
-def by_controller(runs: Sequence[Run], field: str, k: int, scale: float = 1.0) -> tuple[Curve, ...]:
-    """A field of several controllers' runs, each in its colour; the first is drawn broad, so that those
-    that coincide with it leave it visible."""
+_BROAD = (2.4, 1.0)
+
+
+def by_controller(
+    runs: Sequence[Run], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
+) -> tuple[Curve, ...]:
+    """A field of several controllers' runs, each in its colour. weights: widths of the first, if there are
+    others, and of the others; the first is broad, so that those that coincide with it leave it visible."""
     shown = [run for run in runs if len(run.t)]
     return tuple(
         curve(
@@ -32,7 +37,7 @@ def by_controller(runs: Sequence[Run], field: str, k: int, scale: float = 1.0) -
             scale,
             label=name(run.controller),
             colour=run.controller,
-            weight=2.4 if place == 0 and len(shown) > 1 else 1.0,
+            weight=weights[0] if place == 0 and len(shown) > 1 else weights[1],
         )
         for place, run in enumerate(shown)
     )
@@ -120,8 +125,10 @@ def joint_panels(
     scale: float = 1.0,
     bound: str | None = None,
     joints: int | None = None,
+    weights: tuple[float, float] = _BROAD,
 ) -> tuple[Panel, ...]:
-    """A panel per joint of a per-joint field, with ± the bound's field of the first run that has one."""
+    """A panel per joint of a per-joint field, with ± the bound's field of the first run that has one; weights
+    as in `by_controller`."""
     known = next((run for run in runs if run.error is None), None)
     if known is None:
         return (Panel(f"${symbol}$ ({unit})", ()),)
@@ -135,7 +142,7 @@ def joint_panels(
         panels.append(
             Panel(
                 f"${symbol}_{k + 1}$ ({unit})",
-                by_controller(runs, field, k, scale),
+                by_controller(runs, field, k, scale, weights),
                 bounds=bounds,
                 bound_label="bound",
             )

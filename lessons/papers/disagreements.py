@@ -24,7 +24,9 @@ Neither paper prints its plant (masses, friction, how a velocity is measured) or
 differs need not be wrong, neither theirs nor ours; but each must have a reason that can be looked at. Here
 is every row that does not agree within its tolerance, 10 % where none is named, ordered by what we think is
 the cause. *Opposite* means that an effect has the other direction. `reproduce` judges each row on both
-sides: it also fails if a disagreement shrinks or vanishes without this page being changed.
+sides: it also fails if a disagreement shrinks or vanishes without this page being changed. Numbers in the
+tables are measured anew by every `reproduce`; those in the texts below them were measured once, by the
+settings named with them.
 """
 _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.")
 

@@ -25,6 +25,8 @@ _DECADES = 300
 """A logarithmic axis that spans less than this factor has ticks at 1, 2, 5."""
 _TALL = 50
 """Bars whose heights differ by more than this factor get a logarithmic axis."""
+_LABEL = 20
+"""Characters in a line of the label of an axis of bars."""
 _NAME = 10
 """Characters in a line of a name below an axis."""
 _STYLES = {"line": "-", "dashed": (0, (5, 2)), "dots": "", "steps": "-"}
@@ -148,10 +150,29 @@ def _draw_bars(axes: Axes, panel: Bars) -> None:
         axes.bar(middle + offset, values, 0.92 * width, color=colour(key), label=label, zorder=3)
     axes.set_xticks(middle, panel.groups)
     axes.grid(visible=False, axis="x")
-    axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
+    axes.set(xlabel=panel.x_label, ylabel=textwrap.fill(panel.y_label, _LABEL), title=panel.title)
     known = [value for _, _, values in panel.series for value in values if value > 0]
     if known and max(known) > _TALL * min(known):
         axes.set_yscale("log")
+        _mark_zeros(axes, panel, width)
+
+
+def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
+    """A logarithmic axis has no place for a bar of no height: it gets a word."""
+    for place, (_, key, values) in enumerate(panel.series):
+        offset = (place - 0.5 * (len(panel.series) - 1)) * width
+        for group, value in enumerate(values):
+            if value <= 0:
+                axes.annotate(
+                    "none",
+                    (group + offset, 0.0),
+                    (0, 2),
+                    xycoords=("data", "axes fraction"),
+                    textcoords="offset points",
+                    ha="center",
+                    fontsize=7,
+                    color=colour(key),
+                )
 
 
 def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:

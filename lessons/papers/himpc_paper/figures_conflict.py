@@ -95,15 +95,19 @@ def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
     )
 
 
+_CHATTER = (0.5, 1.6)
+"""Of HQP, which switches to and fro, and HIMPC: a broad line would be a block."""
+
+
 def _fig_12(results: Results, quick: bool) -> Section:
     runs = _runs(results, (rt2("hqp"), rt2("himpc")))
-    panels = joint_panels(runs, "tau_demand", r"\tau", "N·m", bound="tau_upper")
+    panels = joint_panels(runs, "tau_demand", r"\tau", "N·m", bound="tau_upper", weights=_CHATTER)
     return _picture("himpc-fig-12", "Torque demands on RT2, with their bounds.", panels)
 
 
 def _fig_13(results: Results, quick: bool) -> Section:
     runs = _runs(results, (rt2("hqp"), rt2("himpc")))
-    panels = joint_panels(runs, "v", r"\dot q", "deg/s", DEG, bound="v_limit")
+    panels = joint_panels(runs, "v", r"\dot q", "deg/s", DEG, bound="v_limit", weights=_CHATTER)
     return _picture("himpc-fig-13", "Joint velocities on RT2, with their bounds.", panels)
 
 
