@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-IN_DOCS = ("serving", "authoring", "instructors", "disagreements", "settings")
+IN_DOCS = ("serving", "authoring", "instructors", "disagreements", "settings", "results", "house")
 LINKS = {
     **{f"{where}{name}.md": f"{name}.md" for name in IN_DOCS for where in ("docs/", "")},
     "docs/lessons/README.md": "lessons/index.md",
-    "CONTRIBUTING.md": "contributing.md",
+    **{f"{where}CONTRIBUTING.md": "contributing.md" for where in ("", "../")},
     "examples/README.md": "examples/index.md",
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
@@ -19,8 +19,6 @@ FROM_README = {
     "start": ("Start", "Start"),
     "own": ("Bring your own", "Bring your own"),
     "own-program": ("In your own program", "In your own program"),
-    "results": ("Results beside the papers'", "Results beside the papers'"),
-    "house": ("How it is built", "How it is built"),
     "limits": ("Limits", "Limits"),
 }
 """Page: its title and the README's section."""
