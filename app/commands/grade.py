@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ def grade(
     hints: int = 0,
     seed: int = 0,
     out: Path = Path("grades.csv"),
+    scheduler: str | None = None,
     json: str | None = None,
 ) -> int:
     """Judge a solution of an exercise by what it does; without a file, list the exercises.
@@ -35,6 +37,8 @@ def grade(
         hints: show so many hints of the exercise.
         seed: decides the disturbances.
         out: table to write for a folder, and to carry on.
+        scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
+            machine's cores.
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.exercises.grade import as_data
@@ -43,7 +47,7 @@ def grade(
     if file is None:
         return _list(exercise, hints, json)
     if file.is_dir():
-        return _folder(file, exercise, seed, out, json)
+        return _folder(file, exercise, seed, out, scheduler, json)
     found = grade_file(str(file), exercise, seed)
     if json is not None:
         write_json(as_data(found), json)
@@ -113,11 +117,15 @@ def _list(exercise: str | None, hints: int, json: str | None) -> int:
     return 0
 
 
-def _folder(folder: Path, exercise: str | None, seed: int, out: Path, json: str | None) -> int:
+def _folder(
+    folder: Path, exercise: str | None, seed: int, out: Path, scheduler: str | None, json: str | None
+) -> int:
     from lessons.exercises.folder import grade_folder
+    from lessons.parallel import on_cluster, on_cores
 
-    with progress_bar(f"grading {folder} …", json is None) as advance:
-        rows = grade_folder(folder, exercise, seed, out, advance)
+    way = nullcontext(on_cores) if scheduler is None else on_cluster(scheduler)
+    with way as spread, progress_bar(f"grading {folder} …", json is None) as advance:
+        rows = grade_folder(folder, exercise, seed, out, spread, advance)
     if json is not None:
         write_json(rows, json)
         return 0

@@ -5,30 +5,39 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
 from pathlib import Path
 
 from lessons.exercises import load_exercise
-from lessons.exercises.grade import Grade, grade
-from lessons.own.files import SUFFIX, read
-from lessons.parallel import cores
+from lessons.exercises.grade import WITHIN, Grade, Submission, grade_apart
+from lessons.own.files import SUFFIX, Source, read
+from lessons.parallel import Failed, Spread
 from robots import InputError
+from robots.isolation import Allowance
 
 COLUMNS: tuple[str, ...] = ("file", "exercise", "points", "of", "missed", "error", "seed", "asked", "sha256")
 Row = dict[str, str]
 
 
 def grade_folder(
-    folder: Path, exercise: str | None, seed: int, out: Path, progress: Callable[[float], None]
+    folder: Path,
+    exercise: str | None,
+    seed: int,
+    out: Path,
+    spread: Spread,
+    progress: Callable[[float], None],
+    within: Allowance = WITHIN,
 ) -> list[Row]:
-    """Grades every Python file of a folder, on all cores, each in a process of its own.
+    """Grades every Python file of a folder, each in a process of its own.
 
     Args:
         folder: of the submissions.
         exercise: which; None: what each file says.
         seed: decides the disturbances, the same for all.
         out: CSV file; rows that are there already, of the same content, are kept.
+        spread: how the work is spread.
         progress: called with the share that is done.
+        within: what grading one file may cost.
 
     Raises:
         InputError: no such exercise, no Python file in the folder, or the table cannot be written.
@@ -40,25 +49,27 @@ def grade_folder(
         raise InputError(f"{folder}: has no Python file; give a folder of submissions")
     held = {(row["file"], row["sha256"], row["seed"], row["asked"]): row for row in _rows(out)}
     done: dict[Path, Row] = {}
+    left: list[Source] = []
     for path in files:
-        row = held.get((path.name, _digest(path), str(seed), exercise or ""))
-        if row is not None:
-            done[path] = row
-    left = [path for path in files if path not in done]
-    with ThreadPoolExecutor(cores()) as pool:
-        futures = {pool.submit(grade, str(path), exercise, seed): path for path in left}
         try:
-            for future in as_completed(futures):
-                path = futures[future]
-                try:
-                    done[path] = row_of(future.result(), seed, exercise)
-                except InputError as error:  # it cannot even be read
-                    failed = Grade(str(path), "", exercise or "", error=str(error))
-                    done[path] = row_of(failed, seed, exercise)
-                _write(out, [done[each] for each in files if each in done])
-                progress(len(done) / len(files))
-        finally:
-            pool.shutdown(cancel_futures=True)
+            source = read(str(path))
+        except InputError as error:
+            done[path] = row_of(Grade(str(path), "", exercise or "", error=str(error)), seed, exercise)
+            continue
+        row = held.get((path.name, source.digest, str(seed), exercise or ""))
+        if row is None:
+            left.append(source)
+        else:
+            done[path] = row
+    work = spread(grade_apart, [Submission(source, exercise, seed, within) for source in left])
+    with closing(work) as outcomes:
+        for place, outcome in outcomes:
+            source = left[place]
+            if isinstance(outcome, Failed):
+                outcome = Grade(source.path, source.digest, exercise or "", error=outcome.reason)
+            done[Path(source.path)] = row_of(outcome, seed, exercise)
+            _write(out, [done[each] for each in files if each in done])
+            progress(len(done) / len(files))
     found = [done[path] for path in files]
     _write(out, found)
     return found
@@ -84,13 +95,6 @@ def row_of(found: Grade, seed: int, asked: str | None) -> Row:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _digest(path: Path) -> str:
-    try:
-        return read(str(path)).digest
-    except InputError:
-        return ""
 
 
 def _rows(out: Path) -> Iterator[Row]:

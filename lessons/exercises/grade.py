@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -28,8 +31,9 @@ from robots.isolation import Allowance, Fault, isolated
 WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program itself", "leave that out")
 """What grading one file may cost."""
 _WRITING = frozenset("wax+")
-_REFUSED = ("socket.", "subprocess.", "os.system", "os.exec", "os.fork", "os.posix_spawn", "os.remove",
-            "os.rename", "os.mkdir", "os.rmdir", "shutil.", "webbrowser.", "ctypes.")  # fmt: skip
+_REFUSED = ("socket.", "subprocess.", "os.system", "os.exec", "os.fork", "os.posix_spawn", "os.kill", "os.remove",
+            "os.rename", "os.mkdir", "os.rmdir", "os.truncate", "os.link", "os.symlink", "shutil.", "webbrowser.",
+            "ctypes.")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -84,26 +88,63 @@ class Grade:
         return not self.error and self.points == self.of
 
 
-def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
-    """Grades a file, in a process of its own.
+@dataclass(frozen=True)
+class Submission:
+    """A file to be graded, as it is sent to another process or another machine.
 
-    Args:
-        path: of the submission.
+    Attributes:
+        source: the file as it was read.
         exercise: which; None: what the file says in EXERCISE.
         seed: decides the disturbances.
+        within: what grading it may cost.
+    """
+
+    source: Source
+    exercise: str | None = None
+    seed: int = 0
+    within: Allowance = WITHIN
+
+
+def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
+    """Grades a file, in a process of its own; arguments as of `Submission`.
 
     Raises:
         InputError: there is no such exercise or no such file.
     """
     if exercise is not None:
         load_exercise(exercise)
-    source = read(path)
+    return grade_apart(Submission(read(path), exercise, seed))
+
+
+def grade_apart(submission: Submission) -> Grade:
+    """Grades a submission in a process of its own; whatever it does there is a grade."""
+    source, asked = submission.source, submission.exercise
+    with _placed(source) as here:
+        try:
+            found = isolated(graded, here, asked, submission.seed, within=submission.within)
+        except Fault as fault:
+            found = Grade(here.path, here.digest, asked or "", error=f"{here.path}: {fault}")
+        except InputError as error:
+            found = Grade(here.path, here.digest, asked or "", error=str(error))
+    lines = (replace(line, why=line.why.replace(here.path, source.path)) for line in found.lines)
+    error = found.error.replace(here.path, source.path)
+    return replace(found, file=source.path, lines=tuple(lines), error=error)
+
+
+@contextmanager
+def _placed(source: Source) -> Iterator[Source]:
+    """The file where it was read or, on a machine that has it not, written to a folder of its own."""
     try:
-        return isolated(graded, source, exercise, seed, within=WITHIN)
-    except Fault as fault:
-        return Grade(path, source.digest, exercise or "", error=f"{path}: {fault}")
-    except InputError as error:
-        return Grade(path, source.digest, exercise or "", error=str(error))
+        there = read(source.path).text == source.text
+    except InputError:
+        there = False
+    if there:
+        yield source
+        return
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / Path(source.path).name
+        path.write_text(source.text, encoding="utf-8")
+        yield Source(str(path), source.text)
 
 
 def graded(source: Source, exercise: str | None, seed: int) -> Grade:
@@ -216,13 +257,8 @@ def refuse_from(path: str) -> None:
         frame = sys._getframe(1)
         while frame is not None:
             if frame.f_code.co_filename == path:
-                raise PermissionError(f"a submission may not do that ({event} {str(given[:1])[1:60]})")
+                what = f"{event} {given[0]:.60}" if isinstance(given[0], str) else event
+                raise PermissionError(f"a submission may not do that ({what})")
             frame = frame.f_back
 
     sys.addaudithook(hook)
-
-
-def rounded(found: Grade) -> Grade:
-    """The same with what was measured to four digits: two gradings give the same table."""
-    lines = (replace(line, measured=float(f"{line.measured:.4g}")) for line in found.lines)
-    return replace(found, lines=tuple(lines))

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from submissions import SUBMISSIONS
 
 from lessons.parallel import Failed, on_cluster
 
@@ -114,3 +115,19 @@ def _dies_at_one(value: int) -> int:
     if value == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return value
+
+
+def test_a_folder_of_submissions_is_graded_on_the_cluster(cluster: Any, tmp_path: Path) -> None:
+    held = tmp_path / "held"
+    held.mkdir()
+    for name in ("right_time_delay", "wrong_leaves", "wrong_syntax"):
+        (held / f"{name}.py").write_text(SUBMISSIONS[name].file)
+    tables = []
+    for more in ((), ("--scheduler", cluster.scheduler_address)):
+        out = tmp_path / f"{len(more)}.csv"
+        command = [sys.executable, "-m", "app", "grade", str(held), "--out", str(out), *more]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        assert subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL).returncode == 0
+        tables.append(out.read_text())
+    assert tables[0] == tables[1]
+    assert [line.split(",")[2] for line in tables[0].splitlines()] == ["points", "10", "0", "0"]

@@ -2,64 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from submissions import PD, RIGHT, SUBMISSIONS
 
 from lessons.exercises import EXERCISES, load_exercise, start_of
-from lessons.exercises.grade import grade, judged_by
-from lessons.own.files import execute, read
+from lessons.exercises.folder import grade_folder
+from lessons.exercises.grade import WITHIN, Submission, grade, grade_apart, judged_by
+from lessons.own.files import Source, execute, read
+from lessons.parallel import on_cores, one_by_one
 from robots import InputError
-
-TASK = """
-def wanted(level):
-    return (level.x_ddot_d[0] - level.K_v * (level.x_dot - level.x_dot_d[0]) - level.K_p * level.error)
-"""
-PD = (
-    TASK
-    + """
-def torque(now):
-    return now.gravity + now.M_bar * wanted(now.level("posture"))
-"""
-)
-OSF = (
-    TASK
-    + """
-import numpy as np
-
-def torque(now):
-    M_inv = np.linalg.inv(now.M)
-    N, tau, torques = np.eye(now.n), np.zeros(now.n), []
-    for level in now.levels:
-        J = level.J @ N
-        L = np.linalg.pinv(J @ M_inv @ J.T, rcond=1e-9, hermitian=True)
-        tau = tau + J.T @ L @ (wanted(level) - level.J_dot_q_dot - level.J @ M_inv @ tau)
-        N = N - M_inv @ J.T @ L @ J
-        torques.append(now.bias + tau)
-    return torques
-"""
-)
-TDE = (
-    TASK
-    + """
-def torque(now):
-    return now.tau_0 + now.M_bar * (wanted(now.level("posture")) - now.q_ddot)
-"""
-)
-QP = (
-    start_of("two-levels")
-    .replace('EXERCISE = "two-levels"', "")
-    .replace(
-        "        # TODO: for the second level the rows J₁ M̄⁻¹ with lower = upper = J₁ M̄⁻¹ Δτ₁.\n",
-        "        if torques:\n"
-        "            B, U = now.levels[0].J / now.M_bar, torques[0] - now.tau_0\n"
-        "            rows = np.vstack([rows, B])\n"
-        "            lower = np.r_[np.minimum(lower, rows[:-len(B)] @ U), B @ U]\n"
-        "            upper = np.r_[np.maximum(upper, rows[:-len(B)] @ U), B @ U]\n",
-    )
-)
-RIGHT = {"joint-pd": PD, "null-space": OSF, "time-delay": TDE, "one-level-qp": QP, "two-levels": QP}
 
 WRONG: dict[str, tuple[str, str, str, str]] = {
     "pd: sign of K_p": ("joint-pd", "- level.K_p", "+ level.K_p", "comes back"),
@@ -175,44 +131,89 @@ def test_a_grade_comes_out_the_same_twice(file) -> None:
     assert grade(path, "joint-pd", 3) == grade(path, "joint-pd", 3)
 
 
-def test_a_folder_is_graded_into_one_table_that_carries_on(tmp_path: Path, monkeypatch) -> None:
-    """The right ones get all points, nobody loses any through a neighbour, and twice it is the same table."""
-    from lessons.exercises import folder as folders
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("while True: pass", "takes longer than 6 s"),
+        ("import time; time.sleep(100)", "takes longer than 6 s"),
+        (
+            "    while True:\n        try: now.wait\n        except BaseException: pass",
+            "takes longer than 6 s",
+        ),
+        ("    import time; time.sleep(0.4); return now.gravity", "takes longer than 6 s"),
+    ],
+    ids=["endless when loaded", "sleeps when loaded", "endless and deaf", "sleeps a little, always"],
+)
+def test_what_never_ends_is_ended_and_its_grade_is_a_sentence(text: str, words: str, tmp_path: Path) -> None:
+    law = (
+        f"def torque(now):\n{text}\n" if text.startswith(" ") else f"{text}\ndef torque(now): return now.q\n"
+    )
+    source = Source(str(tmp_path / "mine.py"), law)
+    found = grade_apart(Submission(source, "joint-pd", within=replace(WITHIN, seconds=6.0)))
+    assert words in found.error
+    assert found.points == 0
 
-    held = tmp_path / "held"
-    held.mkdir()
-    texts = {
-        "anna": TDE,
-        "ben": TDE.replace("- now.q_ddot", ""),
-        "cleo": "import os\ndef torque(now):\n    os._exit(0)\n",
-        "dan": "def torque(now)\n",
-        "eve": "def torque(now):\n    return now.tau_0\n",
-    }
-    for name, text in texts.items():
-        (held / f"{name}.py").write_text(text)
+
+def test_a_grade_needs_no_file_where_it_is_made(tmp_path: Path) -> None:
+    """A machine of a cluster has not the disk of whoever grades."""
+    source = Source("far/away/mine.py", "def torque(now):\n    return now.q[:2]\n")
+    found = grade_apart(Submission(source, "joint-pd"))
+    assert found.file == "far/away/mine.py"
+    assert found.lines[0].why.startswith("far/away/mine.py, line 1: ")
+
+
+def folder_of(place: Path, names: Sequence[str]) -> Path:
+    place.mkdir()
+    for name in names:
+        (place / f"{name}.py").write_text(SUBMISSIONS[name].file)
+    return place
+
+
+def test_thirty_submissions_get_the_grades_they_deserve(tmp_path: Path) -> None:
+    """Nobody loses anything through a neighbour, and twice it is the same table."""
     out, shares = tmp_path / "grades.csv", []
-    rows = folders.grade_folder(held, "time-delay", 0, out, shares.append)
-    found = {row["file"].removesuffix(".py"): int(row["points"]) for row in rows}
-    assert found["anna"] == 10
-    assert 0 < found["ben"] < 10
-    assert (found["cleo"], found["dan"]) == (0, 0)
-    assert found["eve"] < 10
-    assert "ended by the program" in rows[2]["error"]
-    assert rows[3]["error"] == "dan.py, line 1: expected ':'"
+    rows = grade_folder(folder_of(tmp_path / "all", list(SUBMISSIONS)), None, 0, out, on_cores, shares.append)
+    assert len(rows) == 30
+    found = {row["file"].removesuffix(".py"): row for row in rows}
+    assert {name: int(row["points"]) for name, row in found.items()} == {
+        name: each.points for name, each in SUBMISSIONS.items()
+    }
+    for name, each in SUBMISSIONS.items():
+        assert each.words in found[name]["missed"] + found[name]["error"], name
     assert shares[-1] == 1.0
-    text = out.read_text()
-    graded = []
+    few = ["right_time_delay", "wrong_kills", "wrong_leaves", "wrong_sign", "wrong_weighted"]
+    beside = tmp_path / "again.csv"
+    grade_folder(folder_of(tmp_path / "few", few), None, 0, beside, on_cores, shares.append)
+    assert set(beside.read_text().splitlines()) < set(out.read_text().splitlines())
 
-    def counted(path: str, *given):
-        graded.append(Path(path).name)
-        return grade(path, *given)
 
-    monkeypatch.setattr(folders, "grade", counted)
-    (held / "dan.py").write_text("def torque(now): return 1\n}")
-    again = folders.grade_folder(held, "time-delay", 0, out, shares.append)
-    assert graded == ["dan.py"]
-    assert [row["points"] for row in again] == [row["points"] for row in rows]
-    assert out.read_text().splitlines()[1] == text.splitlines()[1]
+def test_grades_of_a_folder_are_carried_on(tmp_path: Path) -> None:
+    """Stopped after its first file, and one is changed: what is done is not done again."""
+    graded: list[str] = []
+
+    def counted(function, items) -> Generator:
+        graded[:] = [Path(each.source.path).name for each in items]
+        yield from one_by_one(function, items)
+
+    def stopped(function, items) -> Generator:
+        with closing(one_by_one(function, items)) as outcomes:
+            yield next(outcomes)
+        raise KeyboardInterrupt
+
+    names, out = ["wrong_leaves", "wrong_syntax"], tmp_path / "grades.csv"
+    held = folder_of(tmp_path / "held", names)
+    with pytest.raises(KeyboardInterrupt):
+        grade_folder(held, None, 0, out, stopped, lambda _: None)
+    assert len(out.read_text().splitlines()) == 2
+    grade_folder(held, None, 0, out, counted, lambda _: None)
+    assert graded == ["wrong_syntax.py"]
+    before = out.read_text().splitlines()
+    (held / "wrong_syntax.py").write_text("def torque(now): return 1\n}")
+    grade_folder(held, None, 0, out, counted, lambda _: None)
+    after = out.read_text().splitlines()
+    assert graded == ["wrong_syntax.py"]
+    assert after[1] == before[1]
+    assert after[2] != before[2]
 
 
 @pytest.mark.parametrize(
@@ -220,11 +221,9 @@ def test_a_folder_is_graded_into_one_table_that_carries_on(tmp_path: Path, monke
     [("empty", None, "no Python file"), ("other", "a,b\n1,2\n", "is no table of himpc-lab grade")],
 )
 def test_a_folder_that_cannot_be_graded_is_a_sentence(name, text, words, tmp_path: Path) -> None:
-    from lessons.exercises.folder import grade_folder
-
     out = tmp_path / "grades.csv"
     if text is not None:
         out.write_text(text)
         (tmp_path / "one.py").write_text("")
     with pytest.raises(InputError, match=words):
-        grade_folder(tmp_path, None, 0, out, lambda _: None)
+        grade_folder(tmp_path, None, 0, out, one_by_one, lambda _: None)
