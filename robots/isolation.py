@@ -112,13 +112,14 @@ def isolated(function: Callable[..., _T], *args: object, within: Allowance | Non
     return result
 
 
-def _answer_of(child: subprocess.Popen[bytes], request: bytes, seconds: float) -> bytes:
+def _answer_of(child: subprocess.Popen[bytes], request: bytes | None, seconds: float) -> bytes:
     """What it prints. Raises TimeoutExpired after so many seconds of its own, see `Allowance`."""
     began, longest, more = time.monotonic(), PATIENCE * seconds, seconds
     while True:
         try:
             return child.communicate(request, timeout=more)[0]
         except subprocess.TimeoutExpired:
+            request = None  # sent once
             passed = time.monotonic() - began
             more = min(seconds + _waited(child.pid), longest) - passed
             if more < 0.01 * seconds:

@@ -21,6 +21,7 @@ def run(
     urdf: str | None = None,
     tip: str | None = None,
     controller: str | None = None,
+    task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
     duration: float | None = None,
     seed: int | None = None,
     state: str | None = None,
@@ -38,6 +39,8 @@ def run(
         tip: end-effector frame, for the scene "hold".
         controller: which controller instead of the scene's own: a name (see himpc-lab controllers) or a
             Python file of your own.
+        task: Python file with a task of your own that the stack of --state may name; --set stack=… names it
+            by itself.
         duration: simulated seconds; the scene's own by default.
         seed: seed of the run; 0, or the state's, by default.
         state: a state code, as the page shows it: its scene, robot, settings and seed.
@@ -46,6 +49,7 @@ def run(
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
+    from lessons.own.resolve import tasks_named
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
@@ -54,7 +58,8 @@ def run(
     if controller is not None:  # instead of the code's
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
-    spec = replace(spec.but(*set), duration=duration, seed=spec.seed if seed is None else seed)
+    seed = spec.seed if seed is None else seed
+    spec = replace(spec.but(*set), duration=duration, seed=seed, tasks=(*task, *tasks_named(set)))
     loaded = spec.prepared()
     if settings:
         return _list(loaded, json)

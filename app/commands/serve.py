@@ -16,6 +16,7 @@ def serve(
     urdf: str | None = None,
     tip: str | None = None,
     controller: str | None = None,
+    task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
     state: str | None = None,
     max_sessions: int = 4,
     classroom: bool = False,
@@ -33,6 +34,7 @@ def serve(
         lesson: lesson to start with; himpc-lab lessons lists them. Or a Python file of your own.
         scene: scene to start with; iiwa14-hold by default, hold with --urdf. Or a Python file of your own.
         controller: controller to start with, or a Python file of your own: what is saved there, runs.
+        task: Python file with a task of your own that can be added to the stack.
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
         state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
@@ -54,14 +56,14 @@ def serve(
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
         raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
-    own = SceneChoice.starting(scene or ("hold" if urdf else FIRST.run.scene), urdf, tip, controller)
+    own = SceneChoice.starting(scene or ("hold" if urdf else FIRST.run.scene), urdf, tip, controller, task)
     if lesson is not None:
         choice = SceneChoice.opening(lesson).admitting(own)
     elif state is not None:
         from lessons.replay.state import decode
 
         found = decode(state)
-        found = replace(found, run=replace(found.run, files=own.run.files))
+        found = replace(found, run=replace(found.run, files=own.run.files, tasks=own.run.tasks))
         choice = SceneChoice.of_state(found).admitting(own)
     else:
         choice = own

@@ -44,10 +44,12 @@ def sweep(
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
     from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
+    from lessons.own.resolve import tasks_named
     from lessons.parallel import on_cluster, on_cores
     from lessons.scenes.run_spec import RunSpec
 
-    base = RunSpec(scene, controller=controller, set=tuple(set), duration=duration, seed=seed)
+    own = tasks_named(set)
+    base = RunSpec(scene, controller=controller, set=tuple(set), duration=duration, seed=seed, tasks=own)
     definition = make_sweep(base, over)
     choices = metrics(definition)
     shown = check_metric(metric or choices[0], choices)

@@ -28,8 +28,8 @@ class SceneChoice:
         urdf_text: an uploaded robot, instead of the run's.
         exercise: the step of a lesson that it is.
         mine: what the learner had changed of that step, as assignments; made anew once when it is loaded.
-        scenes: Python files that may be the scene. These and the run's `files` are what whoever started the
-            program named: no others are run.
+        scenes: Python files that may be the scene. These and the run's `files` and `tasks` are what whoever
+            started the program named: no others are run.
     """
 
     run: RunSpec
@@ -40,11 +40,17 @@ class SceneChoice:
 
     @classmethod
     def starting(
-        cls, scene: str, urdf: str | None = None, tip: str | None = None, controller: str | None = None
+        cls,
+        scene: str,
+        urdf: str | None = None,
+        tip: str | None = None,
+        controller: str | None = None,
+        tasks: tuple[str, ...] = (),
     ) -> SceneChoice:
-        """What the command line asks for: scene and controller by name, or by the path of a file."""
+        """What the command line asks for: scene and controller by name, or by the path of a file; files of
+        tasks."""
         files = (controller,) if controller is not None and is_file(controller) else ()
-        begun = cls.of_run(RunSpec(scene, urdf, tip, controller, files=files))
+        begun = cls.of_run(RunSpec(scene, urdf, tip, controller, files=files, tasks=tasks))
         return replace(begun, scenes=(scene,) if is_file(scene) else ())
 
     @classmethod
@@ -78,7 +84,7 @@ class SceneChoice:
         if state.lesson is None:
             return cls.of_run(run)
         lesson = cls.of_lesson(Exercise.at(state.lesson, state.step or 1))
-        own = replace(lesson.run, seed=run.seed, files=run.files)
+        own = replace(lesson.run, seed=run.seed, files=run.files, tasks=run.tasks)
         if (own.scene, own.urdf, own.tip) != (run.scene, run.urdf, run.tip):
             raise InputError(
                 f"step {state.step or 1} of lesson '{state.lesson}' has another scene than the code: "
@@ -96,13 +102,14 @@ class SceneChoice:
 
     def admitting(self, start: SceneChoice) -> SceneChoice:
         """The same with the files of what the program was started with."""
-        return replace(self, scenes=start.scenes, run=replace(self.run, files=start.run.files))
+        run = replace(self.run, files=start.run.files, tasks=start.run.tasks)
+        return replace(self, scenes=start.scenes, run=run)
 
     @property
     def known(self) -> bool:
         """Whether names alone tell that it can be loaded: no file, frame or setting of somebody's own."""
         scene, seed = self.run.scene, self.run.seed
-        if self.run.files or (self.exercise is not None and is_file(self.exercise.lesson)):
+        if self.run.files or self.run.tasks or (self.exercise is not None and is_file(self.exercise.lesson)):
             return False
         if self.exercise is not None:
             return not scene

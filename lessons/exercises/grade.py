@@ -31,9 +31,9 @@ from robots.isolation import Allowance, Fault, isolated
 WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program itself", "leave that out")
 """What grading one file may cost."""
 _WRITING = frozenset("wax+")
-_REFUSED = ("socket.", "subprocess.", "os.system", "os.exec", "os.fork", "os.posix_spawn", "os.kill", "os.remove",
-            "os.rename", "os.mkdir", "os.rmdir", "os.truncate", "os.link", "os.symlink", "shutil.", "webbrowser.",
-            "ctypes.")  # fmt: skip
+_REFUSED = ("socket.", "subprocess.", "os.system", "os.exec", "os.fork", "os.posix_spawn", "os.kill",
+            "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.truncate", "os.link", "os.symlink",
+            "shutil.", "webbrowser.", "ctypes.")  # fmt: skip
 
 
 @dataclass(frozen=True)

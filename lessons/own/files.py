@@ -73,8 +73,9 @@ def fingerprint(path: str) -> str:
     return f"{Path(path).name}@{read(path).digest[:12]}"
 
 
-def with_fingerprint(mark: str, files: Iterable[str]) -> str:
-    """The file among several that a fingerprint is of. Raises InputError if it is none of them."""
+def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
+    """The file among several that a fingerprint is of; kind: what it is, and the option that names it. Raises
+    InputError if it is none of them."""
     name = mark.partition("@")[0]
     alike = [each for each in files if is_file(each) and Path(each).name == name]
     for each in alike:
@@ -86,8 +87,8 @@ def with_fingerprint(mark: str, files: Iterable[str]) -> str:
             f"({fingerprint(alike[0])}, not {shortened(mark, 100)})"
         )
     raise InputError(
-        f"this was made with a controller of somebody's own, {shortened(mark, 100)}: get that file and add "
-        f"--controller {shortened(name, 60)}"
+        f"this was made with a {kind} of somebody's own, {shortened(mark, 100)}: get that file and add "
+        f"--{kind} {shortened(name, 60)}"
     )
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,9 @@ from himpc.tasks import Task
 from lessons.own.files import Source, execute, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
-from lessons.scenes.catalog import as_torque_scene, load_scene
+from lessons.scenes.catalog import as_torque_scene, load_scene, with_own_tasks
 from lessons.scenes.scene import Scene
+from lessons.settings.assignments import parse_assignment
 from robots import InputError, Robot
 
 if TYPE_CHECKING:
@@ -91,7 +92,37 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
     _called(source, lambda: check_task(task, scene.robot, name))
     first, *others = scene.settings.levels
     levels = (first, Level((task,)), *others)
-    return replace(scene, settings=replace(scene.settings, levels=levels))
+    return replace(scene, settings=replace(scene.settings, levels=levels, own_tasks=((name, task),)))
+
+
+def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
+    """The scene, whose stack may now name the tasks of files as well, if it takes torques.
+
+    Raises:
+        InputError: a file cannot be used, or its Jacobian is not the task's.
+    """
+    own = {name: task_in(name) for name in files}
+    for name, task in own.items():
+        _called(read(name), partial(check_task, task, scene.robot, name))
+    return with_own_tasks(scene, own)
+
+
+def tasks_named(assignments: Iterable[str]) -> tuple[str, ...]:
+    """The Python files that assignments of a stack name as tasks."""
+    found: list[str] = []
+
+    def look(value: Any) -> None:
+        if isinstance(value, dict):
+            word = value.get("task")
+            if isinstance(word, str) and is_file(word):
+                found.append(word)
+        for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+            look(each)
+
+    for text in assignments:
+        if text.startswith(("stack=", "stack.add=")):
+            look(parse_assignment(text)[1])
+    return tuple(dict.fromkeys(found))
 
 
 def check_task(task: Task, robot: Robot, name: str) -> None:

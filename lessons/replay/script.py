@@ -48,6 +48,7 @@ def script(run: RunSpec, log: Log, duration: float) -> str:
         *_imports(events),
         _IMPORTS,
         f"SCENE = {'scene_named' if is_file(run.scene) else 'load_scene'}({find})",
+        *((f"SCENE = with_tasks(SCENE, {run.tasks!r})",) if run.tasks else ()),
         f"CONTROLLER = {None if own is None else parse_assignment(own)[1]!r}",
         _tuple("SETTINGS", (repr(each) for each in assignments)),
         _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
@@ -76,7 +77,7 @@ import numpy as np
 _CAUTION = """
 Measured computing times took part in it, so every repetition comes out a little different."""
 
-_IMPORTS = """from lessons.headless import arrays, load_scene, prepared, run, scene_named, summary
+_IMPORTS = """from lessons.headless import arrays, load_scene, prepared, run, scene_named, summary, with_tasks
 """
 
 _TAIL = """

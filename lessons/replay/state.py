@@ -63,7 +63,7 @@ def state_of(
         InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
     """
     files = tuple(filter(is_file, settings.controllers))
-    own = RunSpec(run.scene, run.urdf, run.tip, seed=run.seed, files=files)
+    own = RunSpec(run.scene, run.urdf, run.tip, seed=run.seed, files=files, tasks=run.tasks)
     return State(replace(own, set=differences(own.loaded().settings, settings)), lesson, step)
 
 
@@ -97,7 +97,18 @@ def encode(state: State) -> str:
 def _carried(text: str) -> str:
     """An assignment as a code carries it: of a file of one's own the name and what tells its content."""
     path, value = parse_assignment(text)
-    return assignment(path, fingerprint(value)) if path == "controller" and is_file(value) else text
+    if path == "controller" and is_file(value):
+        return assignment(path, fingerprint(value))
+    return assignment(path, _marked(value)) if path == "stack" and ".py" in text else text
+
+
+def _marked(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_marked(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    own = isinstance(value.get("task"), str) and is_file(value["task"])
+    return {key: fingerprint(each) if own and key == "task" else _marked(each) for key, each in value.items()}
 
 
 def decode(code: str) -> State:

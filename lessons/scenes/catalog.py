@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
 from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
+from himpc.tasks import Task
 from lessons.own.files import is_file
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
 from lessons.scenes.hold import hold, hold_of
@@ -89,6 +90,15 @@ def with_controllers(scene: Scene, files: Iterable[str]) -> Scene:
     if not isinstance(scene, TorqueScene):
         return scene
     return replace(scene, settings=admitted(scene.settings, files))
+
+
+def with_own_tasks(scene: Scene, own: Mapping[str, Task]) -> Scene:
+    """The scene, whose stack may now name tasks of one's own by the path of their file, if it takes
+    torques."""
+    if not own or not isinstance(scene, TorqueScene):
+        return scene
+    known = dict(scene.settings.own_tasks) | own
+    return replace(scene, settings=replace(scene.settings, own_tasks=tuple(known.items())))
 
 
 def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:

@@ -26,6 +26,7 @@ class RunSpec:
         duration: simulated seconds; None: the scene's own.
         seed: seed of the run.
         files: Python files that may be the controller; whoever started the program named them.
+        tasks: Python files whose tasks the stack may name, likewise.
     """
 
     scene: str
@@ -37,13 +38,15 @@ class RunSpec:
     duration: float | None = None
     seed: int = 0
     files: tuple[str, ...] = ()
+    tasks: tuple[str, ...] = ()
 
     def loaded(self) -> Scene:
         """The scene without controller and assignments. Raises InputError if it cannot be loaded."""
-        from lessons.own.resolve import scene_named
+        from lessons.own.resolve import scene_named, with_tasks
         from lessons.scenes.catalog import with_controllers
 
-        return with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
+        scene = with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
+        return with_tasks(scene, self.tasks)
 
     def prepared(self) -> Scene:
         """The scene with everything in place but the seed. Raises InputError, one sentence, for what cannot
@@ -52,9 +55,11 @@ class RunSpec:
 
     def applied_to(self, scene: Scene) -> Scene:
         """The scene, however it was loaded, with all that the run says besides."""
+        from lessons.own.resolve import with_tasks
         from lessons.scenes.catalog import prepared, with_controllers
 
-        scene = prepared(with_controllers(scene, self.files), self.controller, self.set)
+        scene = with_tasks(with_controllers(scene, self.files), self.tasks)
+        scene = prepared(scene, self.controller, self.set)
         if self.events is not None:
             scene = replace(scene, events=self.events)
         return scene if self.duration is None else replace(scene, duration=self.duration)
@@ -71,6 +76,8 @@ class RunSpec:
         words = ["himpc-lab", "run", self.scene]
         for name, value in (("urdf", self.urdf), ("tip", self.tip), ("controller", controller)):
             words += [f"--{name}", value] if value is not None else []
+        for each in self.tasks:
+            words += ["--task", each]
         words += ["--duration", f"{self.duration:g}"] if self.duration is not None else []
         words += ["--seed", str(self.seed)] if self.seed else []
         for each in assignments:

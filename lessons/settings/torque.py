@@ -29,7 +29,8 @@ from lessons.settings.settings import (
     level_key,
     level_places,
 )
-from lessons.settings.stack import CHANGES, read_stack, same_tasks, told
+from lessons.settings.stack import read_stack, same_tasks, told
+from lessons.settings.stack_changes import CHANGES, add
 from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.settings.values import WORD, Form, form_of
 from robots import InputError, NominalSettings, PlantSettings, Robot
@@ -70,6 +71,7 @@ class TorqueSettings(Settings):
         options: the scene's own choices, if it has any.
         files: Python files of one's own that may be its controller. No path reaches them: what comes from
             elsewhere (a code, a page) must not choose which files are run.
+        own_tasks: (path, task) of Python files whose tasks the stack may name; likewise.
     """
 
     entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
@@ -92,6 +94,7 @@ class TorqueSettings(Settings):
     plant: PlantSettings = field(default_factory=PlantSettings)
     options: SceneOptions | None = None
     files: tuple[str, ...] = field(default=(), compare=False)
+    own_tasks: tuple[tuple[str, Task], ...] = field(default=(), compare=False)
 
     @property
     def controllers(self) -> Mapping[str, str]:
@@ -141,7 +144,7 @@ class TorqueSettings(Settings):
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". Where a
         value holds one number per joint, a place 1 … n behind it is that joint's alone: "M_bar.3"."""
-        without = ("levels", "options", "files", *_PARTS)
+        without = ("levels", "options", "files", "own_tasks", *_PARTS)
         own = field_places(self, lambda settings: settings, lambda _, new: _checked(new), without=without)
         options = {}
         if self.options is not None:
@@ -161,10 +164,10 @@ class TorqueSettings(Settings):
                 lambda _, value: ordered(self.levels, value),
             ),
             "stack": Place(
-                lambda s: told(s.levels),
+                lambda s: told(s.levels, dict(s.own_tasks)),
                 _with("levels"),
                 Form(None, WORD),
-                lambda _, value: read_stack(value, self.levels),
+                lambda _, value: read_stack(value, self.levels, dict(self.own_tasks)),
                 shorthand=True,
             ),
             **{key: every_level(self.levels, key, _levels, _with("levels")) for key in ("Q", "R")},
@@ -187,7 +190,8 @@ class TorqueSettings(Settings):
         """As in `Settings`; besides "stack.add" and the other `CHANGES`, which change the stack in part."""
         if path not in CHANGES:
             return super().place(path)
-        change = CHANGES[path]
+        own = {"own": dict(self.own_tasks)} if CHANGES[path] is add else {}
+        change = partial(CHANGES[path], **own)
         return Place(
             _levels,
             _with("levels"),
@@ -197,7 +201,11 @@ class TorqueSettings(Settings):
         )
 
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:
-        return [] if same_tasks(self.levels, wanted.levels) else [("stack", told(wanted.levels))]
+        return (
+            []
+            if same_tasks(self.levels, wanted.levels)
+            else [("stack", told(wanted.levels, dict(wanted.own_tasks)))]
+        )
 
 
 _GAINS = ("K_p", "K_v")
@@ -211,7 +219,7 @@ def _now(route: Any) -> Any:
 
 def _known(form: Form, path: str, name: Any) -> Any:
     if isinstance(name, str) and ".py@" in name:
-        return with_fingerprint(name, form.words)
+        return with_fingerprint(name, form.words, "controller")
     if isinstance(name, str) and is_file(name) and name not in form.words:
         raise InputError(
             f"{path} is {shortened(name, 100)}: a file of your own is named when himpc-lab is started, by "

@@ -1,4 +1,4 @@
-"""Thirty submissions, as students hand them in: ten that are right, twenty that are wrong, each differently."""
+"""Thirty submissions, as students hand them in: ten are right, twenty are wrong, each differently."""
 
 from __future__ import annotations
 
@@ -151,7 +151,13 @@ SUBMISSIONS: dict[str, Submission] = {
     "wrong_no_curvature": _wrong("null-space", "- level.J_dot_q_dot", "", 0, "J̇q̇ is missing"),
     "wrong_no_projection": _wrong("null-space", "level.J @ N", "level.J", 0, "reaches the hand"),
     "wrong_weighted": _wrong("two-levels", "if torques:", "if False:", 0, "a weighted sum is not strict"),
-    "wrong_no_bound": _wrong("two-levels", "now.tau_0, (share", "1e3, (share", 0, "bounds must stand"),
+    "wrong_no_bound": _wrong(
+        "two-levels",
+        "= bounds(now)",
+        "= bounds(now)\n        lower, upper = lower - 1e3, upper + 1e3",
+        2,
+        "bounds must stand in the QP of both levels",
+    ),
     "wrong_cut_off": _wrong(
         "one-level-qp",
         "solve_qp(H, f, rows, lower, upper).x",

@@ -161,6 +161,27 @@ def dies_at_one(value: int) -> int:
     return value * value
 
 
+def test_a_sweep_notices_that_a_file_of_ones_own_was_changed(tmp_path: Path) -> None:
+    """Between two calls, or while it runs: cells of two contents are no map."""
+    file, out = tmp_path / "mine.py", tmp_path / "out"
+    file.write_text("def torque(now):\n    return now.bias\n")
+    base = RunSpec("planar3-circle", controller=str(file), duration=0.02)
+    sweep = make_sweep(base, OVER[:1])
+    carry_on(sweep, out, one_by_one)
+    file.write_text("def torque(now):\n    return 2 * now.bias\n")
+    with pytest.raises(InputError, match=r"another sweep \(files differ"):
+        carry_on(sweep, out, one_by_one)
+
+    def saved_meanwhile(function: Any, items: Any) -> Generator[tuple[int, Any], None, None]:
+        outcomes = one_by_one(function, items)
+        yield next(outcomes)
+        file.write_text("def torque(now):\n    return 3 * now.bias\n")
+        yield from outcomes
+
+    with pytest.raises(InputError, match=r"mine\.py@\w+: was changed while it was swept"):
+        carry_on(sweep, tmp_path / "other", saved_meanwhile)
+
+
 @pytest.mark.parametrize("spread", [one_by_one, on_cores])
 def test_failed_work_is_an_outcome(spread: Callable[..., Generator[tuple[int, Any], None, None]]) -> None:
     assert dict(spread(fails_at_two, [1, 2, 4])) == {0: 1, 1: Failed("two is too many"), 2: 16}

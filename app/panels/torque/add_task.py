@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
 import viser
 
 from app.client.wish import Send
-from app.html.text import block
+from app.html.text import block, esc
 from app.panels.torque.level_card import Names
 from app.panels.torque.task_editor import AXES
 from himpc.stack import Stack
-from himpc.tasks import KINDS
+from himpc.tasks import KINDS, Task
+from himpc.tasks.kinds import said
 from himpc.tasks.pointing import DIRECTIONS
 from lessons.events import Set
 
@@ -24,10 +26,13 @@ _OWN = "a level of its own, at place "
 class AddTask:
     """A folder whose controls show what the chosen kind needs. Nothing happens before Add is pressed."""
 
-    def __init__(self, gui: viser.GuiApi, post: Send, names: Names, stack: Stack) -> None:
-        self._post = post
+    def __init__(
+        self, gui: viser.GuiApi, post: Send, names: Names, stack: Stack, own: Mapping[str, Task]
+    ) -> None:
+        """own: tasks of files of one's own, by path."""
+        self._post, self._own = post, own
         with gui.add_folder("Add a task", expand_by_default=False, order=-1.0):
-            self._kind = gui.add_dropdown("Kind", tuple(KINDS), initial_value="position")
+            self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
             self._says = gui.add_html("")
             with gui.add_folder(None):
                 self._frame = gui.add_dropdown(
@@ -72,13 +77,14 @@ class AddTask:
             self._frame.value = frame
 
     def _needs(self) -> set[str]:
-        kind = KINDS[self._kind.value]
-        found = {each.name for each in fields(kind.makes[0])}
+        own = self._own.get(self._kind.value)
+        found = {each.name for each in fields(own or KINDS[self._kind.value].makes[0])}
         return found - {"joints"} if self._kind.value in ("posture", "damping") else found
 
     def _show(self) -> None:
         needs = self._needs()
-        self._says.content = block(KINDS[self._kind.value].says)
+        own = self._own.get(self._kind.value)
+        self._says.content = block(esc(said(own)) if own else KINDS[self._kind.value].says)
         for field, handle in (
             ("frame", self._frame),
             ("frame", self._pick),

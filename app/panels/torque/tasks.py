@@ -84,7 +84,9 @@ class TasksPanel:
                 for place, level in enumerate(settings.levels)
             ]
             if not self._in_lesson:
-                self._add = AddTask(self._gui, self._post, self._names, settings.levels)
+                self._add = AddTask(
+                    self._gui, self._post, self._names, settings.levels, dict(settings.own_tasks)
+                )
 
     def _ask(self, event: Event) -> None:
         """Posts it. What is being edited stays unfolded on the stack that comes of it."""

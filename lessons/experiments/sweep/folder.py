@@ -66,15 +66,23 @@ def carry_on(
 
     Returns:
         all cells in the order of the grid. Interrupted, everything finished so far is in the folder.
+
+    Raises:
+        InputError: as `finished_cells`; or a file of one's own that is swept was changed meanwhile.
     """
     cells = finished_cells(sweep, folder)
-    total = len(sweep.points)
+    total, files = len(sweep.points), sweep.files()
     missing = [index for index in range(total) if index not in cells]
     if progress is not None:
         progress(len(cells), total)
     work = spread(perform_cell, [sweep.run(index) for index in missing])
     with (folder / "cells.jsonl").open("a") as file, closing(work) as outcomes:
         for place, outcome in outcomes:
+            if sweep.files() != files:
+                raise InputError(
+                    f"{', '.join(files['files'])}: was changed while it was swept, and cells of two contents "
+                    "are no map: repeat the command with another folder for --out"
+                )
             if isinstance(outcome, Failed):
                 cell = Cell(missing[place], None, outcome.reason)
             else:

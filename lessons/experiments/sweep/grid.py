@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lessons.own.files import fingerprint, is_file
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.settings import Settings
 from lessons.settings.values import WHOLE
@@ -57,7 +58,15 @@ class Sweep:
             "duration": base.duration,
             "seed": base.seed,
             "over": [{"path": axis.path, "values": list(axis.values)} for axis in self.axes],
+            **self.files(),
         }
+
+    def files(self) -> dict[str, list[str]]:
+        """Which files of one's own take part, and what tells their content; nothing if none does. Raises
+        InputError if one cannot be read."""
+        base = self.base
+        own = [each for each in (base.scene, base.controller or "", *base.tasks) if is_file(each)]
+        return {"files": [fingerprint(each) for each in own]} if own else {}
 
 
 def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
