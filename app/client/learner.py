@@ -62,6 +62,7 @@ class Learner(Simulation):
     def load(self, choice: SceneChoice) -> None:
         """Another scene, in a new process if this one is in trouble."""
         choice = choice.admitting(self._start_choice)
+        self._start_choice = self._start_choice.admitting(choice)
         self._begin_anew(Load(choice), choice)
 
     def reset_all(self) -> None:

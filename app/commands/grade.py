@@ -12,6 +12,7 @@ import tyro
 
 from app.commands.output import print_table, write_json
 from app.commands.progress import progress_bar
+from robots import InputError
 
 if TYPE_CHECKING:
     from lessons.exercises.grade import Grade
@@ -24,6 +25,7 @@ def grade(
     seed: int = 0,
     out: Path = Path("grades.csv"),
     scheduler: str | None = None,
+    key: str | None = None,
     json: str | None = None,
 ) -> int:
     """Judge a solution of an exercise by what it does; without a file, list the exercises.
@@ -32,13 +34,15 @@ def grade(
     stopped, the same command carries on. Exit code 0: all points; 1: some are missing; 2: it cannot be run.
 
     Args:
-        file: Python file with the solution, or a folder of them.
+        file: Python file with the solution, or a folder of them; or a text of what a learner did, as the
+            page wrote it.
         exercise: name of the exercise; by default what the file says in EXERCISE.
         hints: show so many hints of the exercise.
         seed: decides the disturbances.
         out: table to write for a folder, and to carry on.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
             machine's cores.
+        key: file with the key of your lab, to tell whether it signed what was handed in.
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.exercises.grade import as_data
@@ -48,6 +52,8 @@ def grade(
         return _list(exercise, hints, json)
     if file.is_dir():
         return _folder(file, exercise, seed, out, scheduler, json)
+    if file.suffix in _TEXTS:
+        return _handed_in(file, key, json)
     found = grade_file(str(file), exercise, seed)
     if json is not None:
         write_json(as_data(found), json)
@@ -136,3 +142,60 @@ def _folder(
 
 def _short(row: Mapping[str, str]) -> list[str]:
     return [row["file"], row["exercise"], f"{row['points']}/{row['of']}", row["error"] or row["missed"]]
+
+
+_TEXTS = (".txt", ".text", "")
+"""What a file is called in which somebody put what the page wrote."""
+
+
+def _handed_in(file: Path, key: str | None, json: str | None) -> int:
+    from app.link.exercise import parts_of
+    from lessons.course import COURSE, load_lesson
+    from lessons.replay.progress import read_handed_in, read_key
+
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise InputError(
+            f"{file}: cannot be read as a text; give the file with what the page wrote"
+        ) from None
+    try:
+        handed, proof = read_handed_in(text, None if key is None else read_key(key))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    progress = handed.progress
+    lessons = [
+        {
+            "lesson": name,
+            "steps": [place + 1 for place in sorted(progress.seen.get(name, ()))],
+            "of": len(parts_of(load_lesson(name))),
+            "score": progress.best.get(name),
+        }
+        for name in COURSE
+        if name in progress.seen or name in progress.best
+    ]
+    if json is not None:
+        data = {"name": handed.name, "at": handed.at, "proof": proof, "code": handed.code, "lessons": lessons}
+        write_json(data, json)
+    else:
+        rows = [
+            [str(each["lesson"]), f"{len(each['steps'])} of {each['of']}", _score(each["score"])]
+            for each in lessons
+        ]
+        title = f"{handed.name or 'nobody'}, {handed.at}: {_SAYS[proof] if key else _NOT_JUDGED}"
+        print_table(title, ("lesson", "steps run", "best score"), rows)
+        if handed.code:
+            print(f"setting on the page then: himpc-lab --state {handed.code}")
+    return 0 if key is None or proof == "signed" else 1
+
+
+def _score(points: float | None) -> str:
+    return "–" if points is None else f"{points:.0f}"
+
+
+_SAYS = {
+    "signed": "signed by a lab with your key",
+    "not signed": "not signed: anybody could have written it",
+    "signed with another key": "signed with another key, or changed",
+}
+_NOT_JUDGED = "nobody knows who wrote it (--key FILE tells)"

@@ -27,6 +27,7 @@ def serve(
         tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")
     ] = (),
     no_token: bool = False,
+    key: str | None = None,
 ) -> int:
     """Open the page: a robot under HIMPC whose target you can drag.
 
@@ -47,10 +48,12 @@ def serve(
         trusted_origin: where a reverse proxy shows the page, e.g. https://lab.example.org; docs/serving.md
             has one with TLS.
         no_token: let everybody in who reaches the page.
+        key: file with a key of yours, 16 signs or more: what learners hand in is signed with it.
     """
     from app.link.choice import SceneChoice
     from app.server.server import FIRST
     from app.server.server import serve as serve_page
+    from lessons.replay.progress import read_key
 
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
@@ -76,4 +79,5 @@ def serve(
         open_browser=not no_browser,
         trusted_origins=trusted_origin,
         ask_token=not no_token,
+        key=None if key is None else read_key(key),
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 
 from app.link.exercise import Exercise
 from lessons.course import COURSE
-from lessons.own.files import is_file
+from lessons.own.files import is_file, read
 from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
 from robots.errors import InputError, unknown_name
@@ -101,9 +101,34 @@ class SceneChoice:
         return replace(step, run=replace(step.run, seed=self.run.seed)).admitting(self)
 
     def admitting(self, start: SceneChoice) -> SceneChoice:
-        """The same with the files of what the program was started with."""
-        run = replace(self.run, files=start.run.files, tasks=start.run.tasks)
-        return replace(self, scenes=start.scenes, run=run)
+        """The same with the files of what the program was started with as well."""
+        files = _both(start.run.files, self.run.files)
+        run = replace(self.run, files=files, tasks=_both(start.run.tasks, self.run.tasks))
+        return replace(self, scenes=_both(start.scenes, self.scenes), run=run)
+
+    def with_file(self, path: str) -> SceneChoice:
+        """What is shown when a file of one's own is opened by path, by what it defines: a lesson or a scene
+        instead of this one, a controller that drives it, a task that can be added to its stack.
+
+        Raises:
+            InputError: the file cannot be used, with its line.
+        """
+        from lessons.own.judge import judged
+        from lessons.settings.assignments import assignment
+
+        kind = judged(read(path))
+        if kind == "lesson":
+            return SceneChoice.opening(path)
+        if kind == "scene":
+            return SceneChoice.starting(path)
+        run = replace(self.run, events=None, duration=None)
+        if kind == "task":
+            run = replace(run, tasks=_both(run.tasks, (path,)))
+        else:
+            others = tuple(each for each in run.set if not each.startswith("controller="))
+            told = assignment("controller", path)
+            run = replace(run, set=(told, *others), files=_both(run.files, (path,)))
+        return replace(self, run=run, exercise=None, mine=())
 
     @property
     def known(self) -> bool:
@@ -131,3 +156,7 @@ class SceneChoice:
         run = self.run
         load = scene_named if run.scene in self.scenes else load_scene
         return run.applied_to(load(run.scene, run.urdf, run.tip, self.urdf_text))
+
+
+def _both(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*one, *other)))

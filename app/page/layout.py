@@ -26,6 +26,7 @@ from app.panels.lesson.course import Course
 from app.panels.run.active_constraints import BindingPanel
 from app.panels.run.compare import ComparePanel
 from app.panels.run.export import ExportPanel
+from app.panels.run.hand_in import add_hand_in
 from app.panels.run.help import HelpPanel
 from app.panels.run.playback import PlaybackPanel
 from app.panels.run.scene import RobotPanel
@@ -115,6 +116,7 @@ class Stage:
         with tabs.add_tab("Export"):
             ExportPanel(gui, self._learner, self._settings)
             SharePanel(gui, self._learner, choose)
+            add_hand_in(gui, self._learner, notebook)
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):

@@ -43,12 +43,14 @@ def serve(
     open_browser: bool = True,
     trusted_origins: Sequence[str] = (),
     ask_token: bool = True,
+    key: bytes | None = None,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
 
     With `classroom` all pages show one session; who types the printed token into the page steers it.
     Where others than this machine's users can come, the page asks for a token unless `ask_token` is False.
+    `key` signs what learners hand in.
     """
     server = PageServer(
         choice,
@@ -58,6 +60,7 @@ def serve(
         classroom=classroom,
         trusted_origins=trusted_origins,
         ask_token=ask_token,
+        key=key,
     )
     stop = threading.Event()
     try:
@@ -123,6 +126,7 @@ class PageServer:
         classroom: bool = False,
         trusted_origins: Sequence[str] = (),
         ask_token: bool = True,
+        key: bytes | None = None,
     ) -> None:
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
@@ -138,6 +142,7 @@ class PageServer:
         self.token = new_token() if self.public and ask_token else None
         self.guard = Guard(Door())
         self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
+        self._key = key
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()
         try:
@@ -171,7 +176,7 @@ class PageServer:
     # ---------------------------------------------------------------- clients, on viser's loop
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        visit = Visit(self._viser, client, self.sessions, by_path=not self.public)
+        visit = Visit(self._viser, client, self.sessions, by_path=not self.public, key=self._key)
         with self._lock:
             self._visits[client.client_id] = visit
         await visit.arrive()

@@ -11,7 +11,7 @@ from functools import partial
 import viser
 
 from app.adapter import private
-from app.client.progress import Notebook, Progress, progress_from
+from app.client.progress import Notebook
 from app.html.text import block
 from app.page.page import Page
 from app.panels.run.classroom import add_watching
@@ -21,6 +21,8 @@ from app.server.guard import GuardedConnection
 from app.server.sessions import Sessions
 from app.server.uploads import Uploads
 from app.server.workers import Workers, told
+from lessons.replay.progress import Progress
+from lessons.replay.progress import found as found_progress
 
 STORAGE = 5.0
 """s a browser gets to say what it keeps."""
@@ -40,12 +42,13 @@ class Visit:
         client: viser.ClientHandle,
         sessions: Sessions | Classroom,
         by_path: bool,
+        key: bytes | None = None,
     ) -> None:
-        """by_path: whether this page may name files of the machine."""
+        """by_path: whether this page may name files of the machine; key: signs what learners did."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._by_path = by_path
+        self._by_path, self._key = by_path, key
         self._page: Page | None = None
         self._left = False
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
@@ -73,7 +76,9 @@ class Visit:
             return  # the tab was closed
         tokens, dark, progress = (text if text and len(text) <= _LONGEST else None for text in found)
         self._dark = dark == "1"
-        self._notebook = Notebook(progress_from(progress), lambda text: self._keep(_PROGRESS, text))
+        self._notebook = Notebook(
+            found_progress(progress, self._key), lambda text: self._keep(_PROGRESS, text), self._key
+        )
         self._then(_tokens(tokens))
 
     def leave(self) -> None:

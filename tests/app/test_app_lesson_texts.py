@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app.client.progress import Notebook, Progress, progress_from
+from app.client.progress import Notebook
 from app.html.glossary import explained, words
 from app.html.markdown import rendered, rendered_line
 from app.html.text import figure, readable
@@ -15,6 +15,7 @@ from app.link.exercise import Curve
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
 from app.panels.widgets.logarithmic import STEPS, place_of, value_at
 from lessons.course import COURSE, load_lesson
+from lessons.replay.progress import Progress, progress_from
 
 
 def test_progress_survives_the_browser_and_whatever_stands_there() -> None:

@@ -8,12 +8,13 @@ from importlib.resources import files
 
 import viser
 
-from app.client.progress import Notebook, Progress
+from app.client.progress import Notebook
 from app.html.palette import GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from lessons.course import COURSE, load_lesson
+from lessons.replay.progress import Progress
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Lesson
 

@@ -10,8 +10,9 @@ from app.html.palette import BAD, DAMPING, GOOD, LEVELS
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from lessons.own.files import is_file
 from lessons.scenes.run_spec import RunSpec
-from robots import CATALOG
+from robots import CATALOG, InputError
 
 _KINDS = {"repaired": LEVELS[0], "filled": LEVELS[1], "fixed": LEVELS[3], "refused": BAD, "note": DAMPING}
 MAX_UPLOAD = 10_000_000  # bytes, what the importer reads
@@ -61,6 +62,8 @@ class RobotPanel:
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
             gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
+        if by_path:
+            self._add_file(gui, ready.choice)
         self._report(gui, ready)
 
         @scene.on_update
@@ -83,6 +86,29 @@ class RobotPanel:
         @upload.on_upload
         async def _(_: object) -> None:
             self._uploaded(upload.value.content, tip.value.strip() or None)
+
+    def _add_file(self, gui: viser.GuiApi, current: SceneChoice) -> None:
+        with gui.add_folder("A file of your own"):
+            gui.add_html(block(_FILES))
+            path = gui.add_text("Python file", "", hint="Path on the machine that runs this page")
+            load = gui.add_button("Open file")
+
+        @load.on_click
+        def _(_: object) -> None:
+            """On a thread: the file is first loaded in a process of its own, which takes a second."""
+            name = path.value.strip()
+            if not is_file(name):
+                self.refuse("No Python file was named: write its path, which ends with .py, first.")
+                return
+            self._answer.visible = True
+            self._answer.content = block("Loading …")
+            try:
+                choice = current.with_file(name)
+                choice.resolved().scene()
+            except InputError as error:
+                self.refuse(str(error))
+            else:
+                self._choose(choice)
 
     def _ask(self, run: RunSpec, urdf_text: str | None = None) -> None:
         if run.scene == "hold" and run.urdf == "":
@@ -120,3 +146,10 @@ class RobotPanel:
                 gui.add_html(block(f"{kind} <b>{esc(finding.where)}</b>: {esc(finding.text)}"))
             if len(report.findings) > 60:
                 gui.add_html(block(f"… and {len(report.findings) - 60} more."))
+
+
+_FILES = (
+    "A controller, scene, lesson or task, by what the file defines. It is read from the disk of whoever "
+    "started himpc-lab, on this machine, and never uploaded; pages that others can reach do not offer this. "
+    "<code>himpc-lab new</code> writes one to begin with."
+)

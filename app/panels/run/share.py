@@ -11,7 +11,7 @@ from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import Told
 from lessons.replay.script import script
-from lessons.replay.state import decode, encode, state_of
+from lessons.replay.state import State, decode, encode, state_of
 from robots import InputError
 
 
@@ -58,14 +58,7 @@ class SharePanel:
             _refuse(client, error)
 
     def _write(self, told: Told) -> None:
-        choice = _from_a_name(told.choice)
-        exercise = choice.exercise
-        state = state_of(
-            choice.run,
-            told.settings,
-            lesson=None if exercise is None else exercise.lesson,
-            step=None if exercise is None else exercise.place + 1,
-        )
+        state = _state(told)
         self._line.value = state.run.command_line()
         self._line.visible = True
         self._code.visible = False
@@ -76,6 +69,22 @@ class SharePanel:
         choice = _from_a_name(told.choice)
         text = script(choice.run, told.log, told.t)
         client.send_file_download(f"{choice.run.scene}.py", text.encode(), save_immediately=True)
+
+
+def code_of(told: Told) -> str:
+    """The setting as a code. Raises InputError if a code cannot carry it."""
+    return encode(_state(told))
+
+
+def _state(told: Told) -> State:
+    choice = _from_a_name(told.choice)
+    exercise = choice.exercise
+    return state_of(
+        choice.run,
+        told.settings,
+        lesson=None if exercise is None else exercise.lesson,
+        step=None if exercise is None else exercise.place + 1,
+    )
 
 
 def _from_a_name(choice: SceneChoice) -> SceneChoice:

@@ -1,0 +1,40 @@
+"""What was done of the lessons, as a text to hand in."""
+
+from __future__ import annotations
+
+import viser
+
+from app.client.learner import Learner
+from app.client.progress import Notebook
+from app.html.text import block
+from app.panels.run.share import code_of
+from lessons.replay.progress import LONGEST_NAME
+from robots import InputError
+
+
+def add_hand_in(gui: viser.GuiApi, learner: Learner, notebook: Notebook) -> None:
+    """A folder in the current container. The text is made when it is asked for, on viser's threads."""
+    with gui.add_folder("Hand in what you did", expand_by_default=False):
+        gui.add_html(block(_SIGNED if notebook.signs else _NOT_SIGNED))
+        name = gui.add_text("Your name", "")
+        make = gui.add_button("Write the text")
+        text = gui.add_text("To hand in", "", multiline=True, visible=False)
+
+    @make.on_click
+    def _(_: object) -> None:
+        told = learner.ask()
+        try:
+            code = "" if told is None else code_of(told)
+        except InputError:
+            code = ""  # e.g. an uploaded robot: the lessons are told all the same
+        text.visible = False
+        text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], code)
+        text.visible = True
+
+
+_WHAT = (
+    "The lessons whose steps you ran, the best scores of their challenges, and the code of the setting that "
+    "is on the page now. Copy the text and send it; <code>himpc-lab grade FILE.txt</code> reads it."
+)
+_SIGNED = f"{_WHAT} This lab signs it with its instructor's key."
+_NOT_SIGNED = f"{_WHAT} This lab has no instructor's key, so anybody could have written it."

@@ -1,0 +1,189 @@
+"""What a learner has done so far: as the browser keeps it, and as a text to hand in.
+
+With a key, which an instructor's lab holds, both carry an HMAC of their content: whoever has the key can tell
+that a lab with the same key wrote them. Without one they carry a sum that only tells damage.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import hashlib
+import hmac
+import json
+import math
+import re
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from lessons.course import COURSE
+from robots import InputError
+
+VERSION = 1
+LONGEST_NAME = 80
+LEAST_KEY = 16  # bytes
+_LONGEST_TEXT = 200_000
+_HANDED = re.compile(r"hp(\d{1,6})(s?)-([\w-]+)-([0-9a-f]{64})")
+Proof = Literal["signed", "not signed", "signed with another key"]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Attributes:
+    seen: per lesson the places of the steps whose run was seen.
+    best: per lesson the best points (0 to 100) of its challenge.
+    """
+
+    seen: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    best: Mapping[str, float] = field(default_factory=dict)
+
+    def with_step(self, lesson: str, place: int) -> Progress:
+        """After a step's run."""
+        return replace(self, seen={**self.seen, lesson: self.seen.get(lesson, frozenset()) | {place}})
+
+    def with_points(self, lesson: str, points: float) -> Progress:
+        """After a challenge that was passed; only the best attempt counts."""
+        return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
+
+    def next_place(self, lesson: str, steps: int) -> int:
+        """The first step not seen yet; 0 if all were."""
+        seen = self.seen.get(lesson, frozenset())
+        return next((place for place in range(steps) if place not in seen), 0)
+
+    def dumped(self) -> str:
+        """As text."""
+        return json.dumps(
+            {"seen": {name: sorted(places) for name, places in self.seen.items()}, "best": dict(self.best)}
+        )
+
+
+def kept(progress: Progress, key: bytes | None) -> str:
+    """As the browser keeps it."""
+    text = progress.dumped()
+    return text if key is None else _seal(text.encode(), key) + text
+
+
+def found(text: str | None, key: bytes | None) -> Progress:
+    """What a browser kept; with a key, nothing that was not written with it."""
+    if key is None or not text:
+        return progress_from(text)
+    seal, body = text[:64], text[64:]
+    return progress_from(
+        body if hmac.compare_digest(seal.encode(), _seal(body.encode(), key).encode()) else None
+    )
+
+
+def progress_from(text: str | None) -> Progress:
+    """From the browser's storage, which anybody may have written: what makes no sense is left out."""
+    try:
+        found = json.loads(text or "{}")
+    except (ValueError, RecursionError):
+        return Progress()
+    if not isinstance(found, dict):
+        return Progress()
+    return Progress(
+        {
+            name: frozenset(place for place in places if type(place) is int and 0 <= place < 100)
+            for name, places in _of_lessons(found.get("seen"))
+            if isinstance(places, list)
+        },
+        {
+            name: float(points)
+            for name, points in _of_lessons(found.get("best"))
+            if type(points) in (int, float) and math.isfinite(points) and 0 <= points <= 100
+        },
+    )
+
+
+def _of_lessons(found: Any) -> list[tuple[str, Any]]:
+    return [(name, found[name]) for name in COURSE if name in found] if isinstance(found, dict) else []
+
+
+# ------------------------------------------------------------------ handed in
+
+
+@dataclass(frozen=True)
+class HandedIn:
+    """What leaves the browser.
+
+    Attributes:
+        name: as the learner wrote it.
+        at: when, ISO 8601.
+        progress: of the lessons.
+        code: of the setting that was on the page then; "" if none could be made.
+    """
+
+    name: str
+    at: str
+    progress: Progress
+    code: str = ""
+
+
+def written(handed: HandedIn, key: bytes | None) -> str:
+    """As a text of letters, digits, "-" and "_"."""
+    given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
+    body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))
+    text = f"hp{VERSION}{'s' if key is not None else ''}-{body.decode().rstrip('=')}"
+    return f"{text}-{_seal(text.encode(), key)}"
+
+
+def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
+    """What was handed in, and what its seal tells; without a key a signature cannot be judged, and counts as
+    none.
+
+    Raises:
+        InputError: it is no such text, incomplete or damaged, or a newer version wrote it.
+    """
+    matched = _HANDED.fullmatch("".join(text.split())) if len(text) <= _LONGEST_TEXT else None
+    if matched is None:
+        raise InputError(
+            f"this is nothing that was handed in: such a text begins with hp{VERSION}- or hp{VERSION}s- and "
+            "ends with 64 digits and letters; copy all of it"
+        )
+    version, signed, body, seal = matched.groups()
+    if int(version) != VERSION:
+        raise InputError(f"the text has format {version}, and this himpc-lab reads {VERSION}: update it")
+    whole = f"hp{version}{signed}-{body}".encode()
+    if not signed and not hmac.compare_digest(seal, _seal(whole, None)):
+        raise _damaged()
+    try:
+        unpacking = zlib.decompressobj()
+        packed = unpacking.decompress(base64.urlsafe_b64decode(body + "=" * (-len(body) % 4)), _LONGEST_TEXT)
+        given = json.loads(packed.decode())
+        name, at, progress, code = (str(given[key]) for key in "ntpc")
+    except (ValueError, binascii.Error, zlib.error, RecursionError, KeyError, TypeError):
+        raise _damaged() from None
+    handed = HandedIn(_plain(name)[:LONGEST_NAME], _plain(at)[:40], progress_from(progress), code[:20_000])
+    if not signed or key is None:
+        return handed, "not signed"
+    right = hmac.compare_digest(seal, _seal(whole, key))
+    return handed, "signed" if right else "signed with another key"
+
+
+def read_key(path: str) -> bytes:
+    """The key in a file, blanks at its ends aside. Raises InputError if there is none that is long enough."""
+    try:
+        key = Path(path).read_bytes().strip()
+    except OSError as error:
+        raise InputError(f"--key {path}: cannot be read ({error.strerror})") from None
+    if len(key) < LEAST_KEY:
+        raise InputError(
+            f"--key {path}: a key has {LEAST_KEY} signs or more; make one with "
+            "python -c 'import secrets; print(secrets.token_hex())'"
+        )
+    return key
+
+
+def _seal(data: bytes, key: bytes | None) -> str:
+    return (hashlib.sha256(data) if key is None else hmac.new(key, data, "sha256")).hexdigest()
+
+
+def _plain(text: str) -> str:
+    return "".join(sign if sign.isprintable() else " " for sign in text)
+
+
+def _damaged() -> InputError:
+    return InputError("the text is incomplete or was changed on its way: copy all of it again")

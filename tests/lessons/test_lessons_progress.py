@@ -1,0 +1,102 @@
+"""What a learner hands in: read as it was written, judged by its signature, and refused if it is damaged."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from app.commands.grade import grade
+from lessons.replay.progress import (
+    HandedIn,
+    Progress,
+    found,
+    kept,
+    progress_from,
+    read_handed_in,
+    read_key,
+    written,
+)
+from robots import InputError
+
+KEY, OTHER = b"an instructor's key", b"somebody else's key"
+DONE = Progress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("one-task", 81.0)
+HANDED = HandedIn("Zoë Ångström", "2026-11-22T10:00:00+00:00", DONE, "hl1-abc")
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+def test_what_is_handed_in_is_read_as_it_was_written(key: bytes | None) -> None:
+    text = written(HANDED, key)
+    lines = "\n".join(text[at : at + 40] for at in range(0, len(text), 40))
+    assert read_handed_in(lines, key) == (HANDED, "not signed" if key is None else "signed")
+
+
+def test_a_signature_is_of_one_key() -> None:
+    assert read_handed_in(written(HANDED, OTHER), KEY) == (HANDED, "signed with another key")
+    assert read_handed_in(written(HANDED, KEY), None) == (HANDED, "not signed")
+    assert read_handed_in(written(HANDED, None), KEY) == (HANDED, "not signed")
+
+
+def test_what_was_changed_is_not_signed() -> None:
+    """A better score under the seal of a worse one; and every single sign that is another."""
+    better = HandedIn(HANDED.name, HANDED.at, DONE.with_points("deadlines", 100.0))
+    seal = written(HANDED, KEY)[-64:]
+    assert read_handed_in(written(better, KEY)[:-64] + seal, KEY)[1] == "signed with another key"
+    text = written(HANDED, KEY)
+    for at in range(0, len(text), 7):
+        changed = text[:at] + ("A" if text[at] != "A" else "B") + text[at + 1 :]
+        with suppress(InputError):
+            assert read_handed_in(changed, KEY)[1] != "signed"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "nothing that was handed in"),
+        ("hello", "nothing that was handed in"),
+        (written(HANDED, None)[:-1], "nothing that was handed in"),
+        ("x" * 10**6, "nothing that was handed in"),
+        (written(HANDED, None).replace("hp1-", "hp9-"), "format 9"),
+        (written(HANDED, None)[:-1] + "g", "nothing that was handed in"),
+        ("hp1-AAAA-" + "0" * 64, "incomplete or was changed"),
+        ("hp1s-AAAA-" + "0" * 64, "incomplete or was changed"),
+    ],
+)
+def test_damage_to_what_is_handed_in_is_a_sentence(text: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        read_handed_in(text, KEY)
+
+
+def test_a_lab_with_a_key_believes_only_what_it_wrote_into_the_browser() -> None:
+    assert found(kept(DONE, KEY), KEY) == DONE
+    assert found(kept(DONE, None), None) == DONE
+    forged = kept(DONE, KEY)[:64] + DONE.with_points("deadlines", 100.0).dumped()
+    for text in (None, "", "{", DONE.dumped(), kept(DONE, OTHER), forged, "ü" * 200):
+        assert found(text, KEY) == Progress()
+    assert progress_from(kept(DONE, KEY)) == Progress()
+
+
+def test_grade_reads_what_is_handed_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, key, out = tmp_path / "zoe.txt", tmp_path / "key", tmp_path / "a.json"
+    file.write_text(written(HANDED, KEY) + "\n")
+    key.write_bytes(KEY + b"\n")
+    assert grade(file, key=str(key), json=str(out)) == 0
+    found_data = json.loads(out.read_text())
+    assert (found_data["name"], found_data["proof"]) == (HANDED.name, "signed")
+    steps = {each["lesson"]: (each["steps"], each["score"]) for each in found_data["lessons"]}
+    assert steps == {"deadlines": ([1, 3], None), "one-task": ([], 81.0)}
+    assert grade(file) == 0
+    assert "nobody knows who wrote it" in capsys.readouterr().out
+    key.write_bytes(OTHER)
+    assert grade(file, key=str(key)) == 1
+    assert "signed with another key" in capsys.readouterr().out
+    file.write_text("hp1-")
+    with pytest.raises(InputError, match=r"zoe\.txt: this is nothing that was handed in"):
+        grade(file)
+    with pytest.raises(InputError, match=r"nobody\.txt: cannot be read"):
+        grade(tmp_path / "nobody.txt")
+    key.write_bytes(b"short")
+    with pytest.raises(InputError, match="a key has 16 signs or more"):
+        read_key(str(key))
