@@ -182,8 +182,8 @@ def _handed_in(file: Path, key: str | None, json: str | None) -> int:
             [str(each["lesson"]), f"{len(each['steps'])} of {each['of']}", _score(each["score"])]
             for each in lessons
         ]
-        title = f"{handed.name or 'nobody'}, {handed.at}: {_SAYS[proof] if key else _NOT_JUDGED}"
-        print_table(title, ("lesson", "steps run", "best score"), rows)
+        print_table(f"{handed.name or 'nobody'}, {handed.at}", ("lesson", "steps run", "best score"), rows)
+        print(_SAYS[proof] if key else _NOT_JUDGED)
         if handed.code:
             print(f"setting on the page then: himpc-lab --state {handed.code}")
     return 0 if key is None or proof == "signed" else 1

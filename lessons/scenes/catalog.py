@@ -97,7 +97,7 @@ def with_own_tasks(scene: Scene, own: Mapping[str, Task]) -> Scene:
     torques."""
     if not own or not isinstance(scene, TorqueScene):
         return scene
-    known = dict(scene.settings.own_tasks) | own
+    known = {**dict(scene.settings.own_tasks), **own}
     return replace(scene, settings=replace(scene.settings, own_tasks=tuple(known.items())))
 
 

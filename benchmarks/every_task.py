@@ -1,0 +1,145 @@
+"""Every kind of task on every robot of the catalog, in closed loop under two controllers: held, then dragged
+to where another posture has it, so that it can be reached.
+
+    python -m benchmarks.every_task [--seconds 3] [--json -]
+
+A row per robot and kind: how far it is off after it was held, and after it was dragged (mm or degrees).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from himpc.configuration import Configuration
+from himpc.rotation import quaternion
+from himpc.tasks import KINDS, Task
+from lessons.events import MoveTarget
+from lessons.scenes.catalog import prepared, torque_scene
+from lessons.scenes.names import SCENES
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import assignment
+from robots import CATALOG
+
+CONTROLLERS = ("himpc", "hqp")
+HELD_FOR = 0.1  # s
+SETTLED = {"m": 1e-3, "rad": np.deg2rad(0.1)}
+"""By unit of the task: closer than this it has settled."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """How far a task is off, in its unit: the largest coordinate, over the tasks of its kind, as a share of
+    `SETTLED`. moved: how far the drag was, likewise. calm: largest |v| over its limit at the end."""
+
+    robot: str
+    kind: str
+    controller: str
+    held: float
+    moved: float
+    settled: float
+    calm: float
+
+
+@cache
+def scene_of(robot: str) -> TorqueScene:
+    """The scene in which a robot of the catalog holds still."""
+    own = f"{robot}-hold"
+    return torque_scene(own) if own in SCENES else torque_scene("hold", robot)
+
+
+def entry(kind: str, scene: TorqueScene) -> dict[str, Any]:
+    """A task of a kind that the robot of a scene can do something about."""
+    robot = scene.robot
+    tasks = [task for level in scene.settings.levels for task in level.tasks]
+    fields = {name for of in KINDS[kind].makes for name in of.__dataclass_fields__}
+    given: dict[str, Any] = {"task": kind, "name": "x"}
+    planar = "axes" in vars(tasks[0]) and vars(tasks[0])["axes"] == "xy"
+    if "axes" in fields and planar and "pose" not in kind:
+        given["axes"] = "z" if "orientation" in kind else "xy"
+    if "root" in fields:
+        given["root"] = robot.frames[len(robot.frames) // 3]
+    if kind == "pointing":
+        given["axis"] = "x"
+    if kind == "plane_distance":
+        given["normal"] = [1.0, 0.0, 0.0]
+    if kind == "joints":
+        given["joints"] = list(robot.joint_names[:2])
+    return given
+
+
+def measured(robot: str, kind: str, controller: str, seconds: float) -> Found:
+    """A run: held, then dragged for so many seconds."""
+    scene = scene_of(robot)
+    stack = [entry(kind, scene), {"task": "posture", "name": "rest"}]
+    session = TorqueSession(prepared(scene, controller, [assignment("stack", stack)]))
+    tasks = session.settings.levels[0].tasks
+    run(session, HELD_FOR)
+    held = off(session, tasks)
+    rng = np.random.default_rng(0)
+    q = session.plant.q + rng.uniform(0.05, 0.1, session.robot.n) * rng.choice([-1.0, 1.0], session.robot.n)
+    there = Configuration(session.robot, session.robot.model.createData(), q, np.zeros(len(q)))
+    for task in tasks:
+        if session.target(task.name) is not None:
+            value = np.asarray(task.target(there))
+            given = quaternion(value) if value.ndim == 2 else value
+            session.post(MoveTarget(task.name, tuple(given.tolist())))
+    moved = 0.0
+    for _ in range(20):
+        run(session, seconds / 20)
+        moved = max(moved, off(session, tasks))
+    calm = float(np.abs(session.plant.v / session.robot.v_limit).max())
+    return Found(robot, kind, controller, held, moved, off(session, tasks), calm)
+
+
+def run(session: TorqueSession, seconds: float) -> None:
+    until = session.t + seconds - 1e-9
+    while session.t < until and session.diverged_at is None:
+        session.drain()
+        session.tick()
+
+
+def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
+    """The largest error in units of `SETTLED`; infinite once control is lost."""
+    plan = session.plan
+    if plan is None or session.diverged_at is not None:
+        return float("inf")
+    return max(float(np.abs(plan.errors[task.name]).max()) / SETTLED[task.unit] for task in tasks)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--robot", choices=CATALOG, default=None)
+    parser.add_argument("--json", default=None)
+    given = parser.parse_args()
+    found = []
+    for robot in CATALOG if given.robot is None else (given.robot,):
+        for kind in KINDS:
+            for controller in CONTROLLERS:
+                each = measured(robot, kind, controller, given.seconds)
+                found.append(each)
+                print(
+                    f"{robot:16}{kind:22}{controller:7}held {each.held:8.2g}  moved {each.moved:8.3g}  "
+                    f"settled {each.settled:8.2g}  v {each.calm:.1e}",
+                    file=sys.stderr,
+                    flush=True,
+                )
+    if given.json is not None:
+        text = json.dumps([asdict(each) for each in found], indent=1)
+        sys.stdout.write(text) if given.json == "-" else Path(given.json).write_text(text)
+    bad = [each for each in found if not (each.held < 1.0 and each.settled < 1.0)]
+    print(f"{len(found)} runs, {len(bad)} not settled", file=sys.stderr)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
