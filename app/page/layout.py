@@ -121,7 +121,7 @@ class Stage:
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
         with tabs.add_tab("Help"):
             self._help = HelpPanel(gui)
-        for place, key in enumerate(_HOTKEYS[: len(self._settings().levels)]):
+        for place, key in enumerate(_HOTKEYS):  # a stack may grow
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):

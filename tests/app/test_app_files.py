@@ -1,0 +1,115 @@
+"""What a page does with files of one's own that its learner names, and with what the learner hands in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+from lessons.own.new import text_of
+from lessons.replay.progress import read_handed_in
+from lessons.replay.state import decode
+from lessons.scenes.run_spec import RunSpec
+from lessons.settings.torque import TorqueSettings
+from robots import InputError
+
+KEY = b"an instructor's key"
+LONG = 120.0
+
+
+@pytest.fixture
+def server() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, key=KEY)
+    yield running
+    running.close()
+
+
+def settings(learner: Learner) -> TorqueSettings:
+    assert isinstance(learner.settings, TorqueSettings)
+    return learner.settings
+
+
+def press(wire: Wire, label: str) -> None:
+    assert eventually(lambda: wire.find(label) is not None, LONG), label
+    wire.write(str(wire.find(label)), value=True)
+
+
+def open_file(wire: Wire, path: Path) -> None:
+    assert eventually(lambda: wire.find("Python file") is not None, LONG)
+    wire.write(str(wire.find("Python file")), value=str(path))
+    press(wire, "Open file")
+
+
+def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path) -> None:
+    """A controller drives the scene that is there, a task can be added to it, a wrong file is a sentence."""
+    law, task, wrong = (tmp_path / f"{name}.py" for name in ("law", "task", "wrong"))
+    law.write_text("def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n")
+    task.write_text(text_of("task", None, "task.py"))
+    wrong.write_text("def torque(now)\n    return 0\n")
+    with Wire(server.url) as wire:
+        assert eventually(lambda: wire.shows("never uploaded"), LONG)
+        learner = server.sessions.learners[0]
+        open_file(wire, wrong)
+        assert eventually(lambda: wire.shows("wrong.py, line 1: expected"), LONG)
+        open_file(wire, tmp_path / "nothing.py")
+        assert eventually(lambda: wire.shows("cannot be read"), LONG)
+        open_file(wire, law)
+        assert eventually(
+            lambda: learner.settings is not None and learner.settings.controller == str(law), LONG
+        )
+        assert eventually(lambda: wire.shows("a controller of your own"), LONG)
+        open_file(wire, task)
+        assert eventually(lambda: bool(settings(learner).own_tasks), LONG)
+        assert eventually(lambda: wire.find("Kind") is not None, LONG)
+        wire.write(str(wire.find("Kind")), value=str(task))
+        press(wire, "Add")
+        assert eventually(lambda: "reach" in [level.name for level in settings(learner).levels], LONG)
+        assert settings(learner).controller == str(law)
+        assert learner.failure is None
+
+
+def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:
+    here = SceneChoice(RunSpec("planar3-hold"))
+    for kind in ("scene", "lesson"):
+        path = tmp_path / f"{kind}.py"
+        path.write_text(text_of(kind, None, path.name))
+        found = here.with_file(str(path)).admitting(here).resolved()
+        assert found.scene().name == (str(path) if kind == "scene" else "iiwa14-hold")
+    with pytest.raises(InputError, match=r"no\.py: cannot be read"):
+        here.with_file(str(tmp_path / "no.py"))
+
+
+def test_a_page_that_others_reach_opens_no_files(tmp_path: Path) -> None:
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")),
+        port=0,
+        max_sessions=1,
+        trusted_origins=("https://lab.example.org",),
+        ask_token=False,
+    )
+    try:
+        with Wire(server.url) as wire:
+            assert eventually(lambda: wire.find("Upload a URDF") is not None, LONG)
+            assert wire.find("Python file") is None
+    finally:
+        server.close()
+
+
+def test_what_was_done_is_handed_in_with_the_labs_signature(server: PageServer) -> None:
+    with Wire(server.url) as wire:
+        assert eventually(lambda: wire.find("Your name") is not None, LONG)
+        wire.write(str(wire.find("Your name")), value="Zoë")
+        press(wire, "Write the text")
+
+        def text() -> str:
+            return str(wire.controls[str(wire.find("To hand in"))].get("value", ""))
+
+        assert eventually(lambda: text().startswith("hp1s-"), LONG)
+        handed, proof = read_handed_in(text(), KEY)
+        assert (handed.name, proof) == ("Zoë", "signed")
+        assert decode(handed.code).run.scene == "planar3-hold"
