@@ -121,13 +121,13 @@ def _answer_of(child: subprocess.Popen[bytes], request: bytes | None, seconds: f
         except subprocess.TimeoutExpired:
             request = None  # sent once
             passed = time.monotonic() - began
-            more = min(seconds + _waited(child.pid), longest) - passed
+            more = min(seconds + waited(child.pid), longest) - passed
             if more < 0.01 * seconds:
                 raise
 
 
-def _waited(pid: int) -> float:
-    """Seconds that a process was ready to run and had no core, as far as the system tells."""
+def waited(pid: int) -> float:
+    """Seconds that a process was ready to run and had no core, as far as the system tells (Linux)."""
     try:
         return int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) * 1e-9
     except (OSError, ValueError, IndexError):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+import time
 from collections.abc import Callable
 from functools import partial
 from types import FrameType
@@ -17,9 +19,10 @@ from lessons.own.judge import judged
 from lessons.own.kinds import law_of, line_of
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
+from robots.isolation import waited
 
 LONGEST_TICK = 0.5
-"""s of wall time that one call may take; a control period is a millisecond or a few."""
+"""s that one call may take by its own doing, asleep included; a control period is a millisecond or a few."""
 
 
 class _TooLong(BaseException):
@@ -49,7 +52,7 @@ def _guarded(source: Source, function: Callable[..., Any], *args: Any) -> Any:
     try:
         if not watched:
             return function(*args)
-        before = signal.signal(signal.SIGALRM, _stop)
+        before = signal.signal(signal.SIGALRM, _Watch())
         signal.setitimer(signal.ITIMER_REAL, LONGEST_TICK)
         try:
             return function(*args)
@@ -63,5 +66,21 @@ def _guarded(source: Source, function: Callable[..., Any], *args: Any) -> Any:
         raise OwnFault(sentence(source.path, error)) from None
 
 
-def _stop(_: int, __: FrameType | None) -> None:
-    raise _TooLong
+class _Watch:
+    """Hears the alarm of a call. One that computed all the time is too long; one that did not may have slept
+    or, on a busy machine, waited for a core, which does not count: that shows if it goes on."""
+
+    def __init__(self) -> None:
+        self._computed = time.thread_time()
+        self._since: tuple[float, float] | None = None
+
+    def __call__(self, _: int, __: FrameType | None) -> None:
+        if time.thread_time() - self._computed > 0.9 * LONGEST_TICK:
+            raise _TooLong
+        now, starved = time.monotonic(), waited(os.getpid())
+        if self._since is None:
+            self._since = now, starved
+        own = now - self._since[0] - (starved - self._since[1])
+        if own > 0.98 * LONGEST_TICK:
+            raise _TooLong
+        signal.setitimer(signal.ITIMER_REAL, LONGEST_TICK - own)

@@ -127,5 +127,7 @@ def sentence(path: str, error: BaseException) -> str:
         return f"{place}: it ends the program (SystemExit): leave that out"
     if isinstance(error, MemoryError):
         return f"{place}: it needs more memory than there is"
-    said = shortened(" ".join(str(error).split()), 200)
-    return f"{place}: {said if isinstance(error, InputError) else f'{type(error).__name__}: {said}'}"
+    said = " ".join(str(error).split())
+    if isinstance(error, InputError):
+        return f"{place}: {shortened(said, 1000)}"
+    return f"{place}: {type(error).__name__}: {shortened(said, 200)}"

@@ -13,6 +13,7 @@ import numpy as np
 from himpc.configuration import Configuration
 from himpc.stack import Level
 from himpc.tasks import Task
+from lessons.own.check import check_lesson, check_scene
 from lessons.own.files import Source, execute, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
@@ -41,34 +42,46 @@ def scene_named(
         return load_scene(name, urdf, tip, urdf_text)
     if (urdf, tip, urdf_text) != (None, None, None):
         raise InputError(f"{name} brings its own robot: leave out --urdf and --tip")
-    source = read(name)
+    return _scene_of(read(name))
+
+
+@lru_cache(maxsize=64)
+def _scene_of(source: Source) -> Scene:
+    """The scene of a file, tried once per content."""
     module = module_of(source)
     if kind_of(module) == "task":
-        return with_task(load_scene(TASK_SCENE), name)
+        return with_task(load_scene(TASK_SCENE), source.path)
     expected(module, "scene")
     given = vars(module).get("SCENE")
     found = _called(source, vars(module)["scene"]) if given is None else given
     if not isinstance(found, Scene):
         raise InputError(
-            f"{name}: its scene is a {type(found).__name__}: make it with TorqueScene or VelocityScene, "
-            "or change one of lessons.headless.load_scene"
+            f"{source.path}: its scene is a {type(found).__name__}: make it with TorqueScene or "
+            "VelocityScene, or change one of lessons.headless.load_scene"
         )
-    return replace(found, name=name)
+    _called(source, partial(check_scene, found))
+    return replace(found, name=source.path)
 
 
 def lesson_named(name: str) -> Lesson:
     """A lesson by its name or file. Raises InputError if there is none, or the file cannot be used."""
     from lessons.course import load_lesson
+
+    return _lesson_of(read(name)) if is_file(name) else load_lesson(name)
+
+
+@lru_cache(maxsize=64)
+def _lesson_of(source: Source) -> Lesson:
+    """The lesson of a file, tried once per content."""
     from lessons.teaching.lesson import Lesson
 
-    if not is_file(name):
-        return load_lesson(name)
-    module = module_of(read(name))
+    module = module_of(source)
     expected(module, "lesson")
     found = vars(module)["LESSON"]
     if not isinstance(found, Lesson):
-        raise InputError(f"{name}: LESSON is a {type(found).__name__}: make it with Lesson(…)")
-    return replace(found, name=name)
+        raise InputError(f"{source.path}: LESSON is a {type(found).__name__}: make it with Lesson(…)")
+    _called(source, partial(check_lesson, found))
+    return replace(found, name=source.path)
 
 
 def task_in(name: str) -> Task:

@@ -65,10 +65,17 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
         assert eventually(lambda: wire.shows("a controller of your own"), LONG)
         open_file(wire, task)
         assert eventually(lambda: bool(settings(learner).own_tasks), LONG)
-        assert eventually(lambda: wire.find("Kind") is not None, LONG)
+
+        def offered() -> bool:
+            uuid = wire.find("Kind")
+            return uuid is not None and str(task) in wire.controls[uuid]["props"]["options"]
+
+        assert eventually(offered, LONG)
         wire.write(str(wire.find("Kind")), value=str(task))
         press(wire, "Add")
-        assert eventually(lambda: "reach" in [level.name for level in settings(learner).levels], LONG)
+        assert eventually(lambda: "reach" in [level.name for level in settings(learner).levels], LONG), (
+            wire.notices
+        )
         assert settings(learner).controller == str(law)
         assert learner.failure is None
 

@@ -40,7 +40,7 @@ def test_the_deadline_is_a_sentence(monkeypatch, tmp_path: Path) -> None:
 
 def test_waiting_for_a_core_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """A busy machine must not make a good file a bad one; yet there is an end."""
-    monkeypatch.setattr(isolation, "_waited", lambda pid: 100.0)
+    monkeypatch.setattr(isolation, "waited", lambda pid: 100.0)
     assert isolated(time.sleep, 3.0, within=isolation.Allowance(2.0)) is None
     monkeypatch.setattr(isolation, "PATIENCE", 2.0)
     with pytest.raises(Fault, match="takes longer than 1 s"):

@@ -1,0 +1,152 @@
+"""Wrong scenes, tasks and lessons, over twenty ways each: a sentence that names the file, exit code 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.__main__ import main
+from lessons.own import judge
+from lessons.own.new import text_of
+
+SCENE, TASK, LESSON = (text_of(kind, None, "mine.py") for kind in ("scene", "task", "lesson"))
+
+FILE = {
+    "empty": ("", "defines neither"),
+    "two things": ("TASK = 1\nLESSON = 2\nSCENE = 3\n", "put each into a file of its own"),
+    "another kind": ("def torque(now):\n    return now.q\n", "is a controller, and a"),
+    "syntax": ("SCENE = (\n", "mine.py, line 1: "),
+    "indentation": ("def scene():\nreturn 1\n", "mine.py, line 2: "),
+    "missing name": ("SCENE = TASK = LESSON = nothing\n", "mine.py, line 1: NameError"),
+    "missing module": ("import no_such_module\n", "mine.py, line 1: ModuleNotFoundError"),
+    "missing part": ("from lessons.events import Kick\n", "mine.py, line 1: ImportError"),
+    "raises": ("\nraise ValueError('so')\n", "mine.py, line 2: ValueError: so"),
+    "exits": ("import sys\nsys.exit(0)\n", "mine.py, line 2: it ends the program"),
+    "memory": ("held = [0] * 10**13\n", "mine.py, line 1: it needs more memory"),
+    "recursion": ("def f():\n    f()\nf()\n", "RecursionError"),
+    "no text": (b"\xff\xfe\x00SCENE", "UTF-8"),
+}
+
+
+def changed(text, good, bad):
+    assert good in text, good
+    return text.replace(good, bad)
+
+
+SCENES = {
+    "a number": ("SCENE = 3\n", "its scene is a int"),
+    "nothing returned": ("def scene():\n    pass\n", "its scene is a NoneType"),
+    "raises when asked": ("def scene():\n    return 1 / 0\n", "line 2: ZeroDivisionError"),
+    "unknown scene": (changed(SCENE, "planar3-hold", "planar4-hold"), "planar4-hold"),
+    "unknown setting": (changed(SCENE, '"horizon"', '"horizn"'), "horizn"),
+    "value out of range": (changed(SCENE, '"horizon", 10', '"horizon", -1'), "horizon"),
+    "shape of q_0": (changed(SCENE, "[0.0, 90.0, -90.0]", "[0.0, 90.0]"), "q must be 3 finite numbers"),
+    "unknown body": (changed(SCENE, '"link_3"', '"link_9"'), "link_9"),
+    "an event that is none": (
+        changed(SCENE, 'Push("link_3", force=(0.0, 5.0, 0.0), seconds=0.1)', '"push"'),
+        "event",
+    ),
+    "duration": (changed(SCENE, "duration=4.0", "duration=-1.0"), "duration"),
+    "duration that is no number": (changed(SCENE, "duration=4.0", 'duration="long"'), "duration"),
+    "a task that is not there": (changed(SCENE, '{"position"', '{"elbow"'), "elbow"),
+    "shape of a reference": (
+        changed(
+            SCENE, "centre, radius = np.array([0.55, 0.3])", "centre, radius = np.array([0.55, 0.3, 0.0])"
+        ),
+        "mine.py: ValueError",
+    ),
+    "references that raise": (changed(SCENE, "    centre,", "    nothing\n    centre,"), "NameError"),
+    "no references": (
+        changed(SCENE, 'return {"position"', 'dict({"position"').replace('"eased"))}', '"eased"))})'),
+        "references",
+    ),
+    "unknown field": (changed(SCENE, "duration=4.0", "lasting=4.0"), "lasting"),
+}
+TASKS = {
+    "a number": ("TASK = 3\n", "TASK is a int"),
+    "Jacobian of another value": (changed(TASK, "max(np.hypot(p[0], p[1]), 1e-6)", "2.0"), "is off by"),
+    "sign of the Jacobian": (changed(TASK, "(direction @ J)", "(-direction @ J)"), "is off by"),
+    "shape of the Jacobian": (changed(TASK, "[:, None, :]", ""), "has shape"),
+    "Jacobian of nothing": (changed(TASK, "return (direction @ J)[:, None, :]", "pass"), "has shape"),
+    "Jacobian without end": (
+        changed(TASK, "(direction @ J)[:, None, :]", "np.nan * (direction @ J)[:, None, :]"),
+        "is off by",
+    ),
+    "shape of the error": (changed(TASK, "return value - desired", "return np.zeros(3)"), "error"),
+    "value that raises": (
+        changed(TASK, "return np.array([np.hypot", "return nothing([np.hypot"),
+        "NameError",
+    ),
+    "value of words": (changed(TASK, "return np.array([np.hypot(p[0], p[1])])", 'return "far"'), "mine.py"),
+    "no coordinates": (changed(TASK, "def coordinates", "def coords"), "coordinates"),
+    "coordinates too many": (changed(TASK, '("reach",)', '("a", "b")'), "shape"),
+    "unknown frame": (changed(TASK, 'Reach(name="reach"', 'Reach(name="reach", frame="nose"'), "nose"),
+    "negative stiffness": (changed(TASK, "K_p=100.0", "K_p=-1.0"), "K_p"),
+    "no name": (changed(TASK, 'name="reach", ', ""), "name"),
+    "unknown field": (changed(TASK, "K_p=100.0", "stiffness=100.0"), "stiffness"),
+}
+LESSONS = {
+    "a number": ("LESSON = 3\n", "LESSON is a int"),
+    "no card": (changed(LESSON, LESSON.split('"""')[1], "A lesson"), "docstring"),
+    "no minutes": (changed(LESSON, "Minutes: 5\n", ""), "docstring"),
+    "unknown scene": (changed(LESSON, 'scene="iiwa14-hold"', 'scene="iiwa15-hold"'), "iiwa15-hold"),
+    "unknown setting": (changed(LESSON, '"plant.payload_kg=2"', '"plant.payload=2"'), "plant.payload"),
+    "a setting out of range": (
+        changed(LESSON, '"plant.payload_kg=2"', '"plant.payload_kg=-2"'),
+        "payload_kg",
+    ),
+    "unknown unit": (changed(LESSON, '"error/position", "mm"', '"error/position", "miles"'), "miles"),
+    "no steps": (changed(LESSON, "steps=(LOAD,)", "steps=()"), "step"),
+    "a step that is none": (changed(LESSON, "steps=(LOAD,)", "steps=(3,)"), "step"),
+    "unknown relation": (changed(LESSON, '"at most"', '"about"'), "about"),
+    "duration": (changed(LESSON, "duration=1.0", "duration=-1.0"), "duration"),
+    "unknown field": (changed(LESSON, "duration=1.0", "lasting=1.0"), "lasting"),
+}
+WRONG = {"scene": FILE | SCENES, "task": FILE | TASKS, "lesson": FILE | LESSONS}
+LINES = {
+    "scene": ["run", "mine.py", "--duration", "0.02"],
+    "task": ["run", "mine.py", "--duration", "0.02"],
+    "lesson": ["lessons", "--check", "mine.py"],
+}
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(("kind", "what"), [(kind, what) for kind in WRONG for what in WRONG[kind]])
+def test_a_wrong_file_is_a_sentence(
+    kind: str, what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, words = WRONG[kind][what]
+    Path("mine.py").write_bytes(text if isinstance(text, bytes) else text.encode())
+    # None of these harms the process it is loaded in; those that do come below.
+    monkeypatch.setattr(judge, "_judged", judge._kind)
+    assert main(LINES[kind]) == 2
+    said = capsys.readouterr().err.strip()
+    assert words in said
+    assert "mine.py" in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize("kind", LINES)
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("import os\nos._exit(0)\n", "ends the program"), ("while True: pass\n", "takes longer than 4 s")],
+    ids=["leaves", "never ends"],
+)
+def test_a_file_that_would_take_the_program_along_is_a_sentence(
+    kind: str,
+    text: str,
+    words: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from dataclasses import replace
+
+    monkeypatch.setattr(judge, "LOADING", replace(judge.LOADING, seconds=4.0))
+    Path("mine.py").write_text(text + f"# {kind}\n")
+    assert main(LINES[kind]) == 2
+    assert f"mine.py: loading it {words}" in capsys.readouterr().err
