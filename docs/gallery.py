@@ -19,6 +19,7 @@ from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from lessons.course import COURSE, load_lesson
+from lessons.exercises import exercises_of
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Lesson, Step
 
@@ -108,6 +109,16 @@ def write_index(out: Path) -> None:
                 "",
                 f"![{card.title}]({name}.webp)",
             ]
+            for each in exercises_of(name):
+                own = each.card
+                lines += [
+                    "",
+                    f"**Write it yourself: {own.title}** ({own.minutes} minutes). {own.question}",
+                    "",
+                    "```sh",
+                    *each.commands(),
+                    "```",
+                ]
     (out / "README.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

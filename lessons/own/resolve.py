@@ -140,6 +140,7 @@ def tasks_named(assignments: Iterable[str]) -> tuple[str, ...]:
 
 def check_task(task: Task, robot: Robot, name: str) -> None:
     """Raises InputError if value, error, Jacobian and coordinates of a task do not fit together."""
+    Level((task,))  # which looks at its gains
     rng = np.random.default_rng(0)
     data, h, m = robot.model.createData(), 1e-6, len(task.coordinates(robot))
     low, high = np.maximum(robot.q_lower, -1.5), np.minimum(robot.q_upper, 1.5)
