@@ -216,7 +216,7 @@ def _told_task(task: Task, own: Own) -> dict[str, Any]:
         found = next((path for path, each in own.items() if type(each) is type(task)), None)
         if found is None:
             raise InputError(
-                f"task '{task.name}' is of a kind of its own, which no word names: put it into a file, and "
+                f"task '{task.name}' is of a kind of its own and cannot be told: put it into a file, and "
                 "name that by --task FILE.py"
             )
         word, usual = found, vars(own[found])
