@@ -75,6 +75,11 @@ class Wire:
         """Writes attributes of a control, as its input does with `value`."""
         self.say(_messages.GuiUpdateMessage(uuid, updates))
 
+    def press_key(self, hotkey: str) -> None:
+        """Triggers the command that has a key."""
+        found = next(uuid for uuid, each in self.commands.items() if each["hotkey"] == hotkey)
+        self.say(_messages.CommandTriggerMessage(found))
+
     def find(self, label: str) -> str | None:
         """The control with a label."""
         shown = list(self.controls.items())

@@ -70,6 +70,12 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         shown(wire, "Remove elbow")
         assert wait_until(lambda: wire.shows("gets 2 of 3 directions"), LONG)
 
+        wire.press_key("4")  # which stood for no level before
+        assert wait_until(lambda: not settings(learner).levels[3].enabled, LONG)
+        wire.press_key("9")
+        wire.press_key("4")
+        assert wait_until(lambda: settings(learner).levels[3].enabled, LONG)
+
         choose(wire, "Axes", "y", at=1)
         assert wait_until(lambda: axes(learner, "elbow") == "y", LONG)
         assert wait_until(lambda: wire.shows("gets 1 of 1 directions"), LONG)
