@@ -42,17 +42,19 @@ def controller_of(settings: TorqueSettings, robot: Robot) -> Controller:
     judged(source)
     module = execute(source)
     make = law_of(module)
-    careful, call = partial(_guarded, source, make), partial(_guarded, source)
+    watch = _Watch()
+    careful, call = partial(_guarded, source, watch, make), partial(_guarded, source, watch)
     return OwnController(robot, wanted, careful, call, f"{source.path}, line {line_of(module)}")
 
 
-def _guarded(source: Source, function: Callable[..., Any], *args: Any) -> Any:
+def _guarded(source: Source, watch: _Watch, function: Callable[..., Any], *args: Any) -> Any:
     """function(*args), at most LONGEST_TICK. Raises OwnFault, with the line, for whatever goes wrong."""
     watched = threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer")
     try:
         if not watched:
             return function(*args)
-        before = signal.signal(signal.SIGALRM, _Watch())
+        watch.begin()
+        before = signal.signal(signal.SIGALRM, watch.hear)
         signal.setitimer(signal.ITIMER_REAL, LONGEST_TICK)
         try:
             return function(*args)
@@ -67,19 +69,27 @@ def _guarded(source: Source, function: Callable[..., Any], *args: Any) -> Any:
 
 
 class _Watch:
-    """Hears the alarm of a call. One that computed all the time is too long; one that did not may have slept
-    or, on a busy machine, waited for a core, which does not count: that shows if it goes on."""
+    """Ends a call that takes too long. One that computed all the time does; one that did not may have slept
+    or, on a busy machine, waited for a core, which does not count. How long it waited is asked from the first
+    alarm on, since asking costs as much as a short call."""
 
     def __init__(self) -> None:
-        self._computed = time.thread_time()
+        self._computed = 0.0
         self._since: tuple[float, float] | None = None
+        self._heard = False
 
-    def __call__(self, _: int, __: FrameType | None) -> None:
+    def begin(self) -> None:
+        """A call begins."""
+        self._computed = time.thread_time()
+        self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
+
+    def hear(self, _: int, __: FrameType | None) -> None:
+        """The alarm. Raises _TooLong, or sets it again."""
         if time.thread_time() - self._computed > 0.9 * LONGEST_TICK:
             raise _TooLong
         now, starved = time.monotonic(), waited(os.getpid())
         if self._since is None:
-            self._since = now, starved
+            self._since, self._heard = (now, starved), True
         own = now - self._since[0] - (starved - self._since[1])
         if own > 0.98 * LONGEST_TICK:
             raise _TooLong

@@ -148,7 +148,7 @@ SUBMISSIONS: dict[str, Submission] = {
     "right_qp_of_torques": Submission("one-level-qp", _QP_OF_TORQUES, 10),
     "right_two_by_basis": Submission("two-levels", _TWO_BY_BASIS, 10),
     "wrong_sign": _wrong("joint-pd", "- level.K_p", "+ level.K_p", 2, "comes back"),
-    "wrong_no_curvature": _wrong("null-space", "- level.J_dot_q_dot", "", 7, "J̇q̇ is missing"),
+    "wrong_no_curvature": _wrong("null-space", "- level.J_dot_q_dot", "", 7, "J̇q̇, the order"),
     "wrong_no_projection": _wrong("null-space", "level.J @ N", "level.J", 2, "reaches the hand"),
     "wrong_weighted": _wrong("two-levels", "if torques:", "if False:", 0, "a weighted sum is not strict"),
     "wrong_no_bound": _wrong(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +131,18 @@ def test_own_controller_that_is_wrong_is_one_sentence(what: str, tmp_path: Path)
     said = str(caught.value)
     assert str(path) in said
     assert "\n" not in said
+
+
+def test_own_call_may_wait_for_a_core_but_not_sleep(file, monkeypatch) -> None:
+    """A busy machine makes no good controller a bad one."""
+    from lessons.own import controllers
+
+    scene = load_scene("planar3-hold")
+    law = file("import time\n\ndef torque(now):\n    time.sleep(0.7)\n    return now.bias\n")
+    with pytest.raises(InputError, match=r"line 4: one call takes longer than 0\.5 s"):
+        run(prepared(scene, law, ()), 0.01)
+    monkeypatch.setattr(controllers, "waited", lambda pid: time.monotonic())
+    assert run(prepared(scene, law, ()), 0.003)["tau"].shape == (3, 3)
 
 
 def test_own_endless_import_ends_at_the_deadline(file, monkeypatch) -> None:
