@@ -37,7 +37,8 @@ def forward(L: Array, a: Array, m: Array) -> None:
 @quick
 def backward(L: Array, z: Array, x: Array) -> None:
     """x ← L⁻ᵀ z."""
-    x[:] = z
+    for i in range(len(z)):
+        x[i] = z[i]
     for i in range(len(z) - 1, -1, -1):
         x[i] /= L[i, i]
         for j in range(i):

@@ -78,7 +78,9 @@ def _place(
                     here[a, 1] = c * g + along * y + s * (h * x - f * w)
                     here[a, 2] = c * h + along * w + s * (f * y - g * x)
             else:
-                here[:] = F
+                for a in range(3):  # `here[:] = F` would be compiled with all that it takes to word an error
+                    for b in range(3):
+                        here[a, b] = F[a, b]
             _apply(here, axis[j], z[k, j])
             if not turns[j]:
                 for a in range(3):
@@ -113,9 +115,11 @@ def _frame(
                 J[k, 0, c] = axis[1] * w - axis[2] * y
                 J[k, 1, c] = axis[2] * x - axis[0] * w
                 J[k, 2, c] = axis[0] * y - axis[1] * x
-                J[k, 3:, c] = axis
+                for a in range(3):
+                    J[k, 3 + a, c] = axis[a]
             else:
-                J[k, :3, c] = axis
+                for a in range(3):
+                    J[k, a, c] = axis[a]
     return place, at, J
 
 

@@ -8,7 +8,7 @@ from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.bases import no_directions, seen_rows, take_directions
 from himpc.tick.kernel.bounds import sums
 from himpc.tick.kernel.level import Level, prepare
-from himpc.tick.kernel.linear import dot
+from himpc.tick.kernel.linear import copy_rows, dot
 from himpc.tick.kernel.taken import Taken
 
 FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
@@ -126,8 +126,8 @@ def solve_level(
     knots = levels[place, KNOTS]
     if alone:
         level.fixed[:] = 0.0
-        low[:] = lower
-        high[:] = upper
+        copy_rows(lower, low)
+        copy_rows(upper, high)
     else:
         keep_above(level, U[place - 1], knots)
         # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
@@ -137,7 +137,7 @@ def solve_level(
                 low[r, a] = min(lower[r, a], value[r, a] - room)
                 high[r, a] = max(upper[r, a], value[r, a] + room)
         if level.rest[N] == 0:
-            U[place] = U[place - 1]
+            copy_rows(U[place - 1], U[place])
             return 0.0, 0
     if not prepare(level, B, free, root_Q, ideal):
         return FAILED, 0

@@ -16,6 +16,7 @@ from himpc.tick.kernel.cascade import (
     predict,
 )
 from himpc.tick.kernel.evidence import bounds_met, cost_of, leak_of, quaternions
+from himpc.tick.kernel.linear import copy, copy_rows
 from himpc.tick.kernel.residual import add_effects, effects
 from himpc.tick.kernel.views import matrices, matrix, vector
 
@@ -81,11 +82,13 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
     quaternions(task, matrices(data, where[AT.R_now], T, 3, 3), matrix(data, where[AT.quaternion], T, 4))
     quaternions(task, matrices(data, where[AT.R_d], T, 3, 3), matrix(data, where[AT.quaternion_d], T, 4))
     if keep:
-        q_was[:] = q
-        v_was[:] = v
-        vector(data, where[AT.x_dot_was], M)[:] = vector(data, where[AT.x_dot], M)
-        matrix(data, where[AT.path], N + 1, n)[:] = predicted
-        matrices(data, where[AT.U_was], last + 1, N, n)[:] = U
+        copy(q, q_was, n)
+        copy(v, v_was, n)
+        copy(vector(data, where[AT.x_dot], M), vector(data, where[AT.x_dot_was], M), M)
+        copy_rows(predicted, matrix(data, where[AT.path], N + 1, n))
+        U_was = matrices(data, where[AT.U_was], last + 1, N, n)
+        for i in range(last + 1):
+            copy_rows(U[i], U_was[i])
         data[where[AT.scalars] + PERIOD] = data[where[AT.scalars] + T_S]
         whole[whole_where[WHOLE_AT.known] + 1] = 1
         pressed_row, pressed_joint = (

@@ -6,6 +6,7 @@ import math
 
 from himpc.cascade.compiled import piece
 from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.linear import copy
 
 POSITION, ORIENTATION, JOINTS, DAMPING, GIVEN = range(5)
 """Kinds of tasks; rows of a GIVEN one are handed in, with its value and error."""
@@ -84,7 +85,7 @@ def jacobian(
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
         for i in range(first, first + size):
             if kind == GIVEN:
-                J[i] = given[part[i]]
+                copy(given[part[i]], J[i], J.shape[1])
                 continue
             if kind >= JOINTS:
                 J[i, part[i]] = 1.0

@@ -23,6 +23,20 @@ def subtract(share: float, x: Array, y: Array, n: int) -> None:
 
 
 @piece
+def copy(x: Array, y: Array, n: int) -> None:
+    """y ← x over the first n. (`y[:] = x` would be compiled with all that it takes to word an error.)"""
+    for i in range(n):
+        y[i] = x[i]
+
+
+@piece
+def copy_rows(X: Array, Y: Array) -> None:
+    """Y ← X, as many rows as Y has."""
+    for i in range(len(Y)):
+        copy(X[i], Y[i], Y.shape[1])
+
+
+@piece
 def factorise(H: Array, d: int) -> bool:
     """The lower Cholesky factor F of H = F Fᵀ in place of its lower triangle; False if H is not positive.
 

@@ -7,7 +7,7 @@ import math
 from himpc.cascade.compiled import MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.kinematics import turned_away
-from himpc.tick.kernel.linear import dot
+from himpc.tick.kernel.linear import copy, dot
 
 _APPROACH = 6.0
 """1/s: how fast the remaining distance closes near the raw target."""
@@ -92,9 +92,9 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
         turned_away(raw.reshape(3, 3), now[:9].reshape(3, 3), away)
     distance, speed = math.sqrt(dot(away, away, m)), math.sqrt(dot(velocity, velocity, m))
     if rests or (distance < _STILL and speed < 10.0 * _STILL):
-        then[:width] = raw
+        copy(raw, then, width)
         then[width:] = 0.0
-        then[width + 2 * m : width + 3 * m] = away
+        copy(away, then[width + 2 * m :], m)
         then[width + 3 * m] = 1.0
         return
     # Never faster than a stop with half the acceleration cap allows; linear close to the goal.
