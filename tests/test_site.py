@@ -10,10 +10,10 @@ from typing import Literal
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Browser
 
 from app.__main__ import main
-from browsing.hands import CHROMIUM_ARGS, SLOW, find_chromium
+from browsing.hands import SLOW
 from docs.build import build
 from docs.further import further
 from docs.pages.lessons import MEASURED, measured
@@ -130,37 +130,30 @@ def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_site_in_a_browser(site: Path, width: int, height: int, scheme: Literal["light", "dark"]) -> None:
+def test_the_site_in_a_browser(
+    site: Path, browser: Browser, width: int, height: int, scheme: Literal["light", "dark"]
+) -> None:
     """From a file: nothing wider than the screen or loaded from elsewhere; film, answers and search work."""
-    path = find_chromium()
-    if path is None:
-        pytest.skip("no Chromium found: install one (Debian: apt-get install chromium)")
     asked: list[str] = []
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_ARGS)
-        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
-        page.set_default_timeout(SLOW)
-        page.on("request", lambda request: asked.append(request.url))
-        for name in ("index.html", "lessons/inside-the-qp.html"):
-            page.goto((site / name).as_uri())
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-        assert (
-            page.evaluate("document.querySelector('math[display=block]').getBoundingClientRect().height") > 10
-        )
-        assert (
-            page.evaluate("document.querySelector('figure.curves svg').getBoundingClientRect().width") > 200
-        )
-        answer = page.locator("details", has_text="Answer").last
-        answer.locator("summary").click()
-        assert answer.evaluate("each => each.open && each.innerText.length") > 60
-        page.locator("button[data-film]").click()
-        (frame,) = [each for each in page.frames if "player.html" in each.url]
-        frame.wait_for_function(
-            "() => window.__viserMutable?.nodeRefFromName['/robot/2'] && window.__VISER_EMBED_DATA__.length"
-        )
-        page.goto((site / "search.html").as_uri() + "?q=singularity")
-        page.locator("#search-results li").first.wait_for()
-        browser.close()
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+    page.set_default_timeout(SLOW)
+    page.on("request", lambda request: asked.append(request.url))
+    for name in ("index.html", "lessons/inside-the-qp.html"):
+        page.goto((site / name).as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('math[display=block]').getBoundingClientRect().height") > 10
+    assert page.evaluate("document.querySelector('figure.curves svg').getBoundingClientRect().width") > 200
+    answer = page.locator("details", has_text="Answer").last
+    answer.locator("summary").click()
+    assert answer.evaluate("each => each.open && each.innerText.length") > 60
+    page.locator("button[data-film]").click()
+    (frame,) = [each for each in page.frames if "player.html" in each.url]
+    frame.wait_for_function(
+        "() => window.__viserMutable?.nodeRefFromName['/robot/2'] && window.__VISER_EMBED_DATA__.length"
+    )
+    page.goto((site / "search.html").as_uri() + "?q=singularity")
+    page.locator("#search-results li").first.wait_for()
+    page.close()
     assert asked and all(url.startswith(("file:", "data:", "blob:")) for url in asked)
 
 

@@ -1,32 +1,16 @@
-"""Fixtures of the page's tests: one browser and one server for all that can share them."""
+"""Fixtures of the tests in a browser: one server and one page for all that can share them."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
-from browsing.hands import CHROMIUM_ARGS, find_chromium, open_page, press, tab, wait_for_scene
+from browsing.hands import open_page, press, tab, wait_for_scene
 from lessons.scenes.run_spec import RunSpec
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    path = find_chromium()
-    if path is None:
-        reason = "no Chromium found: install one (Debian: apt-get install chromium) to test the page"
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
-    expect.set_options(timeout=30_000)
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=CHROMIUM_ARGS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")
