@@ -7,6 +7,7 @@ from robots.lazy import lazily
 if TYPE_CHECKING:
     from lessons.experiments.jobs import Job, perform_all
     from lessons.experiments.tune import chosen, tune
+    from lessons.own.resolve import scene_named, with_tasks
     from lessons.recording.arrays import arrays
     from lessons.recording.recording import Recording
     from lessons.recording.run import run
@@ -26,9 +27,11 @@ __all__ = [
     "perform_all",
     "prepared",
     "run",
+    "scene_named",
     "summary",
     "torque_scene",
     "tune",
+    "with_tasks",
 ]
 
 __getattr__ = lazily(
@@ -44,8 +47,10 @@ __getattr__ = lazily(
         "perform_all": "experiments.jobs",
         "prepared": "scenes.catalog",
         "run": "recording.run",
+        "scene_named": "own.resolve",
         "summary": "recording.summary",
         "torque_scene": "scenes.catalog",
         "tune": "experiments.tune",
+        "with_tasks": "own.resolve",
     },
 )

@@ -68,7 +68,7 @@ _SCENE = '''"""The scene {scene}, to be changed.
 
 from dataclasses import replace
 
-from lessons.headless import load_scene
+from lessons import load_scene
 
 START = load_scene("{scene}")
 

@@ -57,7 +57,7 @@ def _scene_of(source: Source) -> Scene:
     if not isinstance(found, Scene):
         raise InputError(
             f"{source.path}: its scene is a {type(found).__name__}: make it with TorqueScene or "
-            "VelocityScene, or change one of lessons.headless.load_scene"
+            "VelocityScene, or change one of lessons.load_scene"
         )
     _called(source, partial(check_scene, found))
     return replace(found, name=source.path)

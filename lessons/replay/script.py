@@ -77,7 +77,7 @@ import numpy as np
 _CAUTION = """
 Measured computing times took part in it, so every repetition comes out a little different."""
 
-_IMPORTS = """from lessons.headless import arrays, load_scene, prepared, run, scene_named, summary, with_tasks
+_IMPORTS = """from lessons import arrays, load_scene, prepared, run, scene_named, summary, with_tasks
 """
 
 _TAIL = """

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from himpc.references import Circle, Phase
+from lessons import load_scene
 from lessons.events import Push
-from lessons.headless import load_scene
 
 # Begin with a scene there is (himpc-lab scenes) and change what should be different.
 START = load_scene("planar3-hold")
