@@ -14,7 +14,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.server.server import PageServer
-from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page
+from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
 from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step
 
@@ -55,6 +55,7 @@ def main() -> None:
 
 def played_back(page: Page, seconds: float) -> list[Image.Image]:
     """The run once more by looking back at it: whatever the machine's pace, a tenth of a second each."""
+    press(page, "Pause")  # a robot that runs is not looked back at
     page.mouse.move(700, 850)  # or a hint would cover something
     for _ in range(round(seconds) + 1):
         key(page, "Shift+J")
