@@ -7,7 +7,7 @@ import math
 import numpy as np
 import viser
 
-_SHARE = 0.62
+_SHARE = 0.74
 """Of the picture's width and height that what is looked at may take: a target has to be dragged somewhere."""
 _NARROW = 0.75
 """Width over height of a desktop's scene once the panels are docked beside it, as a rule."""
