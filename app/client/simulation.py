@@ -163,9 +163,9 @@ class Simulation(ABC):
         telemetry, too, which can wait for the next look but one."""
 
         def take(block: Block, history: History) -> float:
-            if rows:
-                history.pull()
             t, poses = block.moment()
+            if rows:
+                history.pull()  # after the moment: what is told of until then is in the telemetry
             self.tape.add(Frame(t, poses, self.status))
             return t
 
