@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
+import re
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -11,11 +14,13 @@ from app.client.progress import Notebook
 from app.html.glossary import explained, words
 from app.html.markdown import rendered, rendered_line
 from app.html.text import figure, readable
-from app.link.exercise import Curve
+from app.link.exercise import Curve, Exercise, Lecture
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
+from app.panels.lesson.prediction import Asking
 from app.panels.widgets.logarithmic import STEPS, place_of, value_at
 from lessons.course import COURSE, load_lesson
 from lessons.replay.progress import Progress, progress_from
+from lessons.teaching.prediction import Grade, Value
 
 
 def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
@@ -83,3 +88,35 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     nothing = Curve(np.array([0.0]), np.array([math.nan]))
     assert chart("error", "mm", nothing, None, [], 1.0) == ""
     assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")
+
+
+def test_a_guess_that_came_too_late_is_not_drawn() -> None:
+    """The drawing shows what was graded."""
+    prediction = next(
+        each.prediction
+        for name in COURSE
+        for each in load_lesson(name).steps
+        if isinstance(each.prediction, Value)
+    )
+    gui = MagicMock()
+    picture, _ = gui.add_html.side_effect = [MagicMock(), MagicMock()]
+    asking = Asking(gui, prediction, lambda _: None)
+    slider = gui.add_slider.return_value
+    slider.value = STEPS
+    asyncio.run(slider.on_update.call_args.args[0](None))
+    assert figure(prediction.high, prediction.measure.unit) in picture.content
+    graded = prediction.low * 2
+    asking.show(
+        Lecture(
+            exercise=Exercise("one-task"),
+            phase="done",
+            attempt=1,
+            t=1.0,
+            duration=1.0,
+            answer=graded,
+            truth=graded,
+            grade=Grade(1.0, "Right."),
+        )
+    )
+    guess = re.findall(r">your guess ([^<]*)", picture.content)
+    assert guess == [figure(graded, prediction.measure.unit)]

@@ -148,16 +148,17 @@ class Asking:
             self._picture.content = html
 
     def _pictured(self, lecture: Lecture | None) -> str:
-        truth = math.nan if lecture is None else lecture.truth
+        """lecture: once the run is graded; what came too late for it is not what was said."""
+        truth, mine = (math.nan, self._mine) if lecture is None else (lecture.truth, lecture.answer)
         match self._prediction:
             case Choice() as choice:
-                return _options(choice, self._mine, truth)
+                return _options(choice, mine, truth)
             case Value() as value:
-                guess = self._mine if isinstance(self._mine, (int, float)) else self.suggested
+                guess = mine if isinstance(mine, (int, float)) else self.suggested
                 assert isinstance(guess, (int, float))
                 return scale(value.low, value.high, guess, truth, value.factor, value.measure.unit)
             case Sketch() as wanted:
-                points = self._mine if isinstance(self._mine, tuple) else self.suggested
+                points = mine if isinstance(mine, tuple) else self.suggested
                 assert isinstance(points, tuple)
                 curve = None if lecture is None else lecture.sketched
                 return sketch(wanted.low, wanted.high, wanted.until, points, curve, wanted.signal.unit)
