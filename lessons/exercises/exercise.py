@@ -9,7 +9,7 @@ import numpy as np
 
 from lessons.events import Push
 from lessons.scenes.run_spec import RunSpec
-from lessons.teaching.claim import Relation
+from lessons.teaching.claim import Relation, condition, holds
 from lessons.teaching.control import Script
 from lessons.teaching.lesson import Card
 from lessons.teaching.measure import Measure
@@ -43,7 +43,7 @@ class Check:
 
     def holds(self, value: float) -> bool:
         """Whether a value meets it; NaN does not."""
-        return value <= self.bound if self.relation == "at most" else value >= self.bound
+        return holds(value, self.relation, self.bound)
 
     @property
     def unit(self) -> str:
@@ -52,7 +52,7 @@ class Check:
     @property
     def condition(self) -> str:
         """E.g. "≤ 1 mm"."""
-        return f"{'≤' if self.relation == 'at most' else '≥'} {self.bound:g} {self.unit}".rstrip()
+        return condition(self.relation, self.bound, self.unit)
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,19 @@ class Claim:
 
     def holds(self, value: float) -> bool:
         """Whether a measured value fulfils the claim; NaN does not."""
-        return value <= self.bound if self.relation == "at most" else value >= self.bound
+        return holds(value, self.relation, self.bound)
 
     @property
     def condition(self) -> str:
         """The claim as an inequality, e.g. "≤ 1 mm"."""
-        return f"{_SIGNS[self.relation]} {self.bound:g} {self.measure.unit}".rstrip()
+        return condition(self.relation, self.bound, self.measure.unit)
+
+
+def holds(value: float, relation: Relation, bound: float) -> bool:
+    """Whether a value is at most, or at least, a bound; NaN is neither."""
+    return value <= bound if relation == "at most" else value >= bound
+
+
+def condition(relation: Relation, bound: float, unit: str) -> str:
+    """As an inequality, e.g. "≤ 1 mm"."""
+    return f"{_SIGNS[relation]} {bound:g} {unit}".rstrip()
