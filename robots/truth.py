@@ -34,11 +34,8 @@ def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
 
 
 def joint_axis(model: pin.Model, joint: int) -> tuple[bool, np.ndarray]:
-    """(prismatic, unit axis in the joint's frame) of a one-axis joint."""
-    kind = model.joints[joint]
-    data = kind.createData()
-    kind.calc(data, np.zeros(1))
-    motion = np.asarray(data.S, dtype=float).reshape(6)
+    """(prismatic, unit axis in the joint's frame) of a one-axis joint, which is the same in every pose."""
+    motion = np.asarray(model.joints[joint].createData().S, dtype=float).reshape(6)
     prismatic = bool(np.abs(motion[:3]).max() > 0.5)
     return prismatic, motion[:3] if prismatic else motion[3:]
 

@@ -11,6 +11,7 @@ from arms import full_mass_matrix, joint, link
 from arms import robot as urdf
 
 from robots import CATALOG, Plant, PlantSettings, Robot, load_robot, load_urdf_text
+from robots.truth import joint_axis
 
 
 def independently_changed(
@@ -146,3 +147,14 @@ def test_what_is_faster_than_numbers_can_follow_stays_where_it_was(altered: bool
     assert np.isfinite(plant.q).all() and np.isfinite(plant.v).all()
     plant.reset(robot.home)
     assert not plant.broken
+
+
+@pytest.mark.parametrize("kind", [pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned])
+def test_a_joints_axis_is_read_from_no_configuration(kind: type) -> None:
+    """Pinocchio's joints check no sizes: such a read past a short vector ended a process."""
+    model = pin.Model()
+    model.addJoint(0, kind(np.array([0.6, 0.0, 0.8])), pin.SE3.Identity(), "skew")
+    model.joints[1].setIndexes(1, 10**9, 10**9)  # a configuration that long is nowhere in memory
+    prismatic, axis = joint_axis(model, 1)
+    assert prismatic == (kind is pin.JointModelPrismaticUnaligned)
+    np.testing.assert_allclose(axis, [0.6, 0.0, 0.8])
