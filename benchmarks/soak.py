@@ -37,7 +37,7 @@ from lessons.scenes.run_spec import RunSpec
 
 FILL = 10.0  # minutes
 EVERY = 5.0  # s
-NEAR = 5  # samples over which a median is taken
+NEAR = 5  # samples over which a median is taken, at least
 BATCHES = 5  # of reloads
 REST = 5.0  # s
 GROWTH, PER_100, SPARE = 1.05, 5.0, 3
@@ -164,14 +164,15 @@ def judged(later: list[Sample], cost: float | None) -> list[str]:
     """Sentences on what is over the figures; later: samples since all was filled."""
     if len(later) < 2 * NEAR:
         return [f"Too short: {len(later)} samples since everything was filled."]
-    first, last = later[:NEAR], later[-NEAR:]
+    some = max(NEAR, len(later) // 10)  # what is on its way to a client comes and goes within minutes
+    first, last = later[:some], later[-some:]
     faults: list[str] = []
     for name in ("server", "children"):
-        before, after = (median(getattr(each, name) for each in some) for some in (first, last))
+        before, after = (median(getattr(each, name) for each in part) for part in (first, last))
         if after > GROWTH * before:
             faults.append(f"Memory of the {name} grew from {before:.1f} to {after:.1f} MB.")
     for name in ("processes", "threads", "handles"):
-        before, after = (median(getattr(each, name) for each in some) for some in (first, last))
+        before, after = (median(getattr(each, name) for each in part) for part in (first, last))
         if after > before + SPARE:
             faults.append(f"There were {before:g} {name}, then {after:g}.")
     if cost is not None and cost > PER_100:
