@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -49,6 +50,25 @@ def test_lists_load_no_numerics(command: str) -> None:
     done = _watched([command])
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) > 5
+
+
+def test_the_plant_looks_for_no_window() -> None:
+    """MuJoCo's import would ask other processes for a window library; Ctrl-C reached them."""
+    code = """
+import sys
+import app.commands.early, robots.plant
+assert "mujoco" in sys.modules and "glfw" not in sys.modules
+"""
+    environment = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_help_names_every_command() -> None:
