@@ -9,8 +9,9 @@ the clients reloads its page N times. Prints a table; exit 0 if memory of the se
 by at most 5 % since everything was filled, threads and handles are as many as before, and 100 reloads cost at
 most 5 MB.
 
-Memory is what no other process shares, after what is free was given back: what an allocator keeps for later
-goes up and down by more than a leak would.
+Memory is what a process has written and shares with no other, after what is free was given back: what an
+allocator keeps for later goes up and down by more than a leak would, and so do pages of libraries, which are
+shared as long as any program on the machine has them open, too.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass
 from itertools import combinations
+from pathlib import Path
 from statistics import median
 
 import psutil
@@ -46,7 +48,7 @@ GROWTH, PER_100, SPARE = 1.05, 5.0, 3
 
 @dataclass(frozen=True)
 class Sample:
-    """minute: since the start; server, children: MB that no other process shares; rss: MB of the server."""
+    """minute: since the start; server, children: MB of their own, see `written`; rss: MB of the server."""
 
     minute: float
     server: float
@@ -132,25 +134,36 @@ def sample(minute: float, client: int) -> Sample:
     """What server and children hold now. client: number of the process that is no part of the server."""
     server = psutil.Process()
     tidy()
-    memory = server.memory_full_info()
+    memory = written(server)
     own, processes = 0.0, 0
     for child in server.children(recursive=True):
         if child.pid == client:
             continue
         try:
-            own += child.memory_full_info().uss
+            own += written(child)
             processes += 1
         except psutil.NoSuchProcess:
             pass
     return Sample(
         minute=round(minute, 2),
-        server=round(1e-6 * memory.uss, 1),
-        rss=round(1e-6 * memory.rss, 1),
+        server=round(1e-6 * memory, 1),
+        rss=round(1e-6 * server.memory_info().rss, 1),
         children=round(1e-6 * own, 1),
         processes=processes,
         threads=server.num_threads(),
         handles=server.num_fds(),
     )
+
+
+def written(process: psutil.Process) -> float:
+    """Bytes that a process has written and shares with no other."""
+    if sys.platform != "linux":
+        return process.memory_full_info().uss
+    try:
+        lines = Path(f"/proc/{process.pid}/smaps_rollup").read_text().splitlines()
+    except (FileNotFoundError, ProcessLookupError):
+        raise psutil.NoSuchProcess(process.pid) from None
+    return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("Private_Dirty:"))
 
 
 def tidy() -> None:
