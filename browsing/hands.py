@@ -6,6 +6,7 @@ import math
 import shutil
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import urlsplit
 
 from playwright.sync_api import Browser, Locator, Page
 
@@ -13,6 +14,8 @@ CHROMIUM_ARGS = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swi
 SLOW = 60_000  # ms: WebGL in software on two shared cores
 BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
 
+SCALE = 0.25
+"""Pixels per CSS pixel where nobody looks at the picture."""
 OFTEN, SELDOM = 80, 300
 """ms between two pictures, where something is dragged in 3D and where nothing is."""
 
@@ -20,6 +23,13 @@ _RESTING = """(() => {
   const frame = window.requestAnimationFrame.bind(window);
   window.requestAnimationFrame = (draw) => window.setTimeout(() => frame(draw), REST);
   window.cancelAnimationFrame = (id) => window.clearTimeout(id);
+})()"""
+
+_PLAIN = """(() => {
+  const context = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return context.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
+  };
 })()"""
 
 _PICTURES = """() => new Promise((done) => {
@@ -47,20 +57,34 @@ def open_page(
     url: str,
     width: int = 1300,
     height: int = 480,
-    scale: float = 0.5,
+    scale: float = SCALE,
     rest: int = OFTEN,
 ) -> Page:
-    """A fresh browser profile with the page loaded and the robot drawn.
+    """A fresh browser profile with the page loaded and the robot drawn; arguments as of `new_page`."""
+    page = new_page(browser, width, height, scale, rest)
+    # viser draws no less than a pixel per CSS pixel unless it is told to.
+    load(page, url if scale >= 1 else f"{url}{'&' if urlsplit(url).query else '?'}fixedDpr={scale}")
+    return page
 
-    rest: ms between two pictures. Without a graphics card every picture takes both cores a tenth of a second.
+
+def new_page(
+    browser: Browser, width: int = 1300, height: int = 480, scale: float = SCALE, rest: int = OFTEN
+) -> Page:
+    """An empty page of a fresh browser profile, in which pictures cost little.
+
+    Args:
+        browser: without a graphics card every picture takes both cores a tenth of a second.
+        width, height: of the page, CSS pixels.
+        scale: pixels per CSS pixel. Below 1 edges are not smoothed: nobody looks.
+        rest: ms between two pictures.
     """
     page = browser.new_context(
-        viewport={"width": width, "height": height},
-        device_scale_factor=scale,  # 0.5: a quarter of the pixels: they are drawn without a graphics card
+        viewport={"width": width, "height": height}, device_scale_factor=scale
     ).new_page()
     page.set_default_timeout(SLOW)
     page.add_init_script(_RESTING.replace("REST", str(rest)))
-    load(page, url)
+    if scale < 1:
+        page.add_init_script(_PLAIN)
     return page
 
 

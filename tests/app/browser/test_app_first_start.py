@@ -10,7 +10,7 @@ from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
-from browsing.hands import SLOW, eventually
+from browsing.hands import SLOW, eventually, new_page
 from lessons.scenes.run_spec import RunSpec
 
 
@@ -20,7 +20,7 @@ def test_the_page_opens_while_it_is_compiled(
     """And counts what is ready. (How the robot comes after that: every other test of the page.)"""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0)
-    page = browser.new_context(viewport={"width": 1300, "height": 480}).new_page()
+    page = new_page(browser)
     try:
         page.goto(server.url, wait_until="commit", timeout=SLOW)
 

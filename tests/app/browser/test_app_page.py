@@ -24,6 +24,7 @@ from browsing.hands import (
     eventually,
     is_drawn,
     key,
+    new_page,
     number,
     open_page,
     position,
@@ -256,7 +257,7 @@ def test_two_browsers_and_no_third(
     drag_target(page, axis=1, along=0.15)
     assert eventually(page, lambda: position(page, "/actual")[1] > still[1] + 0.08)
     assert np.allclose(position(second, "/actual"), still, atol=2e-3)
-    third = browser.new_context().new_page()
+    third = new_page(browser)
     third.goto(server.url, wait_until="commit")
     expect(third.get_by_text("All places are taken")).to_be_visible(timeout=60_000)
     pid = other.pid
