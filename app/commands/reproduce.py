@@ -78,12 +78,12 @@ def _print(reports: Sequence[Report]) -> None:
 
     for report in reports:
         lines = [
-            [row.quantity, row.unit, row.says or number(row.paper), number(row.ours), row.verdict]
+            [row.verdict or "–", row.says or number(row.paper), number(row.ours), row.unit, row.quantity]
             for row in report.section.rows
         ]
         if lines:
             title = f"{report.item.name}: {report.item.title}"
-            print_table(title, ("", "unit", "paper", "ours", "verdict"), lines)
+            print_table(title, ("verdict", "paper", "ours", "unit", "of what"), lines)
     rows = []
     for report in reports:
         checks = report.section.checks

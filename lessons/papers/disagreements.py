@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from lessons.papers.item import Row
-from lessons.papers.topics import Topic, topics
+from lessons.papers.stored import stored
+from lessons.papers.topics import Measured, Topic, topics
 from lessons.papers.words import number
 from lessons.replay.state import encode
 
@@ -20,13 +22,13 @@ a run. HIMPC is Wang, Liu, Leibold, Buss, Lee, T-RO 2024; HTMPC is Du, Zhou, Sch
 
 {tally}
 
-Neither paper prints its plant (masses, friction, how a velocity is measured) or its code. So a number that
-differs need not be wrong, neither theirs nor ours; but each must have a reason that can be looked at. Here
-is every row that does not agree within its tolerance, 10 % where none is named, ordered by what we think is
-the cause. *Opposite* means that an effect has the other direction. `reproduce` judges each row on both
-sides: it also fails if a disagreement shrinks or vanishes without this page being changed. Numbers in the
-tables are measured anew by every `reproduce`; those in the texts below them were measured once, by the
-settings named with them.
+HIMPC's paper prints neither its plants (masses, friction, how a velocity is measured) nor its code; HTMPC's
+neither its weights (ours are from the authors' published set-up) nor its targets. So a number that differs
+need not be wrong, neither theirs nor ours; but each must have a reason that can be looked at. Here is every
+row that does not agree within its tolerance, 10 % where none is named, ordered by what we think is the cause.
+*Opposite* means that an effect has the other direction. `reproduce` judges each row on both sides: it also
+fails if a disagreement shrinks or vanishes without this page being changed. Every number of ours, in the
+tables and in the texts below them, is measured by `reproduce` and held against the one stored before.
 """
 _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.")
 
@@ -42,16 +44,35 @@ def page(found: Found) -> str:
         if row.verdict not in ("differs", "opposite"):
             continue
         by_topic.setdefault(row.topic if row.topic in topics() else "", []).append((item, row))
-    verdicts = [row.verdict for _, row in found]
-    counts = {each: verdicts.count(each) for each in ("agrees", "differs", "opposite")}
-    tally = (
-        f"Of {sum(counts.values())} printed numbers and statements that we hold ours against, "
-        f"{counts['agrees']} agree, {counts['differs']} differ and {counts['opposite']} come out the other "
-        "way round."
-    )
-    parts = [_INTRO.format(tally=tally)]
-    parts += [_section(topics().get(name, _NO_TOPIC), rows) for name, rows in by_topic.items() if rows]
+    parts = [_INTRO.format(tally=_tally([row for _, row in found]))]
+    measured = {**_remembered(), **{(item, row.quantity): (row.ours, row.ratio) for item, row in found}}
+    parts += [
+        _section(topics().get(name, _NO_TOPIC).told(measured), rows)
+        for name, rows in by_topic.items()
+        if rows
+    ]
     return "\n".join(parts)
+
+
+def _remembered() -> Measured:
+    """What was stored: a short reproduction does not measure all that the texts tell."""
+    return {
+        (item, quantity): (ours, ratio)
+        for item, memory in stored(False).items()
+        for quantity, (ours, ratio, *_) in memory.rows.items()
+    }
+
+
+def _tally(rows: Sequence[Row]) -> str:
+    counts = Counter(row.verdict for row in rows)
+    compared = sum(counts[each] for each in ("agrees", "differs", "opposite"))
+    copied = sum(row.copied and row.verdict == "agrees" for row in rows)
+    return (
+        f"Of {compared} comparisons with what the papers print, {counts['agrees']} agree, "
+        f"{counts['differs']} differ and {counts['opposite']} come out the other way round. A printed number "
+        f"counts once for each of our readings of it, and {copied} of those that agree are settings that we "
+        "took over."
+    )
 
 
 def _section(topic: Topic, rows: Found) -> str:

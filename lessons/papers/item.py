@@ -36,6 +36,7 @@ class Row:
         within: ours and the paper's agree if their ratio is within this of 1.
         band: how far ours may be from the stored number, as a share; a machine's times need a wide one.
         topic: the disagreement (`lessons.papers.topics`) that explains it, if the two do not agree.
+        copied: ours is a setting taken over from the paper, no measurement.
     """
 
     quantity: str
@@ -48,6 +49,7 @@ class Row:
     within: float = CLOSE
     band: float = CLOSE
     topic: str = ""
+    copied: bool = False
 
     @property
     def ratio(self) -> float | None:

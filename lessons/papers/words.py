@@ -53,6 +53,7 @@ def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:
                     "the scene was given other gains",
                     within=1e-9,
                     band=1e-9,
+                    copied=True,
                 )
             )
     return tuple(rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,10 +15,11 @@ import pytest
 from lessons.papers import ITEMS
 from lessons.papers import printed as printed_values
 from lessons.papers.disagreements import page
+from lessons.papers.himpc_paper.iiwa import rt4
 from lessons.papers.item import Check, Item, Row, Section, between
 from lessons.papers.reproduce import recalled, write_page
 from lessons.papers.stored import Memory, from_memory, judged, stored
-from lessons.papers.topics import topics
+from lessons.papers.topics import Quoted, Topic, topics
 
 ROOT = Path(__file__).parents[2]
 VALUES = ROOT / "lessons" / "papers" / "values"
@@ -186,6 +188,43 @@ def test_every_disagreement_is_explained_and_can_be_seen() -> None:
             topic.state.run.prepared()
 
 
+def test_every_number_in_a_topic_is_measured_or_said_to_be_given() -> None:
+    """What a text quotes of ours is a stored row; other numbers are listed: a paper's, or a setting's."""
+    memory = stored(False)
+    for topic in topics().values():
+        texts = topic.evidence + topic.cause
+        assert set(re.findall(r"{(\w+)}", texts)) == set(topic.numbers), topic.name
+        for each in topic.numbers.values():
+            ours, ratio, *_ = memory[each.item].rows[each.row]
+            assert math.isfinite(ours if not each.ratio else ratio or math.nan), each.row
+        plain = re.sub(
+            r"{\w+}|\(\d+\)|(?:Figs?\.|Table|[Ll]evel|joint|Part) \d+( and \d+)?|RT\d|1/s", "", texts
+        )
+        loose = set(re.findall(r"(?<![\w.])\d+(?:\.\d+)?[⁰¹²³⁴⁵⁶⁷⁸⁹]*", plain))
+        assert loose == set(topic.given), topic.name
+
+
+def test_a_measured_number_is_written_into_its_text() -> None:
+    """As the row has it now, not as it was stored; one that is missing is a dash."""
+    numbers = {"a": Quoted("i", "r", scale=1e3), "b": Quoted("i", "r", ratio=True, less=1.0, form="+.0%")}
+    topic = Topic("t", "", "{a} mm, {b}", "no number", "", numbers=numbers)
+    assert topic.told({("i", "r"): (2e-3, 0.9)}).evidence == "2 mm, −10 %"
+    assert topic.told({}).evidence == "– mm, –"
+    row = Row(
+        "HIMPC: level-1 RMSE in RT2 over RT1", "1", None, 77.0, says="about", topic="conflict-reaches-level-1"
+    )
+    assert "ours errs 77 times as much" in page([("himpc-fig-11", row)])
+
+
+def test_what_needs_hardly_a_run_is_measured_again() -> None:
+    """Q against R and M̄ against M from the settings; and when OSF loses RT4's singular start."""
+    kept = stored(False)
+    for row in ITEMS["himpc-weights"].report({}, False).rows:
+        assert row.ours == pytest.approx(kept["himpc-weights"].rows[row.quantity][0], rel=1e-4), row.quantity
+    lost = rt4("osf").do().lost_at
+    assert lost == pytest.approx(kept["himpc-rivals"].rows["OSF on RT4: control is lost at"][0])
+
+
 def test_every_topic_is_needed() -> None:
     named = {row.topic for report in recalled(list(ITEMS.values())) for row in report.section.rows}
     assert set(topics()) <= named
@@ -208,4 +247,4 @@ def test_what_agrees_is_not_on_the_page() -> None:
     made = page(rows)
     assert "| far |" in made and "| close |" not in made
     assert "Not explained yet" in made and "| strange |" in made
-    assert "Of 3 printed numbers" in made and "1 agree, 2 differ and 0 " in made
+    assert "Of 3 comparisons" in made and "1 agree, 2 differ and 0 " in made

@@ -3,6 +3,8 @@
 from lessons.papers.himpc_paper import (
     ablations,
     accuracy,
+    adaptation,
+    evidence,
     figures_circle,
     figures_conflict,
     figures_iiwa,
@@ -30,4 +32,6 @@ ITEMS = (
     *value.ITEMS,
     *ablations.ITEMS,
     *limits.ITEMS,
+    *evidence.ITEMS,
+    *adaptation.ITEMS,
 )

@@ -21,13 +21,18 @@ _READINGS = {
 _CHECKED = ("links' rotational inertia scaled", "diag M(q) scaled")
 """The two readings of the paper's words; links of another density are a third plant, for comparison."""
 _WRIST = "[1,1,1,1,{0},{0},{0}]"
+_HALF, _LIGHT_WRIST, _TWICE = (
+    "all links of half the mass and inertia",
+    "links 5 to 7 with 0.3 of the mass, 0.2 of the inertia",
+    "our M̄ twice as large",
+)
 _OTHERS = {
-    "all links of half the mass and inertia": ("plant.mass_scale=0.5", "plant.inertia_scale=0.5"),
-    "links 5 to 7 with 0.3 of the mass, 0.2 of the inertia": (
+    _HALF: ("plant.mass_scale=0.5", "plant.inertia_scale=0.5"),
+    _LIGHT_WRIST: (
         f"plant.mass_scale={_WRIST.format(0.3)}",
         f"plant.inertia_scale={_WRIST.format(0.2)}",
     ),
-    "our M̄ twice as large": ("M_bar_scale=2",),
+    _TWICE: ("M_bar_scale=2",),
     "position limits as the velocity from which one can stop": ("limits.position=viability",),
 }
 """Other plants and settings, to see what the errors hang on."""
@@ -60,6 +65,7 @@ def _table_5(results: Results, quick: bool) -> Section:
         ]
     for reading, extra in list(_READINGS.items())[1:]:
         rows += [_change_row(results, reading, extra, *where) for where in COORDINATES]
+    rows += _share_rows(results)
     return Section(
         notes=(
             f"RMSE over the whole run, which starts on the reference, N = 5. {OPEN} Some 300 readings were "
@@ -110,16 +116,36 @@ def _change_row(
     )
 
 
+def _shares(results: Results, words: str) -> dict[str, float]:
+    """Errors with another plant or setting over the nominal ones, by coordinate."""
+    run, nominal = results[rt4("himpc", *_OTHERS[words])], results[rt4()]
+    return {
+        label: run.error_of(task, k, "rmse") / nominal.error_of(task, k, "rmse")
+        for label, task, k, _ in COORDINATES
+    }
+
+
+def _share_rows(results: Results) -> list[Row]:
+    """Those of the shares that the explanations rest on."""
+    rows = []
+    for words in (_HALF, _TWICE):
+        shares = [share for label, share in _shares(results, words).items() if label != "q₁"]
+        rows += [(f"{words}: least share of an error but q₁'s", min(shares))]
+        rows += [(f"{words}: largest share of an error but q₁'s", max(shares))]
+    rows += [
+        (f"{_LIGHT_WRIST}: share of {label}'s error", share)
+        for label, share in _shares(results, _LIGHT_WRIST).items()
+        if label in ("o_X", "o_Y", "o_Z", "q₁")
+    ]
+    return [Row(text, "1", None, share, "no number of the paper's") for text, share in rows]
+
+
 def _others(results: Results) -> Table:
     """What the errors hang on, as shares of the nominal ones."""
-    nominal = results[rt4()]
     rows = []
     for words, extra in _OTHERS.items():
-        run = results[rt4("himpc", *extra)]
-        shares = (
-            run.error_of(task, k, "rmse") / nominal.error_of(task, k, "rmse") for _, task, k, _ in COORDINATES
-        )
-        rows.append((words, *map(number, shares), trouble(run)))
+        shares = _shares(results, words).values()
+        rows.append((words, *map(number, shares), trouble(results[rt4("himpc", *extra)])))
     columns = ("plant or setting", *(label for label, _, _, _ in COORDINATES), "")
     return Table("RMSE over the whole run, as a share of the nominal one", columns, tuple(rows))
 

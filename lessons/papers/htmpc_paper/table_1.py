@@ -48,6 +48,7 @@ def _table(results: Results, quick: bool) -> Section:
             quantity = f"{label}: {words} of the EE error"
             rows.append(Row(quantity, "mm", paper[e][d][words], ours, why, topic=_TOPIC[f]))
         parts = [run.figure("parts", k, "normalised_base_error") for k in (0, 1)]
+        rows.append(Row(f"{label}: base error, Part 2", "1", None, parts[1], "Fig. 5 shows curves only"))
         zero = run.figure("line_search", "zero_share")
         step = run.figure("line_search", "mean_step")
         lines.append((label, *(number(x) for x in (largest, *parts, step, zero))))

@@ -1,0 +1,138 @@
+"""docs/results.md and house.md tell what `reproduce` measured: a number of ours in them is a stored one."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from himpc.limits import POSITION_MARGIN, Limits
+from himpc.limits.rows import REACTION
+from lessons.papers.himpc_paper.adaptation import CASES
+from lessons.papers.stored import stored
+
+DOCS = Path(__file__).parents[2] / "docs"
+TEXT = (DOCS / "results.md").read_text(encoding="utf-8")
+MEMORY = stored(False)
+
+
+def of(item: str, row: str) -> float:
+    """A stored number: of a row, or of a check."""
+    memory = MEMORY[item]
+    return memory.rows[row][0] if row in memory.rows else memory.checks[row][0]
+
+
+def power(value: float) -> str:
+    """Two digits and the power of ten."""
+    return re.sub(r"e-0", "e-", f"{value:.1e}")
+
+
+def plain(value: float, digits: int) -> str:
+    """Without a zero before the point."""
+    return f"{value:.{digits}f}".removeprefix("0")
+
+
+def approach(rate: str) -> str:
+    return power(of("himpc-table-3", f"HIMPC, RT2, velocity_approach = {rate}: level-1 RMSE"))
+
+
+def trend(what: str) -> str:
+    rows = (f"R on {what}: HIMPC, N = {N}, over HIMPC with N = 5" for N in (10, 20, 30))
+    return ", ".join(plain(of("himpc-table-6", row), 3) for row in rows)
+
+
+def expected() -> dict[str, str]:
+    """Our column by the first one."""
+    fig_11, table_5 = "himpc-fig-11", "himpc-table-5"
+    ratios = [of("himpc-table-2", f"{c} over HIMPC, {axis}") for c in ("OSF", "HQP") for axis in "xy"]
+    own = of("himpc-table-3", "HIMPC, RT2, velocity_approach = 8, the scene's own: level-1 RMSE")
+    hqp = own / of(fig_11, "RT2: level-1 RMSE, HIMPC's over HQP's")
+    speed = of("himpc-table-3", "HQP, RT2: joint speed over its bound, 1.5 to 10")
+    lost = [of("himpc-conflict", f"{c} on RT2: control is lost at") for c in ("OSF", "TDEOSF")]
+    softened = of(table_5, "QPs of the 12 000 that had to be softened, 1 to 10")
+    inertia = "links' rotational inertia scaled: {}, disturbed over nominal"
+    changes = sorted(round(100 * (1 - of(table_5, inertia.format(axis)))) for axis in "xyz")
+    coarse = [of("himpc-table-8", f"S at {r}e-3° (benchmark 0.01e-3°)") for r in ("0.5", "1", "2", "5", "10")]
+    high = "EE error with (12) over that with (11), high δ, formulation A"
+    matched = "Part 2: HTMPC better than HTIDKC tuned to the same Part 1, formulation C"
+    authors = "Part 2: HTMPC better than HTIDKC with the authors' gains, formulation A"
+    return {
+        "RT1 (`planar3-circle`), level 1: HIMPC, TDEOSF": ", ".join(
+            power(of("himpc-table-2", f"{c}, y")) for c in ("HIMPC", "TDEOSF")
+        )
+        + " m",
+        "RT1, level 1: OSF and HQP over HIMPC": f"{min(ratios):.0f} to {max(ratios):.0f} ×",
+        "RT2 (`planar3-conflict`): HIMPC": f"{power(own)} m on level 1, inside all bounds, with its own "
+        f"`velocity_approach` 8; {approach('15, the default elsewhere')} with the default 15, "
+        f"{approach('0, as printed')} as printed",
+        "Level 1, RT2 over RT1: HIMPC, HQP": f"{of(fig_11, 'HIMPC: level-1 RMSE in RT2 over RT1'):.1f}, "
+        f"{of(fig_11, 'HQP: level-1 RMSE in RT2 over RT1'):.1f}",
+        "RT2: HQP": f"{power(hqp)} m at {speed:.1f} × the speed limit",
+        "RT2: OSF, TDEOSF": f"lose control at {lost[0]:.1f} s and {lost[1]:.1f} s",
+        "RT3 (`planar3-singular`), from the straight arm: HIMPC": power(
+            of("himpc-fig-15", "HIMPC, y: RMSE over the whole run")
+        )
+        + " m on level 1, no unsolved QP",
+        f"RT4 (`iiwa14-circle-paper`, position rows as printed: {softened:.0f} of 12 000 QPs softened), q₁": (
+            f"{of(table_5, 'nominal: q₁'):.2f}°"
+        ),
+        "RT4, x, y, z in 10⁻⁴ m": ", ".join(f"{1e4 * of(table_5, f'nominal: {axis}'):.2f}" for axis in "xyz"),
+        "Table V, links' rotational inertia ± 20 %: level 1 changes by": f"−{changes[0]} to −{changes[-1]} %",
+        "Table VI, error at N = 10, 20, 30 over N = 5: R on Δτ as printed": trend("Δτ, as printed"),
+        "Table VI, R on M̄⁻¹Δτ, `limits.position=viability`": trend("M̄⁻¹Δτ, with viability"),
+        "Table VII, NHIMPC's median time over HIMPC's": (
+            f"{of('himpc-table-7', 'NHIMPC over HIMPC, median'):.1f} (2 to 3 iterations)"
+        ),
+        "Table VIII, roughness over encoder resolution, N·m": ", ".join(
+            plain(each, 2 if each < 10 else 1) for each in coarse
+        ),
+        "HTMPC, formulation A (as printed): hand's error, (12) over (11), high δ": (
+            f"{of('htmpc-table-1', high):.1f}"
+        ),
+        "HTMPC, formulation C (the default), over HTIDKC tuned to the same first part, part 2": (
+            f"{of('htmpc-fig-6', matched):.0%} better".replace("%", " %")
+        ),
+        "HTMPC, formulation A, over HTIDKC with the authors' gains, part 2": (
+            f"{of('htmpc-fig-6', authors):.0%} better".replace("%", " %")
+        ),
+        "Delivery, formulation C, single-task time over hierarchical": (
+            f"{of('htmpc-fig-9', 'ST/HT execution time, mean over the layouts'):.1f}"
+        ),
+    }
+
+
+def test_the_table_is_what_was_measured() -> None:
+    lines = re.findall(r"^\| (.+?) \| (.+?) \| .+? \|$", TEXT.partition("\n## ")[0], re.MULTILINE)
+    assert dict(lines) == expected()
+
+
+def test_the_payloads_are_what_was_measured() -> None:
+    """M̄ that looks after itself: three digits each, and the two other controllers in the text."""
+
+    def rms(controller: str, payload: float, words: str) -> float:
+        return of(
+            "himpc-adaptation", f"{controller}, {payload:g} kg, {words}: RMS distance of the TCP after 1 s"
+        )
+
+    payloads = [payload for controller, payload in CASES if controller == "himpc"]
+    for words, cell in (("as set", "as set"), ("M_bar_adapt=true", "`M_bar_adapt=true`")):
+        found = (rms("himpc", payload, words) for payload in payloads)
+        told = " | ".join(f"{mm:.2f}" if mm < 10 else f"{mm:.3g}" for mm in found)
+        assert f"| {cell} | {told} |" in TEXT
+    others = [(c, p) for c, p in CASES if c != "himpc"]
+    with_it = " and ".join(f"{rms(*case, 'M_bar_adapt=true'):.0f}" for case in others)
+    without = " and ".join(f"{rms(*case, 'as set'):.0f}" for case in others)
+    assert f"({with_it} mm instead of {without})" in " ".join(TEXT.split())
+
+
+def test_the_departures_from_the_printed_limits_are_the_ones_that_run() -> None:
+    """docs/house.md: the constants, and what they are for."""
+    text = " ".join((DOCS / "house.md").read_text(encoding="utf-8").split())
+    rate, T_s = Limits().velocity_approach, 1e-3
+    over = of("himpc-limits", "nominal, as printed: largest velocity over its limit") - 1.0
+    for told in (
+        f"{REACTION:g}/`velocity_approach` ({T_s + REACTION / rate:.2f} s)",
+        f"{1e3 * POSITION_MARGIN:g} mrad",
+        f"`limits.velocity_approach` ({rate:g} 1/s)",
+        f"overrun by {over:.0%}".replace("%", " %"),
+    ):
+        assert told in text, told
