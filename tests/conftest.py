@@ -7,6 +7,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 # Before NumPy is imported anywhere: the matrices are tiny, and threads only fight over the cores.
@@ -35,14 +37,74 @@ class OneWorkerForTheBrowser(LoadScopeScheduling):
         return _BROWSER if file.startswith(f"{_BROWSER}/") else file
 
 
+_LONG = (
+    "tests/app/browser/",
+    "tests/app/test_app_soak.py",
+    "tests/lessons/test_lessons_grade.py",
+    "tests/app/test_app_rough.py",
+    "tests/lessons/test_lessons_every_controller.py",
+    "tests/test_site.py",
+    "tests/lessons/test_lessons_course.py",
+    "tests/commands/test_commands_reproduce.py",
+)
+"""What takes long comes first, of that what mostly waits: no worker is left alone with it at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    def rank(item: pytest.Item) -> int:
+        return next((k for k, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG))
+
+    items.sort(key=rank)
+
+
+_ROOT = Path(__file__).parents[1]
 _COMPILE = "from himpc.cascade.compiling import compile_all; compile_all(lambda *_: None)"
+_COLD = pytest.StashKey[tuple[str, str]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """What is compiled is compiled before the tests: it takes a minute, for which none of them waits."""
-    if not hasattr(config, "workerinput"):
-        root = Path(__file__).parents[1]
-        subprocess.run([sys.executable, "-c", _COMPILE], cwd=root, check=True, capture_output=True)
+    """What is compiled is compiled before the tests: it takes a minute, for which none of them waits. In a
+    fresh clone the first run does it, and is kept for the test that compares it with the second."""
+    if hasattr(config, "workerinput"):
+        return
+    if not any(_ROOT.glob("himpc/**/__pycache__/*.nbi")) and "NUMBA_CACHE_DIR" not in os.environ:
+        file = Path(mkdtemp(), "first.npz")
+        config.add_cleanup(lambda: rmtree(file.parent))
+        config.stash[_COLD] = str(file), _run(file)
+    subprocess.run([sys.executable, "-c", _COMPILE], cwd=_ROOT, check=True, capture_output=True)
+
+
+def pytest_configure_node(node: Any) -> None:
+    """What a worker is told."""
+    node.workerinput["cold"] = node.config.stash.get(_COLD, None)
+
+
+def _run(file: Path, **environment: str) -> str:
+    """What a run says on standard error."""
+    command = ["run", "iiwa14-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
+    done = subprocess.run(
+        [sys.executable, "-m", "app", *command],
+        cwd=_ROOT,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stderr
+
+
+Run = tuple[Path, str]
+
+
+@pytest.fixture
+def first_and_second_run(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Run, Run]:
+    """What a run recorded and said where nothing was compiled, and the same run after it."""
+    config, second = request.config, tmp_path / "second.npz"
+    told = getattr(config, "workerinput", {"cold": config.stash.get(_COLD, None)})
+    if (cold := told["cold"]) is not None:
+        return (Path(cold[0]), cold[1]), (second, _run(second))
+    first, cache = tmp_path / "first.npz", str(tmp_path / "cache")
+    return (first, _run(first, NUMBA_CACHE_DIR=cache)), (second, _run(second, NUMBA_CACHE_DIR=cache))
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> OneWorkerForTheBrowser:

@@ -129,21 +129,11 @@ def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
         assert process.communicate(timeout=120)[1].splitlines()[-1] == "1"
 
 
-def test_the_first_run_equals_the_second(tmp_path: Path) -> None:
+def test_the_first_run_equals_the_second(first_and_second_run: tuple[tuple[Path, str], ...]) -> None:
     """To the bit, from a machine on which nothing was compiled."""
     runs = []
-    for name in ("first", "second"):
-        file = tmp_path / f"{name}.npz"
-        command = ["run", "iiwa14-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
-        done = subprocess.run(
-            [sys.executable, "-m", "app", *command],
-            cwd=ROOT,
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert ("compiling" in done.stderr) == (name == "first")
+    for (file, said), compiles in zip(first_and_second_run, (True, False), strict=True):
+        assert ("compiling" in said) == compiles
         with np.load(file) as found:
             runs.append({key: found[key].tobytes() for key in ("q", "v", "tau")})
     assert runs[0] == runs[1]
