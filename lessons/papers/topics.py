@@ -90,7 +90,14 @@ def topics() -> dict[str, Topic]:
 
 
 def _topic(name: str, data: dict[str, Any]) -> Topic:
-    texts = {key: data[key] for key in ("title", "evidence", "cause", "look")}
-    numbers = {key: Quoted(**each) for key, each in data.get("numbers", {}).items()}
-    lists = {key: tuple(data.get(key, ())) for key in ("set", "given")}
-    return Topic(name, **texts, **lists, scene=data.get("scene", ""), numbers=numbers)
+    return Topic(
+        name,
+        title=data["title"],
+        evidence=data["evidence"],
+        cause=data["cause"],
+        look=data["look"],
+        scene=data.get("scene", ""),
+        set=tuple(data.get("set", ())),
+        numbers={key: Quoted(**each) for key, each in data.get("numbers", {}).items()},
+        given=tuple(data.get("given", ())),
+    )
