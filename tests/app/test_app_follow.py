@@ -36,6 +36,33 @@ def test_the_camera_keeps_its_place_beside_the_base() -> None:
     np.testing.assert_array_equal(camera.position, before)
 
 
+def test_a_browser_that_tells_late_where_it_looks_from_loses_nothing() -> None:
+    """It tells where its camera was before the last three steps."""
+    camera: Any = SimpleNamespace(position=np.array([3.0, 0.0, 1.0]), look_at=np.array([0.0, 0.0, 0.5]))
+    follower = FollowBase(camera)
+    shown = [(camera.position, camera.look_at)]
+    for x in np.linspace(0.0, 1.0, 41):
+        follower.follow(np.array([x, 0.0, 0.0]), on=True)
+        shown.append((camera.position, camera.look_at))
+        camera.position, camera.look_at = shown[max(0, len(shown) - 4)]
+    np.testing.assert_allclose(shown[-1][0], [4.0, 0.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(shown[-1][1], [1.0, 0.0, 0.5], atol=1e-9)
+
+
+def test_what_is_looked_at_can_be_moved_between_two_drives() -> None:
+    camera: Any = SimpleNamespace(position=np.array([3.0, 0.0, 1.0]), look_at=np.array([0.0, 0.0, 0.5]))
+    follower = FollowBase(camera)
+    for x in (0.0, 1.0):
+        follower.follow(np.array([x, 0.0, 0.0]), on=True)
+    aside = np.array([0.0, 2.0, 0.0])
+    camera.position, camera.look_at = camera.position + aside, camera.look_at + aside
+    for _ in range(100):
+        follower.follow(np.array([1.0, 0.0, 0.0]), on=True)
+    follower.follow(np.array([2.0, 0.0, 0.0]), on=True)
+    np.testing.assert_allclose(camera.position, [5.0, 2.0, 1.0])
+    np.testing.assert_allclose(camera.look_at, [2.0, 2.0, 0.5])
+
+
 def test_the_page_of_a_mobile_robot_goes_along_once_it_is_asked() -> None:
     server = PageServer(SceneChoice(RunSpec("ridgeback-ur10-drag")), port=0, max_sessions=1)
     try:
