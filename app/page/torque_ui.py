@@ -19,7 +19,6 @@ from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
-from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import draggable
 from app.view.drag import Hand
@@ -42,6 +41,8 @@ class TorqueFace:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._inside_tab: viser.GuiTabHandle | None = None
+        self._stale: Status | None = None
+        """What was told last under the stack before."""
 
     # ---------------------------------------------------------------- building
 
@@ -55,10 +56,11 @@ class TorqueFace:
             self._tasks = TasksPanel(
                 gui,
                 bindings,
-                lambda post: Bindings(post, context.loop),
+                context.loop,
                 ready.robot,
                 context.colours,
                 lambda: self._context.settings,
+                self._targets_now,
                 in_lesson=ready.choice.exercise is not None,
             )
         with tabs.add_tab("Control"):
@@ -103,6 +105,7 @@ class TorqueFace:
     def recompose(self, ready: Ready) -> None:
         """The same run goes on under another stack."""
         context = self._context = replace(self._context, ready=ready)
+        self._stale = context.learner.status
         self._tasks.rebuild()
         self._level_plots.rebuild(ready)
         self._inside_parts.remove()
@@ -134,17 +137,20 @@ class TorqueFace:
         poses = self._context.poses()
         return np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
 
+    def _targets_now(self) -> dict[str, np.ndarray]:
+        """Where the hand put each target that can be moved, whatever instant is shown."""
+        ready, status = self._context.ready, self._context.learner.status
+        targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
+        return targets if status is None or status is self._stale else targets | status.targets
+
     def _add_targets(self, scene: viser.SceneApi) -> None:
         context, ready = self._context, self._context.ready
-        status = context.learner.status
-        targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
-        targets |= {} if status is None or ready.again else status.targets
         size = gizmo_size(ready.robot)
         self._hand = Hand(
             scene,
             ready,
             context.colours,
-            targets,
+            self._targets_now(),
             self._tip(),
             size,
             context.post,

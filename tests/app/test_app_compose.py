@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
+from app.link.messages import Post
 from app.link.process import wait_until
 from app.server.server import PageServer
 from browsing.wire import Wire
 from himpc.tasks.axes import OnAxes
+from lessons.events import MoveTarget, Reset
 from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
@@ -95,6 +98,35 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         t = learner.status.t
         assert wait_until(lambda: learner.status is not None and learner.status.t > t + 0.1, LONG)
         assert wire.notices == []
+
+
+def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) -> None:
+    """Each joint has one, in degrees and within its limits; those moved at once build on each other, and a
+    reset puts them back."""
+    with Wire(server.url) as wire:
+        assert wait_until(lambda: bool(server.sessions.learners), LONG)
+        learner = server.sessions.learners[0]
+
+        def target() -> np.ndarray:
+            status = learner.status
+            return np.zeros(7) if status is None else np.degrees(status.targets["posture"])
+
+        first, second = (shown(wire, f"joint_{number}, °") for number in (1, 2))
+        assert [wire.controls[first]["props"][end] for end in ("min", "max")] == [-170.0, 170.0]
+        assert wait_until(lambda: learner.status is not None, LONG)
+        before = target()
+        assert wire.controls[second]["value"] == pytest.approx(before[1], abs=0.051)
+        wire.write(first, value=20.0)
+        wire.write(second, value=15.5)
+        assert wait_until(lambda: np.allclose(target()[:2], [20.0, 15.5]), LONG)
+        assert np.allclose(target()[2:], before[2:])
+        told = learner.ask()
+        assert told is not None
+        assert [event.task for _, event in told.log if isinstance(event, MoveTarget)] == ["posture"] * 2
+        learner.send(Post(Reset()))
+        assert wait_until(lambda: np.allclose(target(), before), LONG)
+        assert wait_until(lambda: wire.controls[first]["value"] == pytest.approx(before[0], abs=0.051), LONG)
+        assert wire.find("x, °") is None and wire.notices == []
 
 
 def axes(learner: Learner, name: str) -> str:

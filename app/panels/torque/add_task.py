@@ -10,13 +10,13 @@ import viser
 
 from app.client.wish import Send
 from app.html.text import block, esc
-from app.panels.torque.level_card import Names
 from app.panels.torque.task_editor import AXES
 from himpc.stack import Stack
 from himpc.tasks import KINDS, Task
 from himpc.tasks.kinds import said
 from himpc.tasks.pointing import DIRECTIONS
 from lessons.events import Set
+from robots import Robot
 
 _NORMALS = {"z, the floor": (0.0, 0.0, 1.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
 _TOGETHER = "together with "
@@ -27,7 +27,7 @@ class AddTask:
     """A folder whose controls show what the chosen kind needs. Nothing happens before Add is pressed."""
 
     def __init__(
-        self, gui: viser.GuiApi, post: Send, names: Names, stack: Stack, own: Mapping[str, Task]
+        self, gui: viser.GuiApi, post: Send, robot: Robot, stack: Stack, own: Mapping[str, Task]
     ) -> None:
         """own: tasks of files of one's own, by path."""
         self._post, self._own = post, own
@@ -37,8 +37,8 @@ class AddTask:
             with gui.add_folder(None):
                 self._frame = gui.add_dropdown(
                     "Of frame",
-                    tuple(names.frames),
-                    initial_value=names.tip,
+                    tuple(robot.frames),
+                    initial_value=robot.tip,
                     hint="Or click a link, see below",
                 )
             with gui.add_folder(None):
@@ -48,7 +48,7 @@ class AddTask:
                     hint="While on, a click on a link of the robot chooses it",
                 )
             with gui.add_folder(None):
-                self._root = gui.add_dropdown("As seen from", tuple(names.frames))
+                self._root = gui.add_dropdown("As seen from", tuple(robot.frames))
             with gui.add_folder(None):
                 self._axes = gui.add_dropdown("Along axes", AXES)
             with gui.add_folder(None):
@@ -56,7 +56,7 @@ class AddTask:
             with gui.add_folder(None):
                 self._normal = gui.add_dropdown("Plane across", tuple(_NORMALS))
             with gui.add_folder(None):
-                self._joint = gui.add_dropdown("Of joint", tuple(names.joints))
+                self._joint = gui.add_dropdown("Of joint", tuple(robot.joint_names))
             with gui.add_folder(None):
                 self._level = gui.add_dropdown("On level", _places(stack), initial_value=_places(stack)[1])
             with gui.add_folder(None):

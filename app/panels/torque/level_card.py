@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import viser
 
 from app.html.palette import BAD, BOUND, DAMPING, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
+from app.panels.torque.joint_targets import Targets, add_joint_targets
 from app.panels.torque.task_editor import TaskEditor
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
@@ -17,17 +17,9 @@ from himpc.stack import Level
 from himpc.telemetry import RUNGS
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
+from robots import Robot
 
 UP, DOWN = "▲ Up", "▼ Down"
-
-
-@dataclass(frozen=True)
-class Names:
-    """What a robot's parts are called."""
-
-    frames: Sequence[str]
-    joints: Sequence[str]
-    tip: str
 
 
 class LevelCard:
@@ -41,12 +33,14 @@ class LevelCard:
         level: Level,
         colours: dict[str, RGB],
         place: int,
-        names: Names,
+        robot: Robot,
+        targets: Callable[[], Targets],
+        moves: Bindings[Targets],
         shift: Callable[[str, int], None],
         unfolded: bool,
     ) -> None:
-        """names: of the robot; shift: moves the level of a name by so many places; unfolded: whether what
-        changes the tasks is in sight."""
+        """targets: in force, which `moves` mirrors; shift: moves the level of a name by so many places;
+        unfolded: whether what changes the tasks is in sight."""
         name = self.name = level.name
         self._colour = colours.get(name, BOUND)
         self._folder = gui.add_folder(_title(place, name), order=float(place))
@@ -54,6 +48,7 @@ class LevelCard:
             self._live = gui.add_html("")
             on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
             move = gui.add_button_group("Priority", (UP, DOWN))
+            add_joint_targets(gui, moves, level, robot, targets)
             with gui.add_folder("Gains and weights", expand_by_default=False):
                 controls = Controls(gui, bindings, settings)
                 for task in level.tasks:
@@ -63,7 +58,7 @@ class LevelCard:
                 controls.add(f"levels.{name}.Q", f"levels.{name}.R")
             with gui.add_folder("Change", expand_by_default=unfolded):
                 for task in level.tasks:
-                    TaskEditor(gui, bindings, task, names, alone=len(level.tasks) == 1)
+                    TaskEditor(gui, bindings, task, robot, alone=len(level.tasks) == 1)
                 if place > 0:
                     above = settings.levels[place - 1].name
                     merge = gui.add_button("Merge with the level above")

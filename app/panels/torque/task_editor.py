@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import viser
 
@@ -16,9 +15,7 @@ from himpc.tasks.kinds import said
 from himpc.tasks.pointing import DIRECTIONS
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
-
-if TYPE_CHECKING:
-    from app.panels.torque.level_card import Names
+from robots import Robot
 
 AXES = ("xyz", "xy", "xz", "yz", "x", "y", "z")
 
@@ -27,16 +24,16 @@ class TaskEditor:
     """The controls of one task. Each stands in a nameless folder, see `Controls`."""
 
     def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], task: Task, names: Names, alone: bool
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], task: Task, robot: Robot, alone: bool
     ) -> None:
         """alone: whether the task has a level of its own."""
         self._gui, self._bindings, self._task = gui, bindings, task
         name = task.name
         gui.add_html(block(f"<b>{esc(name)}</b>: {esc(said(task))}"))
         if hasattr(task, "frame"):
-            self._menu("Frame", "frame", names.frames, names.tip)
+            self._menu("Frame", "frame", robot.frames, robot.tip)
         if hasattr(task, "root"):
-            self._menu("Seen from", "root", names.frames, names.frames[0])
+            self._menu("Seen from", "root", robot.frames, robot.frames[0])
         if hasattr(task, "axis"):
             self._menu("Axis", "axis", DIRECTIONS, "z")
         if isinstance(task, OnAxes):

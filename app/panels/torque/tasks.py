@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 import viser
 
-from app.client.wish import Send, Wish
+from app.client.wish import Wish
 from app.html.palette import DAMPING, RGB
 from app.html.text import block, formula, swatch
 from app.panels.torque.add_task import AddTask
-from app.panels.torque.level_card import LevelCard, Names
+from app.panels.torque.joint_targets import Targets
+from app.panels.torque.level_card import LevelCard
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import Event, MoveLevel, Set
@@ -25,23 +27,23 @@ class TasksPanel:
         self,
         gui: viser.GuiApi,
         bindings: Bindings[TorqueSettings],
-        own: Callable[[Send], Bindings[TorqueSettings]],
+        loop: asyncio.AbstractEventLoop,
         robot: Robot,
         colours: dict[str, RGB],
         current: Callable[[], TorqueSettings],
+        targets: Callable[[], Targets],
         in_lesson: bool,
     ) -> None:
-        """bindings: of what stays; own: makes those of what goes with a stack; in_lesson: whether the stack
-        may not be changed."""
-        self._gui, self._own, self._colours, self._current = gui, own, colours, current
-        self._names, self._in_lesson = Names(robot.frames, robot.joint_names, robot.tip), in_lesson
+        """bindings: of what stays; loop: viser's; current, targets: what is in force; in_lesson: whether the
+        stack may not be changed."""
+        self._gui, self._loop, self._colours = gui, loop, colours
+        self._current, self._targets = current, targets
+        self._robot, self._in_lesson = robot, in_lesson
         self._post, self._edited = bindings.post, ""
         gui.add_html(
             block("The most important level first: each gets what the levels above leave."), order=-1.0
         )
         self._place = gui.add_folder(None, order=0.0)
-        self._cards: list[LevelCard] = []
-        self._bindings: Bindings[TorqueSettings] | None = None
         self._build(current())
         with gui.add_folder("Last level: damping", order=900.0):
             damping = gui.add_checkbox(
@@ -65,19 +67,22 @@ class TasksPanel:
     def _build(self, settings: TorqueSettings) -> None:
         self._order: Wish[tuple[str, ...]] = Wish()
         self._enabled: dict[str, Wish[bool]] = {level.name: Wish() for level in settings.levels}
-        bindings = self._bindings = self._own(self._ask)
+        self._bindings: Bindings[TorqueSettings] = Bindings(self._ask, self._loop)
+        self._moves: Bindings[Targets] = Bindings(self._post, self._loop)
         with self._place:
             self._levels = self._gui.add_folder(None)
         with self._levels:
             self._cards = [
                 LevelCard(
                     self._gui,
-                    bindings,
+                    self._bindings,
                     settings,
                     level,
                     self._colours,
                     place,
-                    self._names,
+                    self._robot,
+                    self._targets,
+                    self._moves,
                     self._move,
                     unfolded=any(task.name == self._edited for task in level.tasks),
                 )
@@ -85,7 +90,7 @@ class TasksPanel:
             ]
             if not self._in_lesson:
                 self._add = AddTask(
-                    self._gui, self._post, self._names, settings.levels, dict(settings.own_tasks)
+                    self._gui, self._post, self._robot, settings.levels, dict(settings.own_tasks)
                 )
 
     def _ask(self, event: Event) -> None:
@@ -137,8 +142,8 @@ class TasksPanel:
             for card in self._cards:
                 if card.name == level.name:
                     card.update(now, level, place)
-        if self._bindings is not None:
-            self._bindings.refresh(now.settings)
+        self._bindings.refresh(now.settings)
+        self._moves.refresh(self._targets())
         cost = now.number("cost/damping")
         busy = cost == cost
         self._damping.content = block(
@@ -154,5 +159,5 @@ class TasksPanel:
 
     def close(self) -> None:
         """The controls are about to be removed."""
-        if self._bindings is not None:
-            self._bindings.close()
+        self._bindings.close()
+        self._moves.close()

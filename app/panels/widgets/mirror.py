@@ -1,4 +1,4 @@
-"""Controls that mirror the session's settings."""
+"""Controls that mirror what the session has: its settings, or where its targets are."""
 
 from __future__ import annotations
 
@@ -13,14 +13,13 @@ import viser
 from app.adapter.private import send_again
 from app.client.wish import HOLD, Send
 from lessons.events import Event
-from lessons.settings.settings import Settings
 
 REMIND = 2.0
 """s between two reminders of what every control must show. viser sends at most one change per 50 ms and
 tab and drops all but the latest: of two controls changed at once (or while the browser stutters) one may
 never arrive, and would go on showing what the session does not have."""
 
-S = TypeVar("S", bound=Settings)
+S = TypeVar("S")
 
 
 @dataclass
@@ -53,7 +52,7 @@ class Bindings(Generic[S]):
         read: Callable[[S], Any],
         event: Callable[[Any], Event],
     ) -> None:
-        """`read` gives the control's value for some settings, `event` the event for a value."""
+        """`read` gives the control's value for what the session has, `event` the event for a value."""
         mirror = _Mirror(handle, read)
         self._mirrors.append(mirror)
 
@@ -64,15 +63,15 @@ class Bindings(Generic[S]):
             mirror.touched = time.monotonic()
             self.post(event(on_scale(handle)))
 
-    def refresh(self, settings: S) -> None:
+    def refresh(self, present: S) -> None:
         """Shows what the session has. Returns at once; the event loop does it."""
-        self._loop.call_soon_threadsafe(self._write, settings)
+        self._loop.call_soon_threadsafe(self._write, present)
 
     def close(self) -> None:
         """The controls are about to be removed: writes nothing any more."""
         self._closed = True
 
-    def _write(self, settings: S) -> None:
+    def _write(self, present: S) -> None:
         if self._closed:
             return
         now = time.monotonic()
@@ -81,7 +80,7 @@ class Bindings(Generic[S]):
             self._reminded = now
         for mirror in self._mirrors:
             if now - mirror.touched > HOLD:
-                value = mirror.read(settings)
+                value = mirror.read(present)
                 if value != mirror.handle.value:
                     mirror.handle.value = value
                 elif remind:
