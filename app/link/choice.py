@@ -148,14 +148,33 @@ class SceneChoice:
 
     def scene(self) -> Scene:
         """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
+        choice = self.resolved()
+        return choice.run.applied_to(choice._bare())
+
+    def fitted(self) -> tuple[SceneChoice, Scene, tuple[str, ...]]:
+        """The choice without those tasks of files that its robot cannot have, its scene, and why each is left
+        out: who opened a file for one robot is not kept from the others. Raises InputError for what cannot be
+        loaded; also if the stack names such a task."""
+        from lessons.own.resolve import misfits
+
+        choice = self.resolved()
+        bare, run = choice._bare(), choice.run
+        out = misfits(bare.robot, run.tasks)
+        kept = replace(run, tasks=tuple(each for each in run.tasks if each not in out))
+        try:
+            scene = kept.applied_to(bare)
+        except InputError:
+            scene = run.applied_to(bare)  # which says what is the matter with the task
+        return replace(choice, run=kept), scene, tuple(out.values())
+
+    def _bare(self) -> Scene:
+        """The scene before anything is set."""
         from lessons.own.resolve import scene_named
         from lessons.scenes.catalog import load_scene
 
-        if self.exercise is not None:
-            return self.resolved().run.prepared()
         run = self.run
-        load = scene_named if run.scene in self.scenes else load_scene
-        return run.applied_to(load(run.scene, run.urdf, run.tip, self.urdf_text))
+        load = scene_named if self.exercise is not None or run.scene in self.scenes else load_scene
+        return load(run.scene, run.urdf, run.tip, self.urdf_text)
 
 
 def _both(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:

@@ -153,7 +153,8 @@ class TaskView:
 @dataclass(frozen=True, eq=False)
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
-    besides the robot; again: it is the same run as before, under another stack."""
+    besides the robot; again: it is the same run as before, under another stack; left_out: why tasks of one's
+    own are not offered, a sentence each."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -163,6 +164,7 @@ class Ready:
     tasks: tuple[TaskView, ...]
     room: np.ndarray
     again: bool = False
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -171,8 +171,9 @@ class Stage:
 
     # ---------------------------------------------------------------- following
 
-    def refuse(self, sentence: str) -> None:
-        self._robot_panel.refuse(sentence)
+    def refuse(self, sentence: str) -> bool:
+        """Whether it was told where it was asked for."""
+        return self._robot_panel.refuse(sentence)
 
     def show_trouble(self, trouble: Trouble | None) -> None:
         self._playback.show_trouble(trouble)

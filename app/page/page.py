@@ -214,6 +214,8 @@ class Page:
             if seen != self._seen:  # a restart leaves the learner's view as it was
                 aim(self._client.camera, ready.robot, self._phone, ready.room)
                 self._seen = seen
+        for sentence in ready.left_out:
+            self._client.add_notification("Opened without a task of yours", sentence, color="orange")
         self._trouble = None
 
     def _frame(self) -> None:
@@ -247,9 +249,7 @@ class Page:
         """Sentences of the session go where they belong."""
         refusals, notices = self.learner.take_messages()
         for sentence in refusals:
-            if self._stage is not None:
-                self._stage.refuse(sentence)
-            else:
+            if self._stage is None or not self._stage.refuse(sentence):
                 self._client.add_notification("Not loaded", sentence, color="red")
         for sentence in notices[-3:]:
             self._client.add_notification("Not changed", sentence, color="orange", auto_close_seconds=8.0)

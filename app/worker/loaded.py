@@ -7,20 +7,24 @@ from dataclasses import dataclass
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.worker.lesson.lecturer import Lecturer
-from app.worker.reports.start import Run
+from app.worker.reports.start import Run, start
+from lessons.events import Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
+from lessons.settings.assignments import parse_assignment
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A scene at its beginning, once nothing of it can be refused any more. mine: a learner's changes."""
+    """A scene at its beginning, once nothing of it can be refused any more. mine: a learner's changes;
+    left_out: why tasks of files are not offered."""
 
     choice: SceneChoice
     scene: Scene
     run: Run
     lecturer: Lecturer | None
     mine: tuple[Post, ...]
+    left_out: tuple[str, ...] = ()
 
     def looks_like(self, choice: SceneChoice, session: Session) -> bool:
         """Whether it is another step of the lesson that runs: as long as it looks the same, nothing needs to
@@ -29,3 +33,16 @@ class Loaded:
         if then is None or now is None or then.lesson != now.lesson:
             return False
         return self.run.session.layout == session.layout
+
+
+def loaded_from(choice: SceneChoice, scene: Scene | None, judged: bool) -> Loaded:
+    """scene: instead of the choice's own; judged: a lesson's claims are, if it is a step of one. Raises
+    InputError for a scene or robot that cannot be loaded."""
+    left_out: tuple[str, ...] = ()
+    if scene is None:
+        choice, scene, left_out = choice.fitted()
+    run = start(scene, choice.run.seed)
+    mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
+    step = choice.exercise if judged else None
+    lecturer = None if step is None else Lecturer(step, run.session, choice.run.seed)
+    return Loaded(choice.resolved(), scene, run, lecturer, mine, left_out)

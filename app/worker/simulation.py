@@ -31,14 +31,12 @@ from app.link.messages import (
 )
 from app.link.ring import Block
 from app.worker.leader import Leader
-from app.worker.lesson.lecturer import Lecturer
-from app.worker.loaded import Loaded
+from app.worker.loaded import Loaded, loaded_from
 from app.worker.outlet import Outlet
 from app.worker.reports.start import start
 from lessons.events import Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
-from lessons.settings.assignments import parse_assignment
 from lessons.settings.settings import Settings
 from robots import InputError
 
@@ -53,14 +51,7 @@ class Body:
         self._judged = judged
         self.running, self.speed = True, 1.0
         self.resets, self.leader = 0, Leader()
-        self._enter(self._loaded(choice, scene or choice.scene()))
-
-    def _loaded(self, choice: SceneChoice, scene: Scene) -> Loaded:
-        run = start(scene, choice.run.seed)
-        mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
-        step = choice.exercise if self._judged else None
-        lecturer = None if step is None else Lecturer(step, run.session, choice.run.seed)
-        return Loaded(choice.resolved(), scene, run, lecturer, mine)
+        self._enter(loaded_from(choice, scene, judged))
 
     def _enter(self, loaded: Loaded) -> None:
         self._outlet = Outlet(loaded.run.session)
@@ -68,7 +59,7 @@ class Body:
 
     def _begin_anew(self, loaded: Loaded) -> None:
         """A lesson's robot stands still until its script begins."""
-        self.choice, self.scene = loaded.choice, loaded.scene
+        self.choice, self.scene, self.left_out = loaded.choice, loaded.scene, loaded.left_out
         self.run, self.lecturer = loaded.run, loaded.lecturer
         self.running, self.speed = self.lecturer is None, 1.0
         self._fresh_start()
@@ -147,7 +138,8 @@ class Body:
             case Speed(factor):
                 self.speed = factor
             case ResetAll():
-                self._begin_anew(self._loaded(replace(self.choice, mine=()), self.scene))
+                again = loaded_from(replace(self.choice, mine=()), self.scene, self._judged)
+                self._begin_anew(replace(again, left_out=self.left_out))
             case Load(choice):
                 return self._load(choice)
             case Watch() as watch:
@@ -187,7 +179,7 @@ class Body:
 
     def _load(self, choice: SceneChoice) -> Report | None:
         try:
-            loaded, before = self._loaded(choice, choice.scene()), self.block
+            loaded, before = loaded_from(choice, None, self._judged), self.block
             if loaded.looks_like(self.choice, self.session):
                 self._begin_anew(loaded)
                 return None
@@ -264,6 +256,7 @@ class Body:
             settings=session.settings,
             tasks=self.run.tasks(),
             room=self.run.room(),
+            left_out=self.left_out,
         )
 
     def status(self, real_time_factor: float = 0.0, capped: bool = False) -> Status:

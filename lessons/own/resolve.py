@@ -114,10 +114,25 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
     Raises:
         InputError: a file cannot be used, or its Jacobian is not the task's.
     """
-    own = {name: task_in(name) for name in files}
-    for name, task in own.items():
-        _called(read(name), partial(check_task, task, scene.robot, name))
-    return with_own_tasks(scene, own)
+    return with_own_tasks(scene, {name: _task_for(scene.robot, name) for name in files})
+
+
+def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
+    """Why a robot cannot have the tasks of some files, by file."""
+    found = {}
+    for name in files:
+        try:
+            _task_for(robot, name)
+        except InputError as error:
+            found[name] = str(error)
+    return found
+
+
+def _task_for(robot: Robot, name: str) -> Task:
+    """The task of a file. Raises InputError if it cannot be used, or not on this robot."""
+    task = task_in(name)
+    _called(read(name), partial(check_task, task, robot, name))
+    return task
 
 
 def tasks_named(assignments: Iterable[str]) -> tuple[str, ...]:

@@ -79,6 +79,14 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
         assert settings(learner).controller == str(law)
         assert learner.failure is None
 
+        wire.write(str(wire.find("Kind")), value="posture")
+        task.write_text(task.read_text().replace('name="reach"', 'name="reach", frame="ee"'))
+        wire.write(str(wire.find("Robot")), value="panda")
+        press(wire, "Load robot")
+        assert eventually(lambda: wire.shows("LEFT OUT"), LONG)
+        assert learner.ready is not None and learner.ready.robot.name == "panda"
+        assert any(title == "Opened without a task of yours" for title, _ in wire.notices)
+
 
 def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:
     here = SceneChoice(RunSpec("planar3-hold"))

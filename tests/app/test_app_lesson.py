@@ -152,7 +152,7 @@ def test_what_is_refused_leaves_everything_as_it_was(learn: Start, monkeypatch: 
     for name, place in (("deadlines", 2), ("one-task", 0)):
         choice = SceneChoice.of_lesson(Exercise(name, place))
         with monkeypatch.context() as patch:
-            patch.setattr("app.worker.simulation.Lecturer", refuse)
+            patch.setattr("app.worker.loaded.Lecturer", refuse)
             answer = body.handle(Load(choice))
         assert isinstance(answer, Refused) and answer.sentence == "no lecturer here"
         mine = body.handle(Load(replace(choice, mine=("horizon",))))

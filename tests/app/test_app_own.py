@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.messages import Lead, Post, Refused
+from app.link.messages import Lead, Load, Post, Ready, Refused
 from app.link.process import wait_until
 from app.server.server import PageServer
 from app.worker.ghost import GhostBody
 from app.worker.simulation import Body
 from browsing.wire import Wire, eventually
 from lessons.events import Reset, Set
+from lessons.own.new import text_of
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import RunSpec
+from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
 HOLDS = "def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n"
@@ -173,3 +175,34 @@ def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
         body.tick(3)
         assert not isinstance(body.ready(), Refused)
         body.close()
+
+
+def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> None:
+    """One sentence says why, the scene is open, and another robot has the task again; a stack that names it
+    is refused for the same reason."""
+    path = tmp_path / "reach.py"
+    path.write_text(text_of("task", None, "reach.py").replace('name="reach"', 'name="reach", frame="link_4"'))
+    choice = SceneChoice.starting("iiwa14-hold", tasks=(str(path),))
+    body = Body(choice)
+    try:
+        assert body.ready().left_out == ()
+        elsewhere = replace(choice, run=replace(choice.run, scene="planar3-hold"))
+        there = body.handle(Load(elsewhere))
+        assert isinstance(there, Ready) and there.robot.name == "planar3"
+        assert [words in there.left_out[0] for words in ("reach.py", "link_4", "planar3")] == [True] * 3
+        assert (there.choice.run.tasks, own_tasks(body)) == ((), [])
+        body.tick(2)
+
+        stack = f'stack=[{{"task": "{path}"}}]'
+        refused = body.handle(Load(replace(elsewhere, run=elsewhere.run.but(stack))))
+        assert isinstance(refused, Refused) and "link_4" in refused.sentence
+        again = body.handle(Load(choice))
+        assert isinstance(again, Ready) and again.left_out == ()
+        assert own_tasks(body) == [str(path)]
+    finally:
+        body.close()
+
+
+def own_tasks(body: Body) -> list[str]:
+    assert isinstance(body.session.settings, TorqueSettings)
+    return list(dict(body.session.settings.own_tasks))

@@ -38,18 +38,23 @@ class RobotPanel:
                 f"scene <b>{esc(ready.choice.run.scene)}</b>"
             )
         )
-        self._answer = gui.add_html("", visible=False)
+        for sentence in ready.left_out:
+            gui.add_html(block(f"{badge('LEFT OUT', LEVELS[1])} {esc(sentence)}"))
+        self._answer: viser.GuiHtmlHandle | None = None
+        self._waits = False
         with gui.add_folder("Scene"):
             names, now = tuple(name for name in scenes if name != "hold"), ready.choice.run.scene
             scene = gui.add_dropdown("Scene", names, initial_value=now if now in names else names[0])
             described = gui.add_html(block(esc(scenes[str(scene.value)])))
             load_scene = gui.add_button("Load scene")
+            of_scene = _answer(gui)
         with gui.add_folder("Robot of the catalog"):
             catalog = gui.add_dropdown(
                 "Robot", tuple(CATALOG), initial_value=robot.name if robot.name in CATALOG else None
             )
             about = gui.add_html(block(esc(CATALOG[str(catalog.value)].title)))
             load_robot = gui.add_button("Load robot")
+            of_robot = _answer(gui)
         with gui.add_folder("Your own URDF"):
             tip = gui.add_text("Hand frame", "", hint="A link's name; empty: the end of the longest chain")
             if by_path:
@@ -58,9 +63,10 @@ class RobotPanel:
 
                 @load_path.on_click
                 async def _(_: object) -> None:
-                    self._ask(RunSpec("hold", path.value.strip(), tip.value.strip() or None))
+                    self._ask(of_urdf, RunSpec("hold", path.value.strip(), tip.value.strip() or None))
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
+            of_urdf = _answer(gui)
             gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
         if by_path:
             self._add_file(gui, ready.choice)
@@ -76,32 +82,33 @@ class RobotPanel:
 
         @load_scene.on_click
         async def _(_: object) -> None:
-            self._ask(RunSpec(str(scene.value)))
+            self._ask(of_scene, RunSpec(str(scene.value)))
 
         @load_robot.on_click
         async def _(_: object) -> None:
             name = str(catalog.value)
-            self._ask(RunSpec(f"{name}-hold") if f"{name}-hold" in scenes else RunSpec("hold", name))
+            run = RunSpec(f"{name}-hold") if f"{name}-hold" in scenes else RunSpec("hold", name)
+            self._ask(of_robot, run)
 
         @upload.on_upload
         async def _(_: object) -> None:
-            self._uploaded(upload.value.content, tip.value.strip() or None)
+            self._uploaded(of_urdf, upload.value.content, tip.value.strip() or None)
 
     def _add_file(self, gui: viser.GuiApi, current: SceneChoice) -> None:
         with gui.add_folder("A file of your own"):
             gui.add_html(block(_FILES))
             path = gui.add_text("Python file", "", hint="Path on the machine that runs this page")
             load = gui.add_button("Open file")
+            answer = _answer(gui)
 
         @load.on_click
         def _(_: object) -> None:
             """On a thread: the file is first loaded in a process of its own, which takes a second."""
             name = path.value.strip()
+            self._wait(answer)
             if not is_file(name):
                 self.refuse("No Python file was named: write its path, which ends with .py, first.")
                 return
-            self._answer.visible = True
-            self._answer.content = block("Loading …")
             try:
                 choice = current.with_file(name)
                 choice.resolved().scene()
@@ -110,15 +117,15 @@ class RobotPanel:
             else:
                 self._choose(choice)
 
-    def _ask(self, run: RunSpec, urdf_text: str | None = None) -> None:
+    def _ask(self, answer: viser.GuiHtmlHandle, run: RunSpec, urdf_text: str | None = None) -> None:
+        self._wait(answer)
         if run.scene == "hold" and run.urdf == "":
             self.refuse("No file was named: write the path of a URDF file first.")
             return
-        self._answer.visible = True
-        self._answer.content = block("Loading …")
         self._choose(SceneChoice(run, urdf_text))
 
-    def _uploaded(self, content: bytes, tip: str | None) -> None:
+    def _uploaded(self, answer: viser.GuiHtmlHandle, content: bytes, tip: str | None) -> None:
+        self._wait(answer)
         if len(content) > MAX_UPLOAD:
             self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; give a smaller URDF.")
             return
@@ -127,14 +134,25 @@ class RobotPanel:
         except UnicodeDecodeError:
             self.refuse("The file is not text: upload the URDF file itself, not a mesh or an archive.")
             return
-        self._ask(RunSpec("hold", tip=tip), text)
+        self._ask(answer, RunSpec("hold", tip=tip), text)
 
-    def refuse(self, sentence: str) -> None:
-        """A scene or robot was not loaded; the one before goes on."""
-        self._answer.visible = True
-        self._answer.content = block(
-            f"{badge('NOT LOADED', BAD)} {esc(sentence)}", "border-left:3px solid rgb(225,45,45)"
-        )
+    def _wait(self, answer: viser.GuiHtmlHandle) -> None:
+        """Something was asked for; `answer` stands below what was pressed."""
+        if self._answer is not None:
+            self._answer.visible = False
+        self._answer, self._waits = answer, True
+        answer.content = block("Loading …")
+        answer.visible = True
+
+    def refuse(self, sentence: str) -> bool:
+        """A scene or robot was not loaded; the one before goes on. Whether it was asked for here, and is now
+        told here."""
+        waited, self._waits = self._waits, False
+        if waited and self._answer is not None:
+            self._answer.content = block(
+                f"{badge('NOT LOADED', BAD)} {esc(sentence)}", "border-left:3px solid rgb(225,45,45)"
+            )
+        return waited
 
     def _report(self, gui: viser.GuiApi, ready: Ready) -> None:
         report = ready.robot.report
@@ -146,6 +164,10 @@ class RobotPanel:
                 gui.add_html(block(f"{kind} <b>{esc(finding.where)}</b>: {esc(finding.text)}"))
             if len(report.findings) > 60:
                 gui.add_html(block(f"… and {len(report.findings) - 60} more."))
+
+
+def _answer(gui: viser.GuiApi) -> viser.GuiHtmlHandle:
+    return gui.add_html("", visible=False)
 
 
 _FILES = (
