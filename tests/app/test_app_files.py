@@ -13,7 +13,7 @@ from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.own.new import text_of
 from lessons.replay.progress import read_handed_in
-from lessons.replay.state import decode
+from lessons.replay.state import State, decode, encode
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
@@ -79,13 +79,12 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
         assert settings(learner).controller == str(law)
         assert learner.failure is None
 
-        wire.write(str(wire.find("Kind")), value="posture")
         task.write_text(task.read_text().replace('name="reach"', 'name="reach", frame="ee"'))
         wire.write(str(wire.find("Robot")), value="panda")
         press(wire, "Load robot")
         assert eventually(lambda: wire.shows("LEFT OUT"), LONG)
         assert learner.ready is not None and learner.ready.robot.name == "panda"
-        assert any(title == "Opened without a task of yours" for title, _ in wire.notices)
+        assert eventually(lambda: "Opened without a task of yours" in dict(wire.notices), LONG)
 
 
 def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:
@@ -128,3 +127,16 @@ def test_what_was_done_is_handed_in_with_the_labs_signature(server: PageServer) 
         handed, proof = read_handed_in(text(), KEY)
         assert (handed.name, proof) == ("Zoë", "signed")
         assert decode(handed.code).run.scene == "planar3-hold"
+
+
+def test_a_code_that_does_not_fit_is_answered_though_nobody_looks_at_the_robot_tab(
+    server: PageServer,
+) -> None:
+    code = encode(State(RunSpec("planar3-hold", set=("horizn=3",))))
+    with Wire(server.url) as wire:
+        assert eventually(lambda: wire.find("Somebody's code") is not None, LONG)
+        wire.write(str(wire.find("Somebody's code")), value=code)
+        press(wire, "Open it")
+        assert eventually(
+            lambda: any(title == "Not loaded" and "horizon" in body for title, body in wire.notices), LONG
+        )
