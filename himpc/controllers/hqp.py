@@ -46,13 +46,15 @@ class HQP(OneStepController):
 
     [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
     singularity. Multiplied out, as here, no product of Jacobians is inverted, and R > 0 keeps every Hessian
-    positive definite. y counts from N_n, so that R does not pull an arm at rest down.
+    positive definite. y counts from N_n, so that R does not pull an arm at rest down. With R on accelerations
+    it weighs M_n⁻¹ y: this law's M is the nominal one.
     """
 
     clips = True
 
     def _adopt(self, settings: Settings) -> None:
         self._nominal = NominalModel(self.robot, settings.nominal)
+        self._by_acceleration = settings.R_on == "acceleration"
 
     def _law(self, q: Array, v: Array, a: Array, demands: list[Demand]) -> Law:
         M, bias = self._nominal.mass_matrix(q), self._nominal.bias(q, v)
@@ -64,8 +66,11 @@ class HQP(OneStepController):
         for i, demand in enumerate(demands):
             started = perf_counter_ns()
             B = demand.J @ inverse
+            R = np.diag(demand.form.R)
+            if self._by_acceleration:
+                R = (inverse * demand.form.level.R) @ inverse
             rung: Rung = "solve"
-            found = self._optimum(demand, B, y, free, rows) if free.shape[1] else Found(y, status="empty")
+            found = self._optimum(demand, B, R, y, free, rows) if free.shape[1] else Found(y, status="empty")
             if not found.usable:
                 # Staying where the levels above are keeps every priority; below nothing, come to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
@@ -80,7 +85,7 @@ class HQP(OneStepController):
                 LevelSolution(
                     name=demand.form.level.name,
                     U=y[None],
-                    cost=float(error @ error + (demand.form.R * increment) @ increment),
+                    cost=float(error @ error + increment @ R @ increment),
                     active=found.active,
                     kkt_residual=found.kkt_residual,
                     status=found.status,
@@ -92,11 +97,11 @@ class HQP(OneStepController):
             )
         return Law(bias, levels)
 
-    def _optimum(self, demand: Demand, B: Array, y: Array, free: Array, rows: Rows) -> Found:
+    def _optimum(self, demand: Demand, B: Array, R: Array, y: Array, free: Array, rows: Rows) -> Found:
         """The level's QP over w in y_i = y_{i−1} + Z w, Z = `free`: the priorities hold exactly."""
         weighted = demand.form.root_Q[:, None] * B
-        H = free.T @ (weighted.T @ weighted + np.diag(demand.form.R)) @ free
-        f = free.T @ (weighted.T @ demand.residual(B @ y) + demand.form.R * y)
+        H = free.T @ (weighted.T @ weighted + R) @ free
+        f = free.T @ (weighted.T @ demand.residual(B @ y) + R @ y)
         # y meets the bounds up to rounding; it must stay feasible exactly.
         lower, upper = np.minimum(rows.lower[0] - y, 0.0), np.maximum(rows.upper[0] - y, 0.0)
         solution = solve_qp(H, f, free, lower, upper, self._settings.solver)

@@ -31,7 +31,8 @@ class Settings:
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (all rows as printed).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
-        R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ.
+        R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ (HQP:
+            with its model's M_n).
         damping: add the damping level whenever the enabled levels leave freedom.
         nominal: the dynamic model that model-based controllers use; incremental ones never read it.
     """
