@@ -17,28 +17,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
 from himpc.rotation import quaternion
-from himpc.tasks import KINDS, Task
+from himpc.tasks import KINDS, Damping, Joints, Posture, Task
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.names import SCENES
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import assignment
-from robots import CATALOG
+from robots import CATALOG, Robot
+from robots.truth import joint_axis
 
 CONTROLLERS = ("himpc", "hqp")
 HELD_FOR = 0.1  # s
 SETTLED = {"m": 1e-3, "rad": np.deg2rad(0.1)}
-"""By unit of the task: closer than this it has settled."""
+"""By unit of a coordinate: closer than this it has settled."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """How far a task is off, in its unit: the largest coordinate, over the tasks of its kind, as a share of
-    `SETTLED`. moved: how far the drag was, likewise. calm: largest |v| over its limit at the end."""
+    """How far a task is off: the largest coordinate, over the tasks of its kind, as a share of what `SETTLED`
+    says for its unit, which is m for prismatic joints. moved: how far the drag was, likewise. calm: largest
+    |v| over its limit at the end."""
 
     robot: str
     kind: str
@@ -112,7 +115,17 @@ def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
     plan = session.plan
     if plan is None or session.diverged_at is not None:
         return float("inf")
-    return max(float(np.abs(plan.errors[task.name]).max()) / SETTLED[task.unit] for task in tasks)
+    return max(
+        float(np.abs(plan.errors[task.name] / settled_within(task, session.robot)).max()) for task in tasks
+    )
+
+
+def settled_within(task: Task, robot: Robot) -> NDArray[np.float64]:
+    """`SETTLED` of each coordinate, (m,)."""
+    names, joints = task.coordinates(robot), {}
+    if isinstance(task, (Joints, Posture, Damping)):
+        joints = {name: joint_axis(robot.model, at)[0] for at, name in enumerate(robot.joint_names, start=1)}
+    return np.array([SETTLED["m" if joints.get(name, task.unit == "m") else "rad"] for name in names])
 
 
 def main() -> int:
