@@ -11,9 +11,11 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
+from app.link.messages import Post
 from app.link.mission_view import MissionView
 from app.server.server import PageServer
 from browsing.hands import (
+    camera,
     drag_target,
     eventually,
     is_drawn,
@@ -25,6 +27,7 @@ from browsing.hands import (
     tab,
     wait_for_scene,
 )
+from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
@@ -115,6 +118,26 @@ def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(page: Page, le
     assert eventually(page, lambda: error(learner, "base") < 0.01)
     assert [each.name for each in mission(learner).rows] == ["base", "ee"]
     assert error(learner, "ee") > 0.2
+
+
+def test_the_camera_goes_along_with_the_base(page: Page, learner: Learner) -> None:
+    """As far as the base went, though a browser without a graphics card tells late where it looks from."""
+    load(page, learner, "ridgeback-ur10-drag")
+    tab(page, "Start")
+    page.get_by_text("Show", exact=True).first.click()
+    along = row(page, "Camera follows the base").locator("input")
+    along.click()
+    expect(along).to_be_checked()
+    eye, start = np.array(camera(page)), latest(learner, "x/base")
+    learner.send(Post(MoveTarget("base", (float(start[0]), float(start[1]) - 1.0))))
+
+    def gone() -> float:
+        return float(np.linalg.norm(latest(learner, "x/base") - start))
+
+    assert eventually(page, lambda: gone() > 0.8 and at_rest(learner))
+    assert eventually(page, lambda: abs(float(np.linalg.norm(np.array(camera(page)) - eye)) - gone()) < 0.05)
+    along.click()
+    page.get_by_text("Show", exact=True).first.click()
 
 
 def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(page: Page, learner: Learner) -> None:
