@@ -96,13 +96,23 @@ def gone(group: int, within: float) -> bool:
     return False
 
 
+# Cells long enough that the second is not done when the first is seen.
+SWEEP = ["planar3-circle", "--over", "Q=100:200:6", "--duration", "0.4"]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Results of the sweep that nobody stops."""
+    out = tmp_path_factory.mktemp("whole")
+    assert main(["sweep", *SWEEP, "--out", str(out)]) == 0
+    return (out / "results.json").read_bytes()
+
+
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals) -> None:
+def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals, whole: bytes) -> None:
     """Interrupted like from a terminal, or told to end: it says how far it got, leaves no process
     behind, and the same command ends in the same results as an uninterrupted one."""
-    # Cells long enough that the second is not done when the first is seen.
-    what = ["planar3-circle", "--over", "Q=100:200:6", "--duration", "0.4"]
-    command = [sys.executable, "-m", "app", "sweep", *what, "--out"]
+    command = [sys.executable, "-m", "app", "sweep", *SWEEP, "--out"]
     part = tmp_path / "part"
     process = subprocess.Popen(
         [*command, str(part)],
@@ -127,9 +137,8 @@ def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals
     # Python's own helper process ends a moment after its parent.
     assert gone(process.pid, within=30.0)
     assert 0 < len(cells(part)) < 6
-    assert main(["sweep", *what, "--out", str(part)]) == 0
-    assert main(["sweep", *what, "--out", str(tmp_path / "whole")]) == 0
-    assert (part / "results.json").read_bytes() == (tmp_path / "whole" / "results.json").read_bytes()
+    assert main(["sweep", *SWEEP, "--out", str(part)]) == 0
+    assert (part / "results.json").read_bytes() == whole
     assert (part / "map.png").is_file()
 
 
