@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tsdownsample import MinMaxDownsampler
 
 from lessons.course import COURSE, load_lesson
 from lessons.recording.recording import Recording
@@ -21,8 +22,8 @@ from lessons.recording.run import run
 from lessons.teaching.lesson import Lesson, Step
 
 FOLDER = Path(__file__).parents[1] / "docs" / "site" / "recorded"
-POINTS = 160
-"""Of a curve: more than its picture is wide in pixels is no use."""
+POINTS = 240
+"""Of a curve, and its two ends: its picture is 574 units wide."""
 RATE = 25.0
 """Pictures a second, at most, of a motion."""
 PLAYED = {"a-redundant-arm": 1, "no-model-needed": 1, "one-task": 1, "swap-the-priorities": 2, "two-tasks": 1}
@@ -51,31 +52,25 @@ def runs_of(lesson: Lesson, step: Step) -> list[Recording]:
 
 
 def plot(step: Step, place: int, runs: list[Recording]) -> dict[str, Any]:
-    """One signal of all runs. An interval of time keeps its least and its greatest value, so that no peak is
-    lost: t and the values have two points per interval."""
+    """One signal: per run when and what."""
     signal = step.plots[place]
-    t = runs[0]["t"][:, 0]
-    curves = [signal.over(each) for each in runs]
-    times = thinned(t, t)[0]
+    drawn = [thinned(each["t"][:, 0], signal.over(each)) for each in runs]
     return {
         "words": signal.words,
         "unit": signal.unit,
-        "t": rounded(times),
-        "curves": [rounded(thinned(each["t"][:, 0], y)[1]) for each, y in zip(runs, curves, strict=True)],
+        "t": [rounded(t) for t, _ in drawn],
+        "curves": [rounded(y) for _, y in drawn],
     }
 
 
 def thinned(t: Array, y: Array) -> tuple[Array, Array]:
-    """At most POINTS values in time's order, extremes kept, and when they were."""
+    """POINTS of them and both ends: of equal intervals the least and the greatest value, each at its time,
+    so that no peak is lost and none is moved."""
     if len(t) <= POINTS:
         return t, y
-    times, values = [], []
-    for part in np.array_split(np.arange(len(t)), POINTS // 2):
-        seen = part[np.isfinite(y[part])]
-        low, high = (seen[np.argmin(y[seen])], seen[np.argmax(y[seen])]) if len(seen) else (part[0], part[0])
-        times += [t[part[0]], t[part[len(part) // 2]]]
-        values += [y[min(low, high)], y[max(low, high)]]
-    return np.array(times), np.array(values)
+    kept = MinMaxDownsampler().downsample(np.ascontiguousarray(y, float), n_out=POINTS)
+    kept = np.unique(np.concatenate(([0], kept.astype(int), [len(t) - 1])))
+    return t[kept], y[kept]
 
 
 def moved(lesson: Lesson, step: Step, runs: list[Recording]) -> dict[str, Any]:

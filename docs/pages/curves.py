@@ -7,26 +7,33 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-WIDTH, HEIGHT = 640, 150
+WIDTH, HEIGHT = 640, 180
 LEFT, RIGHT, TOP, BOTTOM = 58, 8, 8, 22
 _DECADES = 300.0
-"""Values that span more than this factor, all positive, are drawn on a logarithmic axis."""
+"""Values of which most span more than this factor, all positive, are drawn on a logarithmic axis."""
+_MOST = 0.05
+"""So large a share of the values may lie below: an error, or a way, is zero when a run starts."""
+FLOORS = {"m": 1e-6, "mm": 1e-3, "deg": 1e-3, "%": 1e-2, "m/s²": 1e-6, "N·m": 1e-4}
+"""By unit: where a logarithmic axis ends. What is smaller is drawn there: it is a computer's rounding."""
 
 
 def figure(step: Mapping[str, Any], ghost: str | None) -> str:
     """All plots of a step, below each other, and the legend if there is a ghost."""
     drawn = "".join(_plot(each) for each in step["plots"])
     words = "The recorded run." + (f" Dashed: the ghost, {escape(ghost)}." if ghost else "")
+    floors = dict.fromkeys(_floor_words(each) for each in step["plots"])
+    words += "".join(f" {each}" for each in floors if each)
     return f'<figure class="curves">{drawn}<figcaption>{words}</figcaption></figure>'
 
 
 def _plot(plot: Mapping[str, Any]) -> str:
-    t, curves = plot["t"], plot["curves"]
-    values = [v for curve in curves for v in curve if v is not None]
+    times, curves = plot["t"], plot["curves"]
+    t = [min((each[0] for each in times if each), default=0.0), max((e[-1] for e in times if e), default=0.0)]
+    values = _values(plot)
     name = escape(plot["words"] + (f", {plot['unit']}" if plot["unit"] else ""))
-    if not values or not t:
+    if not values:
         return f"<p>{name}: nothing to see in this run.</p>"
-    low, high, log = _range(values)
+    low, high, log = _range(values, plot["unit"])
     place = math.log10 if log else float
 
     def x(at: float) -> float:
@@ -39,19 +46,32 @@ def _plot(plot: Mapping[str, Any]) -> str:
     lines = []
     for tick in _decades(low, high) if log else ticks(low, high):
         lines.append(f'<path class="grid" d="M{LEFT} {y(tick):.1f}H{WIDTH - RIGHT}"/>')
-        lines.append(f'<text x="{LEFT - 5}" y="{y(tick) + 4:.1f}" text-anchor="end">{tick:.4g}</text>')
-    for tick in ticks(t[0], t[-1]):
-        # The unit stands at the last one.
-        unit = " s" if tick + ticks(t[0], t[-1])[1] - ticks(t[0], t[-1])[0] > t[-1] + 1e-9 else ""
+        lines.append(
+            f'<text x="{LEFT - 5}" y="{y(tick) + 4:.1f}" text-anchor="end">{label(tick, log)}</text>'
+        )
+    seconds = ticks(t[0], t[-1])
+    for tick in seconds:
+        unit = " s" if tick == seconds[-1] else ""
         lines.append(f'<text x="{x(tick):.1f}" y="{HEIGHT - 6}" text-anchor="middle">{tick:.4g}{unit}</text>')
-    for kind, curve in zip(("ghost", "own"), reversed([*curves, []][:2]), strict=True):
-        path = _path([(x(at), y(v)) if v is not None else None for at, v in zip(t, curve, strict=False)])
+    for kind, at, curve in reversed(list(zip(("own", "ghost"), times, curves, strict=False))):
+        path = _path([(x(s), y(v)) if v is not None else None for s, v in zip(at, curve, strict=True)])
         lines.append(f'<path class="{kind}" d="{path}"/>' if path else "")
     return (
         f'<p class="what">{name}</p><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{name}">'
         + "".join(lines)
         + "</svg>"
     )
+
+
+def label(tick: float, log: bool) -> str:
+    """Powers of ten where they are shorter."""
+    power = round(math.log10(tick)) if log else 0
+    if -3 < power < 4:
+        return f"{tick:.4g}".replace("-", "−")
+    return "10" + str(power).translate(_RAISED)
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _path(points: Sequence[tuple[float, float] | None]) -> str:
@@ -65,11 +85,27 @@ def _path(points: Sequence[tuple[float, float] | None]) -> str:
     return "".join(parts)
 
 
-def _range(values: Sequence[float]) -> tuple[float, float, bool]:
+def _values(plot: Mapping[str, Any]) -> list[float]:
+    return [v for curve in plot["curves"] for v in curve if v is not None]
+
+
+def _floor_words(plot: Mapping[str, Any]) -> str:
+    """What the axis leaves out; "" if nothing."""
+    values, unit = _values(plot), plot["unit"]
+    if not values:
+        return ""
+    low, _, log = _range(values, unit)
+    end = f"{label(low, log)} {unit}"
+    return f"Below {end} a curve is drawn at {end}." if log and min(values) < low else ""
+
+
+def _range(values: Sequence[float], unit: str) -> tuple[float, float, bool]:
     """Least, greatest, and whether logarithmic."""
     low, high = min(values), max(values)
-    if low > 0 and high > _DECADES * low:
-        return max(low, high * 1e-8), high, True
+    floor = FLOORS.get(unit, 0.0)
+    most = max(sorted(values)[math.floor(_MOST * len(values))], floor)
+    if most > 0 and low >= 0 and high > _DECADES * most:
+        return floor if low < floor else low or most, high, True
     margin = 0.05 * (high - low) or 0.5 * abs(high) or 1.0
     return (0.0 if 0 <= low < 0.5 * high else low - margin), high + margin, False
 
