@@ -77,7 +77,7 @@ def error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, float
     )
 
 
-FAINTEST = 1e-3
+FAINTEST = 1e-4
 """Of a coordinate's unit: where a logarithmic axis of errors ends."""
 
 

@@ -100,6 +100,7 @@ def _draw_lines(axes: Axes, panel: Panel) -> None:
     dotted = (0, (4, 1.5, 1, 1.5))
     for place, bound in enumerate(panel.bounds):
         label = panel.bound_label if place == 0 else ""
+        axes.axhline(bound, color="white", linewidth=1.6, zorder=0.9)  # or the grid fills the gaps
         axes.axhline(bound, color=BOUND, linewidth=1.2, linestyle=dotted, zorder=1, label=label)
     for place, mark in enumerate(panel.marks):
         label = panel.mark_label if place == 0 else ""
@@ -108,7 +109,8 @@ def _draw_lines(axes: Axes, panel: Panel) -> None:
         label = panel.span_label if place == 0 else ""
         axes.axvspan(start, end, color=BOUND, alpha=0.25, linewidth=0, zorder=0, label=label)
     for x, y, text in panel.notes:
-        axes.annotate(text, (x, y), (3, 3), textcoords="offset points", fontsize=7, zorder=4)
+        behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
+        axes.annotate(text, (x, y), (3, 3), textcoords="offset points", fontsize=7, zorder=4, bbox=behind)
 
 
 def _positive(values: Iterable[np.ndarray]) -> bool:
@@ -158,13 +160,13 @@ def _draw_bars(axes: Axes, panel: Bars) -> None:
 
 
 def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
-    """A logarithmic axis has no place for a bar of no height: it gets a word."""
+    """A logarithmic axis has no place for a bar of no height: it gets a dash."""
     for place, (_, key, values) in enumerate(panel.series):
         offset = (place - 0.5 * (len(panel.series) - 1)) * width
         for group, value in enumerate(values):
             if value <= 0:
                 axes.annotate(
-                    "none",
+                    "–",
                     (group + offset, 0.0),
                     (0, 2),
                     xycoords=("data", "axes fraction"),

@@ -93,7 +93,7 @@ def _fig_4(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(COMPARED))
     caption = (
         "Size of the tracking errors on RT1 with the paper's encoder, the largest in every 50 ms. OSF and "
-        "HQP coincide, and so do TDEOSF and HIMPC."
+        "HQP coincide, and so do TDEOSF and HIMPC. Cut below 1e-4."
     )
     return _picture("himpc-fig-4", caption, log_error_panels(runs, PLANAR_ERRORS))
 

@@ -122,7 +122,9 @@ def _picture(results: Results, plants: list[str]) -> Picture:
         bars("QPs without a solution", lambda run: run.figure("solver", "unsolved")),
         bars("level 1, worst axis (mm)", _level_1_mm),
     )
-    caption = "Limits as printed, with a barrier on speed, and with position limits one can stop before."
+    caption = (
+        "Limits as printed, with a barrier on speed, and with position limits one can stop before. –: none."
+    )
     return Picture("himpc-limits", caption, panels, 2)
 
 

@@ -50,7 +50,8 @@ def _section(results: Results, quick: bool) -> Section:
         Panel(
             "$V_N(k+1) / V_N(k)$, level 1",
             (ratio,),
-            "$V_N(k)$, level 1 (below 1: it decreases)",
+            "$V_N(k)$, level 1",
+            title="below 1 it decreases",
             bounds=(1.0,),
             log_x=True,
             y_range=(0.0, 2.0),
