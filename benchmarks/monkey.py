@@ -268,7 +268,8 @@ def walk(
     browser: Browser, server: PageServer, minutes: float, seed: int, complaints: Callable[[], str]
 ) -> Findings:
     """A random walk of so many minutes; it ends early when something broke."""
-    page = open_page(browser, server.url, rest=SELDOM)
+    # With less, viser's panel of statistics has no canvas to draw on, and a user finds it sooner or later.
+    page = open_page(browser, server.url, scale=0.5, rest=SELDOM)
     page.set_default_timeout(_PATIENCE)
     page.set_default_navigation_timeout(SLOW)
     monkey = Monkey(page, server, seed, complaints)
