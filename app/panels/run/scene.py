@@ -39,26 +39,29 @@ class RobotPanel:
             )
         )
         for sentence in ready.left_out:
-            gui.add_html(block(f"{badge('LEFT OUT', LEVELS[1])} {esc(sentence)}"))
+            words = f"{badge('LEFT OUT', LEVELS[1])} This robot cannot have a task of yours. {esc(sentence)}"
+            gui.add_html(block(words))
         self._answer: viser.GuiHtmlHandle | None = None
         self._waits = False
         with gui.add_folder("Scene"):
             names, now = tuple(name for name in scenes if name != "hold"), ready.choice.run.scene
             scene = gui.add_dropdown("Scene", names, initial_value=now if now in names else names[0])
             described = gui.add_html(block(esc(scenes[str(scene.value)])))
-            load_scene = gui.add_button("Load scene")
             of_scene = _answer(gui)
+            load_scene = gui.add_button("Load scene")
         with gui.add_folder("Robot of the catalog"):
             catalog = gui.add_dropdown(
                 "Robot", tuple(CATALOG), initial_value=robot.name if robot.name in CATALOG else None
             )
             about = gui.add_html(block(esc(CATALOG[str(catalog.value)].title)))
-            load_robot = gui.add_button("Load robot")
             of_robot = _answer(gui)
+            load_robot = gui.add_button("Load robot")
         with gui.add_folder("Your own URDF"):
             tip = gui.add_text("Hand frame", "", hint="A link's name; empty: the end of the longest chain")
             if by_path:
                 path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
+            of_urdf = _answer(gui)
+            if by_path:
                 load_path = gui.add_button("Load file")
 
                 @load_path.on_click
@@ -66,7 +69,6 @@ class RobotPanel:
                     self._ask(of_urdf, RunSpec("hold", path.value.strip(), tip.value.strip() or None))
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
-            of_urdf = _answer(gui)
             gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
         if by_path:
             self._add_file(gui, ready.choice)
@@ -98,8 +100,8 @@ class RobotPanel:
         with gui.add_folder("A file of your own"):
             gui.add_html(block(_FILES))
             path = gui.add_text("Python file", "", hint="Path on the machine that runs this page")
-            load = gui.add_button("Open file")
             answer = _answer(gui)
+            load = gui.add_button("Open file")
 
         @load.on_click
         def _(_: object) -> None:
@@ -137,7 +139,8 @@ class RobotPanel:
         self._ask(answer, RunSpec("hold", tip=tip), text)
 
     def _wait(self, answer: viser.GuiHtmlHandle) -> None:
-        """Something was asked for; `answer` stands below what was pressed."""
+        """Something was asked for; `answer` stands above what was pressed: what stands below may be out of
+        sight."""
         if self._answer is not None:
             self._answer.visible = False
         self._answer, self._waits = answer, True

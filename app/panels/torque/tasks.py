@@ -96,7 +96,11 @@ class TasksPanel:
     def _ask(self, event: Event) -> None:
         """Posts it. What is being edited stays unfolded on the stack that comes of it."""
         match event:
-            case Set("stack.edit", {"name": str(name)}) | Set("stack.rename", [_, str(name)]):
+            case (
+                Set("stack.edit", {"name": str(name)})
+                | Set("stack.rename", [_, str(name)])
+                | Set("stack.split", str(name))
+            ):
                 self._edited = name
             case _:
                 self._edited = ""

@@ -8,6 +8,7 @@ from playwright.sync_api import Page, expect
 from app.client.learner import Learner
 from app.server.server import PageServer
 from browsing.hands import (
+    BETWEEN,
     click_on,
     drag_target,
     eventually,
@@ -19,8 +20,8 @@ from browsing.hands import (
     target_position,
     write,
 )
+from browsing.wire import Wire
 from himpc.tasks.axes import OnAxes
-from lessons.replay.state import decode
 from lessons.settings.torque import TorqueSettings
 
 ELBOW = "/targets/elbow/control/mark"
@@ -36,10 +37,15 @@ def levels(learner: Learner) -> list[str]:
 
 
 def error(learner: Learner, task: str) -> float:
+    return now(learner, f"error/{task}")
+
+
+def now(learner: Learner, field: str) -> float:
+    """How large it is in the newest row."""
     found = learner.read(lambda _, history: (history.layout, history.latest))
     assert found is not None
     layout, latest = found
-    return float(np.linalg.norm(latest[layout.fields[f"error/{task}"]]))
+    return float(np.linalg.norm(latest[layout.fields[field]]))
 
 
 def unfold(page: Page, title: str, at: int = 0) -> None:
@@ -70,12 +76,14 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: is_drawn(page, "/targets/elbow/control"))
     expect(page.get_by_text("gets 2 of 3 directions", exact=False).first).to_be_visible()
     assert error(learner, "position") < 1e-3
+    expect(page.get_by_text("elbow [mm]", exact=True).first).to_be_visible()  # its curve
 
     before = target_position(page, ELBOW)
     drag_target(page, axis=0, along=0.08, node="/targets/elbow/control", arm=0.13)
     assert eventually(page, lambda: target_position(page, ELBOW)[0] > before[0] + 0.03)
     assert eventually(page, lambda: error(learner, "elbow") > 1e-3)
     assert error(learner, "position") < 2e-3
+    assert now(learner, "priority_leak") < 1e-6  # for whom the elbow's level moves
 
     page.get_by_role("button", name="▲ Up", exact=True).nth(1).click()
     assert eventually(page, lambda: levels(learner)[:2] == ["elbow", "position"])
@@ -93,16 +101,37 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     expect(page.get_by_text("gets 4 of 4 directions", exact=False).first).to_be_visible()
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
 
+    unfold(page, "Change")
+    press(page, "Own level for elbow")
+    assert eventually(page, lambda: levels(learner) == ["position", "elbow", "orientation", "posture"])
+    expect(page.get_by_text("2 · elbow", exact=True)).to_be_visible()
+    flex = 'ancestor::div[contains(@class,"mantine-Flex-root")][1]'
+    named = page.locator(f'xpath=//label[normalize-space(.)="Name"]/{flex}//input')
+    name = named.locator("visible=true").first
+    name.fill("forearm")
+    name.press("Tab")
+    page.wait_for_timeout(BETWEEN)
+    press(page, "Rename")
+    assert eventually(page, lambda: levels(learner) == ["position", "forearm", "orientation", "posture"])
+    expect(page.get_by_text("2 · forearm", exact=True)).to_be_visible()
+    assert eventually(page, lambda: is_drawn(page, "/targets/forearm/control"))
+    assert axes(learner, "forearm") == "x"
+    assert eventually(page, lambda: error(learner, "position") < 2e-3)
+
     tab(page, "Export")
     press(page, "Write it down")
     code = row(page, "Code").locator("textarea").input_value()
-    assert decode(code).run.prepared().settings == settings(learner)
+    with Wire(server.url) as elsewhere:
+        assert eventually(page, lambda: elsewhere.find("Somebody's code") is not None)
+        elsewhere.write(str(elsewhere.find("Somebody's code")), value=code)
+        elsewhere.write(str(elsewhere.find("Open it")), value=True)
+        other = server.sessions.learners[1]
+        assert eventually(page, lambda: other.settings == settings(learner)), elsewhere.notices
 
-    tab(page, "Tasks")
-    unfold(page, "Change")
-    press(page, "Remove elbow")
+    tab(page, "Tasks")  # what was edited last is unfolded
+    press(page, "Remove forearm")
     assert eventually(page, lambda: levels(learner) == ["position", "orientation", "posture"])
-    assert eventually(page, lambda: not is_drawn(page, "/targets/elbow/control"))
+    assert eventually(page, lambda: not is_drawn(page, "/targets/forearm/control"))
     assert learner.failure is None
     status = learner.status
     assert status is not None
