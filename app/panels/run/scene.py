@@ -58,10 +58,9 @@ class RobotPanel:
             load_robot = gui.add_button("Load robot")
         with gui.add_folder("Your own URDF"):
             tip = gui.add_text("Hand frame", "", hint="A link's name; empty: the end of the longest chain")
-            if by_path:
-                path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
             of_urdf = _answer(gui)
             if by_path:
+                path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
                 load_path = gui.add_button("Load file")
 
                 @load_path.on_click
