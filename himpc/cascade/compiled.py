@@ -14,10 +14,10 @@ from types import CellType, FunctionType
 from typing import Any
 
 from numba import boolean, float64, int64, intp, njit, types
-from numba.core import cgutils, config, event
-from numba.extending import intrinsic
+from numba.core import config, event
 
 from himpc.cascade.compiler import compile_apart, compiles_here
+from himpc.cascade.pieces import Piece, Whole
 
 try:
     import fcntl
@@ -25,13 +25,12 @@ except ImportError:  # a system without it: two processes may then compile the s
     fcntl = None
 
 NUMBER, WHOLE, FLAG = float64, intp, boolean
-VECTOR, MATRIX, MATRICES, FRAMES = float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, :, ::1]
+VECTOR, MATRIX, MATRICES = float64[::1], float64[:, ::1], float64[:, :, ::1]
 INDICES, TABLE, FLAGS = intp[::1], int64[:, ::1], boolean[:, ::1]
 """Arrays of our own, contiguous."""
 FIXED, FIXED_VECTOR = types.Array(float64, 2, "C", readonly=True), types.Array(float64, 1, "C", readonly=True)
 """The same, not to be written to."""
-GIVEN, GIVEN_MATRIX, GIVEN_MATRICES = float64[:], float64[:, :], float64[:, :, :]
-GIVEN_INDICES = intp[:]
+GIVEN_MATRIX = float64[:, :]
 """What others hand over: it may be a slice."""
 
 Function = Callable[..., Any]
@@ -55,64 +54,51 @@ def cached(**options: Any) -> Callable[[Function], Any]:
     return decorate
 
 
-inner = cached()
-"""Compiles a function along with those `compiled` that call it; they stand below it."""
-
 _ANY_ORDER = {"reassoc", "contract", "nsz"}
-quick = cached(fastmath=_ANY_ORDER)
-"""The same for functions whose sums may be taken in any order; NaN and infinity keep their meaning."""
+"""Sums may be taken in any order; NaN and infinity keep their meaning."""
 
-
-def compiled(*arguments: Any, by: Callable[[Function], Any] = inner) -> Callable[[Function], Any]:
-    """Compiles a function for arguments of these types, and for no others; `by` is `inner` or `quick`.
-
-    Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
-    that its compilation takes.
-    """
-
-    return lambda function: _compiled_now(by(function), arguments)
-
-
-piece = njit(error_model="numpy", fastmath=_ANY_ORDER)
-"""Compiles a function as a part of the `entry` that calls it, wherever that stands."""
-
-
-def _unowned(_: Any, array: Any) -> Any:
-    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        given, found = (context.make_array(array)(context, builder, *each) for each in ((arguments[0],), ()))
-        for name in ("nitems", "itemsize", "data", "shape", "strides"):
-            setattr(found, name, getattr(given, name))
-        for name in ("meminfo", "parent"):
-            setattr(found, name, cgutils.get_null_value(getattr(found, name).type))
-        return found._getvalue()
-
-    return array(array), generate
-
-
-borrowed: Any = intrinsic(_unowned)
-"""The same array without an owner: nobody counts who looks at it, and slices of it cost nothing. Whoever
-calls the `entry` keeps it."""
+piece = njit(
+    error_model="numpy",
+    fastmath=_ANY_ORDER,
+    pipeline_class=Piece,
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+)
+"""Compiles a function as a part of every `entry` that calls it, wherever that stands."""
 
 
 def entry(*arguments: Any) -> Callable[[Function], Any]:
-    """As `compiled`, for a function with every `piece` of it in whatever file of its folder.
+    """Compiles a function, with every `piece` that it calls, for arguments of these types, and for no others.
+
+    Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
+    that its compilation takes.
 
     Numba takes a function on disk for current as long as its own file is unchanged. What a closure holds is
-    part of what it looks for, though: the function is given one with a digest of all files of the folder.
+    part of what it looks for, though: the function is given one with a digest of all files of its folder and
+    of the folders that pieces come from.
     """
 
     def compile_now(function: Function) -> Any:
         code, digest = function.__code__, sha256()
-        for file in sorted(Path(code.co_filename).parent.glob("*.py")):
-            digest.update(file.read_bytes())
+        for folder in sorted(_folders(function)):
+            for file in sorted(folder.glob("*.py")):
+                digest.update(file.read_bytes())
         sources = CellType(digest.hexdigest())
         stamped = FunctionType(
             code.replace(co_freevars=("sources",)), function.__globals__, function.__name__, None, (sources,)
         )
         stamped.__module__, stamped.__qualname__ = function.__module__, function.__qualname__
-        return _compiled_now(cached(error_model="numpy", fastmath=_ANY_ORDER)(stamped), arguments)
+        options = {"error_model": "numpy", "fastmath": _ANY_ORDER, "pipeline_class": Whole}
+        return _compiled_now(cached(**options, no_cfunc_wrapper=True)(stamped), arguments)
 
     return compile_now
+
+
+def _folders(function: Function) -> set[Path]:
+    """Where a function's file is, and those of the pieces that its module knows."""
+    pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
+    files = [function.__code__.co_filename, *(each.__code__.co_filename for each in pieces if each)]
+    return {Path(file).parent for file in files}
 
 
 def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:

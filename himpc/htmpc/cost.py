@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.compiled import FIXED, GIVEN_MATRIX, MATRICES, MATRIX, NUMBER, compiled, quick
+from himpc.htmpc.kernel.cost import model
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.rows import Rows
 from himpc.htmpc.settings import Efforts
@@ -21,7 +21,6 @@ ZETA = 5e-3
 """Distance from a bound at which the logarithm gives way to a parabola (the authors' value)."""
 
 
-@compiled(MATRICES, GIVEN_MATRIX, GIVEN_MATRIX, FIXED, MATRIX, NUMBER, NUMBER, by=quick)
 def gauss_newton(
     J: Array, Q: Array, e: Array, T_q: Array, effort: Array, share: float, ridge: float
 ) -> tuple[Array, Array]:
@@ -31,35 +30,9 @@ def gauss_newton(
     Args:
         J: (N, m, n), ∂e_k/∂q_k. Q, e: (N, m). T_q: (N, N), ∂q_k/∂u_s. effort: (k, k).
     """
-    N, m, n = J.shape
-    weighted, pull = np.zeros((N, n, n)), np.zeros((N, n))
-    for k in range(N):
-        for p in range(m):
-            for a in range(n):
-                x = Q[k, p] * J[k, p, a]
-                pull[k, a] += x * e[k, p]
-                for b in range(n):
-                    weighted[k, a, b] += x * J[k, p, b]
+    N, _, n = J.shape
     H, g = np.empty((N * n, N * n)), np.zeros(N * n)
-    block = np.empty((n, n))
-    for s in range(N):
-        for k in range(s, N):
-            for a in range(n):
-                g[s * n + a] += T_q[k, s] * pull[k, a]
-        for r in range(s + 1):
-            block[:] = 0.0
-            for k in range(s, N):
-                both = T_q[k, s] * T_q[k, r]
-                for a in range(n):
-                    for b in range(n):
-                        block[a, b] += both * weighted[k, a, b]
-            for a in range(n):
-                for b in range(n):
-                    x = block[a, b] + share * effort[s * n + a, r * n + b]
-                    H[s * n + a, r * n + b] = x
-                    H[r * n + b, s * n + a] = x
-    for i in range(N * n):
-        H[i, i] += ridge
+    model(J, Q, e, T_q, effort, share, ridge, np.zeros((N, n, n)), np.zeros((N, n)), H, g)
     return H, g
 
 

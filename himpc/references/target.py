@@ -22,6 +22,9 @@ POSITION_CAPS = Caps()
 ROTATION_CAPS = Caps(speed=1.2, acceleration=6.0, jerk=120.0)
 JOINT_CAPS = Caps(speed=1.0, acceleration=5.0, jerk=100.0)
 
+_ROOM = 200
+"""Periods after which the samples that are left move to the front of a new array."""
+
 
 class Target:
     """The filtered target and its preview.
@@ -81,7 +84,7 @@ class Target:
         if later and not rests:
             if self._known == 1:
                 self._roll(1)
-            self._samples[:-1] = self._samples[1:]
+            self._samples = self._samples[1:]
             self._known -= 1
             rests = self._samples[0, -1] > 0.0
         if rests:
@@ -96,8 +99,9 @@ class Target:
         from himpc.tick.kernel.target import roll
 
         if len(self._samples) < N + 2:
-            more = np.zeros((N + 2 - len(self._samples), self._samples.shape[1]))
-            self._samples = np.vstack([self._samples, more])
+            samples = np.zeros((N + 2 + _ROOM, self._samples.shape[1]))
+            samples[: self._known] = self._samples[: self._known]
+            self._samples = samples
         motion = np.empty((3, N + 1, self._m))
         roll(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
         self._known = max(self._known, N + 1)

@@ -204,14 +204,15 @@ class CompiledTick:
             reference, read = references.get(task.name), self._read.get(place)
             if reference is not None and reference is read:
                 continue
-            if reference is not None and write_curve(self.arena, place, span, reference):
+            dragged = isinstance(reference, Target)
+            if reference is not None and not dragged and write_curve(self.arena, place, span, reference):
                 self._read[place] = reference
                 continue
             preview = previews[task.name]
             if preview is not read:
                 write_preview(self.arena, place, span, preview, self._settings.horizon + 1)
             # A target at rest shows the same preview again; of others nobody knows whether it has changed.
-            self._read[place] = preview if isinstance(reference, Target) else None
+            self._read[place] = preview if dragged else None
 
     def _solutions(self, found: Snapshot, rungs: Sequence[tuple[Rung, float]]) -> list[LevelSolution]:
         return solutions([level.name for level in self._form.levels], found, rungs) if self._levels else []

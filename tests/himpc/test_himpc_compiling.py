@@ -25,13 +25,13 @@ ROOT = Path(__file__).parents[2]
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 SMALL = """
-from himpc.cascade.compiled import NUMBER, compiled, inner
+from himpc.cascade.compiled import NUMBER, entry, piece
 
-@inner
+@piece
 def _twice(x):
     return 2.0 * x
 
-@compiled(NUMBER)
+@entry(NUMBER)
 def twice(x):
     return _twice(x)
 """

@@ -3,8 +3,8 @@ data."""
 
 from __future__ import annotations
 
-from collections import namedtuple
 from math import prod
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -154,9 +154,17 @@ WHOLES = {
 }
 """Every array of whole numbers and its shape."""
 
-AT = namedtuple("AT", tuple(NUMBERS))(*range(len(NUMBERS)))
-WHOLE_AT = namedtuple("WHOLE_AT", tuple(WHOLES))(*range(len(WHOLES)))
-"""Where in `Arena.where` the place of an array is noted."""
+
+def _numbered(name: str, shapes: dict[str, str]) -> Any:
+    """The place of every array among all. A module: what that holds is a constant to the compiler, which
+    would write a whole tuple down anew wherever one of its numbers is used."""
+    places = ModuleType(name)
+    vars(places).update({each: place for place, each in enumerate(shapes)})
+    return places
+
+
+AT, WHOLE_AT = _numbered("AT", NUMBERS), _numbered("WHOLE_AT", WHOLES)
+"""Where in `Arena.where` and `Arena.whole_where` the place of an array is noted."""
 
 PERIOD, T_S, REACTION, NOW = range(4)
 """What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t."""

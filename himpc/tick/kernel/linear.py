@@ -1,6 +1,12 @@
-"""The linear algebra of small dense matrices, compiled: at these sizes a call costs more than the work."""
+"""The linear algebra of small dense matrices, compiled: at these sizes a call costs more than the work.
+
+Rows that a point is held by are kept as corner · basis: `basis` has orthonormal rows, `corner` is lower
+triangular, and rows come and go one by one.
+"""
 
 from __future__ import annotations
+
+import math
 
 from himpc.cascade.compiled import piece
 from himpc.tick.kernel.arena import Array
@@ -70,9 +76,12 @@ def factorise(H: Array, d: int) -> bool:
 
 @piece
 def forward(F: Array, x: Array, d: int) -> None:
-    """x ← F⁻¹ x, F lower triangular."""
-    for a in range(d):
-        x[a] = (x[a] - dot(F[a], x, a)) / F[a, a]
+    """x ← F⁻¹ x, F lower triangular; what is zero at the beginning stays zero."""
+    first = 0
+    while first < d and x[first] == 0.0:
+        first += 1
+    for a in range(first, d):
+        x[a] = (x[a] - dot(F[a, first:], x[first:], a - first)) / F[a, a]
 
 
 @piece
@@ -81,3 +90,50 @@ def backward(F: Array, x: Array, d: int) -> None:
     for a in range(d - 1, -1, -1):
         x[a] /= F[a, a]
         subtract(x[a], F[a], x, a)
+
+
+@piece
+def split(row: Array, basis: Array, count: int, n: int, share: Array, rest: Array) -> float:
+    """A row (n,) as a combination of the first `count` orthonormal ones of `basis`, and a rest.
+
+    Args:
+        row, basis, count, n: see there.
+        share: the coefficients, (count,).
+        rest: what is left, (n,). Where that is little, a second round takes out what rounding left of them.
+
+    Returns:
+        ‖rest‖².
+    """
+    copy(row, rest, n)
+    for q in range(count):
+        share[q] = 0.0
+    before = after = dot(row, row, n)
+    for _ in range(2):
+        for q in range(count):
+            along = dot(basis[q], rest, n)
+            share[q] += along
+            subtract(along, basis[q], rest, n)
+        after = dot(rest, rest, n)
+        if after > 0.5 * before:
+            break
+    return after
+
+
+@piece
+def close_gap(corner: Array, basis: Array, place: int, count: int, n: int) -> None:
+    """Takes row `place` out of `count` rows corner · basis; those behind it move up, and rotations make
+    `corner` lower triangular again."""
+    for p in range(place, count - 1):
+        for q in range(p + 2):
+            corner[p, q] = corner[p + 1, q]
+    for q in range(place, count - 1):
+        length = math.hypot(corner[q, q], corner[q, q + 1])
+        if length == 0.0:
+            continue
+        cos, sin = corner[q, q] / length, corner[q, q + 1] / length
+        for p in range(q, count - 1):
+            x, y = corner[p, q], corner[p, q + 1]
+            corner[p, q], corner[p, q + 1] = cos * x + sin * y, cos * y - sin * x
+        for c in range(n):
+            x, y = basis[q, c], basis[q + 1, c]
+            basis[q, c], basis[q + 1, c] = cos * x + sin * y, cos * y - sin * x

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from himpc.cascade.compiled import piece
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.level import Level
-from himpc.tick.kernel.linear import backward, dot, forward, subtract
+from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
 
 _DEPENDENT = 1e-10
@@ -79,18 +79,9 @@ def resolve(taken: Taken, place: int, D: int, budget: Array) -> float:
     """Row `place` in terms of those before it: its coefficients into `corner`, the direction that is new into
     `basis`, not yet of length one. Returns the length of what is new, 0 if the row depends on the others."""
     budget[0] -= 4.0 * D * (place + 1.0)
-    basis, corner, white = taken.basis, taken.corner[place], taken.white[place]
-    new = basis[place]
-    for c in range(D):
-        new[c] = white[c]
-    for q in range(place):
-        corner[q] = 0.0
-    for _ in range(2):  # the second round takes out what rounding left
-        for q in range(place):
-            share = dot(basis[q], new, D)
-            corner[q] += share
-            subtract(share, basis[q], new, D)
-    length, whole = math.sqrt(dot(new, new, D)), math.sqrt(dot(white, white, D))
+    white = taken.white[place]
+    left = split(white, taken.basis, place, D, taken.corner[place], taken.basis[place])
+    length, whole = math.sqrt(left), math.sqrt(dot(white, white, D))
     return length if length > _DEPENDENT * whole and length > 1e-14 else 0.0
 
 
@@ -111,28 +102,17 @@ def move(taken: Taken, source: int, to: int, D: int) -> None:
         taken.side[source],
     )
     taken.target[to], taken.pull[to] = taken.target[source], taken.pull[source]
-    for c in range(D):
-        taken.normal[to, c], taken.white[to, c] = taken.normal[source, c], taken.white[source, c]
+    copy(taken.normal[source], taken.normal[to], D)
+    copy(taken.white[source], taken.white[to], D)
 
 
 @piece
 def without(taken: Taken, place: int, k: int, D: int, budget: Array) -> None:
     """Lets row `place` of k go; those behind it move up, and rotations make `corner` triangular again."""
     budget[0] -= 6.0 * D * (k - place)
-    corner, basis = taken.corner, taken.basis
     for p in range(place, k - 1):
         move(taken, p + 1, p, D)
-        for q in range(p + 2):
-            corner[p, q] = corner[p + 1, q]
-    for q in range(place, k - 1):
-        length = math.hypot(corner[q, q], corner[q, q + 1])
-        cos, sin = corner[q, q] / length, corner[q, q + 1] / length
-        for p in range(q, k - 1):
-            x, y = corner[p, q], corner[p, q + 1]
-            corner[p, q], corner[p, q + 1] = cos * x + sin * y, cos * y - sin * x
-        for c in range(D):
-            x, y = basis[q, c], basis[q + 1, c]
-            basis[q, c], basis[q + 1, c] = cos * x + sin * y, cos * y - sin * x
+    close_gap(taken.corner, taken.basis, place, k, D)
 
 
 @piece

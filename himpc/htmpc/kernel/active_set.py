@@ -1,0 +1,234 @@
+"""Entry: the dual method of Goldfarb and Idnani for one QP, see `htmpc.active_set`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.compiled import INDICES, MATRIX, VECTOR, WHOLE, entry, piece
+from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
+from himpc.tick.kernel.views import borrowed
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+SOLVED, CONTRADICTION, LIMIT = range(3)
+SCRATCH = 7
+"""Rows of scratch."""
+MOST_STEPS = 600
+"""Rows taken in or let go in one QP: its time is bounded."""
+_CLOSE = 0.05
+"""Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are watched first."""
+_SATISFIED = 1e-9
+_DEPENDENT = 1e-10
+"""A row whose part outside the span of those held is shorter than this share of it depends on them."""
+_ROUNDING = 1e-7
+"""By how much a row that depends on the others may be missed: more is a contradiction."""
+
+
+@piece
+def residual_of(
+    H: Array,
+    g: Array,
+    A: Array,
+    lower: Array,
+    upper: Array,
+    x: Array,
+    multipliers: Array,
+    gradient: Array,
+) -> float:
+    """`himpc.qp.kkt_residual`; gradient is scratch, (n,)."""
+    n = len(g)
+    squares, worst, total = 0.0, 0.0, 0.0
+    for i in range(n):
+        gradient[i] = g[i] + dot(H[i], x, n)
+        squares += dot(H[i], H[i], n)
+    scale = max(1.0, math.sqrt(squares) * math.sqrt(dot(x, x, n)), math.sqrt(dot(g, g, n)))
+    for i in range(len(A)):
+        value = dot(A[i], x, n)
+        worst = max(worst, lower[i] - value, value - upper[i])
+        if multipliers[i] != 0.0:
+            own = upper[i] - value if multipliers[i] > 0.0 else value - lower[i]
+            worst = max(worst, abs(multipliers[i]) * min(abs(own), 1e6) / scale)
+            subtract(-multipliers[i], A[i], gradient, n)
+    for i in range(n):
+        worst = max(worst, abs(gradient[i]) / scale)
+        total += x[i]
+    # `max` may lose what is not a number: the sum cannot.
+    return worst if math.isfinite(total) else math.inf
+
+
+@piece
+def bounds_of(active: Indices, side: Array, count: int, lower: Array, upper: Array, beta: Array) -> None:
+    """β of the rows held."""
+    for c in range(count):
+        beta[c] = lower[active[c]] if side[c] > 0.0 else -upper[active[c]]
+
+
+@piece
+def at_rows(
+    corner: Array, basis: Array, z_0: Array, beta: Array, y: Array, u: Array, z: Array, count: int
+) -> None:
+    """z and u for the rows held as equalities: corner (y + basis z₀) = β, z = z₀ + basisᵀy, cornerᵀu = y."""
+    n = len(z)
+    copy(beta, y, count)
+    forward(corner, y, count)
+    copy(z_0, z, n)
+    for i in range(count):
+        y[i] -= dot(basis[i], z_0, n)
+        subtract(-y[i], basis[i], z, n)
+    copy(y, u, count)
+    backward(corner, u, count)
+
+
+@piece
+def let_go(
+    corner: Array, basis: Array, active: Indices, side: Array, u: Array, place: int, count: int
+) -> None:
+    """Lets go of the row at a place."""
+    for c in range(place, count - 1):
+        active[c], side[c], u[c] = active[c + 1], side[c + 1], u[c + 1]
+    close_gap(corner, basis, place, count, basis.shape[1])
+
+
+@entry(
+    *(MATRIX, MATRIX, VECTOR, MATRIX, VECTOR, VECTOR),
+    *(INDICES, VECTOR, WHOLE, MATRIX, MATRIX, MATRIX, INDICES, INDICES, VECTOR, VECTOR),
+)
+def solve(
+    L: Array,
+    H: Array,
+    g: Array,
+    A: Array,
+    lower: Array,
+    upper: Array,
+    active: Indices,
+    side: Array,
+    count: int,
+    corner: Array,
+    basis: Array,
+    scratch: Array,
+    watched: Indices,
+    seen: Indices,
+    x: Array,
+    multipliers: Array,
+) -> tuple[float, int, int]:
+    """min ½xᵀHx + gᵀx under lower ≤ Ax ≤ upper: the KKT residual, SOLVED or why not, and how many rows hold
+    the point.
+
+    Args:
+        L, H, g, A, lower, upper: the QP, H = LLᵀ (n, n).
+        active, side, count: the rows held, room for n; those of the QP before.
+        corner, basis: the same, see `linear`, room for n + 1.
+        scratch: (SCRATCH, n + 1).
+        watched, seen: scratch, as long as A; seen is zero.
+        x: (n,), the result.
+        multipliers: as long as A, zero; the result.
+    """
+    n, rows = len(g), len(A)
+    A, H, L, scratch = borrowed(A), borrowed(H), borrowed(L), borrowed(scratch)
+    corner, basis = borrowed(corner), borrowed(basis)
+    z_0, z, normal = scratch[0, :n], scratch[1, :n], scratch[2, :n]
+    r, u, y, beta = scratch[3], scratch[4], scratch[5], scratch[6]
+    for i in range(n):
+        z_0[i] = -g[i]
+    forward(L, z_0, n)
+    watching = 0
+    for i in range(rows):
+        near = _CLOSE * min(upper[i] - lower[i], 1.0)
+        if lower[i] > -near or upper[i] < near:
+            seen[i] = 1
+    for c in range(count):
+        seen[active[c]] = 1
+    for i in range(rows):
+        if seen[i]:
+            watched[watching] = i
+            watching += 1
+    # Rows held from before are kept as far as their multipliers have the right sign here.
+    while True:
+        bounds_of(active, side, count, lower, upper, beta)
+        at_rows(corner, basis, z_0, beta, y, u, z, count)
+        least, worst = 0.0, -1
+        for c in range(count):
+            free = lower[active[c]] < upper[active[c]]
+            if not math.isfinite(beta[c]):
+                least, worst = -math.inf, c
+            elif free and u[c] < least:
+                least, worst = u[c], c
+        if worst < 0:
+            break
+        let_go(corner, basis, active, side, u, worst, count)
+        count -= 1
+    status, steps = LIMIT, 0
+    while steps < MOST_STEPS:
+        copy(z, x, n)
+        backward(L, x, n)
+        p, excess, sign = -1, 0.0, 0.0
+        for place in range(watching):
+            i = watched[place]
+            value = dot(A[i], x, n)
+            missing = max(lower[i] - value, value - upper[i])
+            if missing > max(excess, _SATISFIED) and seen[i] != 2:
+                p, excess = i, missing
+                sign = 1.0 if value < lower[i] else -1.0
+        if p < 0:
+            # What adding up steps has lost comes back before the other rows are looked at.
+            bounds_of(active, side, count, lower, upper, beta)
+            at_rows(corner, basis, z_0, beta, y, u, z, count)
+            copy(z, x, n)
+            backward(L, x, n)
+            more = False
+            for i in range(rows):
+                if seen[i] == 0:
+                    value = dot(A[i], x, n)
+                    if max(lower[i] - value, value - upper[i]) > _SATISFIED:
+                        seen[i], more = 1, True
+                        watched[watching] = i
+                        watching += 1
+            if more:
+                continue
+            status = SOLVED
+            break
+        for i in range(n):
+            normal[i] = sign * A[p, i]
+        forward(L, normal, n)
+        bound = lower[p] if sign > 0.0 else -upper[p]
+        own, size = 0.0, dot(normal, normal, n)
+        while steps < MOST_STEPS:
+            steps += 1
+            shares, rest = corner[count], basis[count]
+            across = split(normal, basis, count, n, shares, rest)
+            copy(shares, r, count)
+            backward(corner, r, count)
+            first, blocking = math.inf, -1
+            for c in range(count):
+                if r[c] > 0.0 and lower[active[c]] < upper[active[c]] and u[c] < first * r[c]:
+                    first, blocking = max(u[c], 0.0) / r[c], c
+            missing = bound - dot(normal, z, n)
+            depends = across <= _DEPENDENT * _DEPENDENT * size or count == n
+            full = math.inf if depends else missing / across
+            if depends and blocking < 0:
+                if missing > _ROUNDING:
+                    return math.inf, CONTRADICTION, count
+                seen[p] = 2
+                break
+            step = min(first, full)
+            subtract(step, r, u, count)
+            own += step
+            if not depends:
+                subtract(-step, rest, z, n)
+            if full <= first:
+                length = math.sqrt(across)
+                for i in range(n):
+                    rest[i] /= length
+                shares[count] = length
+                active[count], side[count], u[count] = p, sign, own
+                count += 1
+                break
+            let_go(corner, basis, active, side, u, blocking, count)
+            count -= 1
+    for c in range(count):
+        multipliers[active[c]] -= side[c] * u[c]
+    return residual_of(H, g, A, lower, upper, x, multipliers, normal), status, count

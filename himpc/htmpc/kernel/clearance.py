@@ -1,0 +1,156 @@
+"""Entry: signed distances between spheres and shapes, in closed form, with gradients."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.compiled import (
+    FLAGS,
+    INDICES,
+    MATRICES,
+    MATRIX,
+    NUMBER,
+    VECTOR,
+    entry,
+    piece,
+)
+from himpc.tick.kernel.kinematics import points
+from himpc.tick.kernel.views import borrowed
+from robots.collision import BOX, FLOOR
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@piece
+def from_ball(x: float, y: float, h: float, radius: float, u: Array) -> float:
+    """Distance of a point from a ball about the origin; u: the unit vector away from it."""
+    away = math.sqrt(x * x + y * y + h * h)
+    if away > 0.0:
+        u[0], u[1], u[2] = x / away, y / away, h / away
+    else:
+        u[0], u[1], u[2] = 0.0, 0.0, 1.0
+    return away - radius
+
+
+@piece
+def from_box(x: float, y: float, h: float, turn: Array, half: Array, u: Array) -> float:
+    """The same for a box: from its nearest point; inside, minus the distance to the nearest face."""
+    nearest, face, squares = -math.inf, 0, 0.0
+    for a in range(3):
+        out = abs(turn[0, a] * x + turn[1, a] * y + turn[2, a] * h) - half[a]
+        if out > nearest:
+            nearest, face = out, a
+        squares += max(out, 0.0) ** 2
+    length = math.sqrt(squares)
+    u[0] = u[1] = u[2] = 0.0
+    for a in range(3):
+        here = turn[0, a] * x + turn[1, a] * y + turn[2, a] * h
+        share = max(abs(here) - half[a], 0.0) / length if length > 0.0 else 0.0
+        if length == 0.0 and a == face:
+            share = 1.0
+        for b in range(3):
+            u[b] += turn[b, a] * (share if here >= 0.0 else -share)
+    return length if length > 0.0 else nearest
+
+
+@entry(
+    *(MATRICES, MATRICES, INDICES, MATRIX, INDICES, MATRIX, VECTOR),
+    *(INDICES, INDICES, MATRICES, MATRIX, MATRIX, FLAGS, NUMBER),
+    *(MATRICES, INDICES, INDICES, INDICES, VECTOR, MATRIX, MATRIX),
+)
+def near(
+    placed: Array,
+    z: Array,
+    turns: Indices,
+    moves: Array,
+    joint: Indices,
+    centre: Array,
+    radius: Array,
+    kind: Indices,
+    carrier: Indices,
+    turn: Array,
+    middle: Array,
+    half: Array,
+    meets: NDArray[np.bool_],
+    within: float,
+    centres: Array,
+    knot: Indices,
+    sphere: Indices,
+    shape: Indices,
+    distance: Array,
+    normal: Array,
+    slopes: Array,
+) -> int:
+    """Pairs of a sphere and a shape nearer than `within`, m; returns how many there are.
+
+    A sphere's distance is that of its centre less its radius. Its gradient is the unit vector from the
+    shape to the centre, on the motion of the one against the other.
+
+    Args:
+        placed, z: (K, n+1, …) joints, see `place`. turns, moves: see `Geometry`.
+        joint, centre, radius, kind, carrier, turn, middle, half, meets: see `Surroundings`.
+        centres: scratch, (K, S, 3).
+        knot, sphere, shape: of each pair, room for all; the result.
+        distance, normal: m, and the unit vector, world axes; the result.
+        slopes: the gradients, room for all or for none.
+    """
+    K, n, S, B = len(placed), moves.shape[1], len(radius), len(kind)
+    placed, z, centres, normal = borrowed(placed), borrowed(z), borrowed(centres), borrowed(normal)
+    turn, middle, half, slopes = borrowed(turn), borrowed(middle), borrowed(half), borrowed(slopes)
+    for k in range(K):
+        points(placed[k], joint, centre, centres[k])
+    count = 0
+    for o in range(B):
+        c = carrier[o]
+        for k in range(K):
+            R = placed[k, c]
+            for s in range(S):
+                if not meets[o, s]:
+                    continue
+                # From the shape's middle to the sphere's, in the axes of the shape's carrier.
+                u, C = normal[count], centres[k, s]
+                x, y, h = C[0] - R[9], C[1] - R[10], C[2] - R[11]
+                x, y, h = (
+                    R[0] * x + R[3] * y + R[6] * h - middle[o, 0],
+                    R[1] * x + R[4] * y + R[7] * h - middle[o, 1],
+                    R[2] * x + R[5] * y + R[8] * h - middle[o, 2],
+                )
+                if kind[o] == FLOOR:
+                    found = h
+                    u[0], u[1], u[2] = 0.0, 0.0, 1.0
+                elif kind[o] == BOX:
+                    found = from_box(x, y, h, turn[o], half[o], u)
+                else:
+                    found = from_ball(x, y, h, half[o, 0], u)
+                found -= radius[s]
+                # Neither is what is not a number near.
+                if not found <= within:
+                    continue
+                x, y, h = u[0], u[1], u[2]
+                for a in range(3):
+                    u[a] = R[3 * a] * x + R[3 * a + 1] * y + R[3 * a + 2] * h
+                knot[count], sphere[count], shape[count], distance[count] = k, s, o, found
+                count += 1
+    for r in range(min(count, len(slopes))):
+        k, s, c = knot[r], sphere[r], carrier[shape[r]]
+        u, C = normal[r], centres[k, s]
+        for j in range(1, n + 1):
+            slopes[r, j - 1] = 0.0
+            # What moves both moves neither against the other.
+            sign = moves[joint[s], j - 1] - moves[c, j - 1]
+            if sign == 0.0:
+                continue
+            w, on = z[k, j], placed[k, j]
+            if turns[j]:
+                x, y, h = C[0] - on[9], C[1] - on[10], C[2] - on[11]
+                along = (
+                    u[0] * (w[1] * h - w[2] * y) + u[1] * (w[2] * x - w[0] * h) + u[2] * (w[0] * y - w[1] * x)
+                )
+            else:
+                along = u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+            slopes[r, j - 1] = sign * along
+    return count

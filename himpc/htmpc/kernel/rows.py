@@ -1,0 +1,131 @@
+"""Entries: the rows of (7d), and rows of what depends on q, on the condensed inputs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.compiled import (
+    FIXED,
+    FIXED_VECTOR,
+    INDICES,
+    MATRIX,
+    NUMBER,
+    TABLE,
+    VECTOR,
+    WHOLE,
+    entry,
+)
+
+Array = NDArray[np.float64]
+
+RAMP_STEPS = 10
+"""The input is taken back within at most this many knots beyond the horizon."""
+STOP_STEPS = 40
+"""Braking is watched for at most this many knots beyond the horizon."""
+
+
+@entry(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
+def spread(A: Array, place: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
+    """From a place on, the rows of A (…, N·n) whose values at knots (r,) have slopes (r, n) in q."""
+    n = slopes.shape[1]
+    for r in range(len(knot)):
+        for s in range(len(T_q)):
+            for j in range(n):
+                A[place + r, s * n + j] = T_q[knot[r], s] * slopes[r, j]
+
+
+@entry(
+    *(FIXED, FIXED, FIXED_VECTOR, VECTOR, VECTOR, VECTOR),
+    *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER),
+    *(MATRIX, MATRIX, TABLE),
+)
+def limits(
+    T_v: Array,
+    T_q: Array,
+    t: Array,
+    q: Array,
+    v: Array,
+    u: Array,
+    q_lower: Array,
+    q_upper: Array,
+    v_max: Array,
+    a_max: Array,
+    j_max: Array,
+    period: float,
+    dt: float,
+    A: Array,
+    bounds: Array,
+    labels: NDArray[np.int64],
+) -> int:
+    """Writes the rows of `limit_rows` to the beginning of a table; returns how many there are."""
+    N, n = len(t), len(q)
+    T, count = t[N - 1], 0
+    for kind in range(4):
+        for k in range(N):
+            for i in range(n):
+                a = a_max[i]
+                if kind == 0:
+                    middle, low, high, reach = v[i], -v_max[i], v_max[i], t[k] * a
+                elif kind == 1:
+                    middle, low, high = q[i] + t[k] * v[i], q_lower[i], q_upper[i]
+                    reach = 0.5 * t[k] ** 2 * a
+                elif kind == 2:
+                    middle, low, high, reach = 0.0, -a, a, math.inf
+                else:
+                    change = j_max[i] * (min(period, dt) if k == 0 else dt)
+                    middle, low, high = -u[i] if k == 0 else 0.0, -change, change
+                    reach = a + abs(u[i]) if k == 0 else 2.0 * a
+                low, high = low - middle, high - middle
+                if (math.isfinite(low) or math.isfinite(high)) and (high < reach or low > -reach):
+                    A[count] = 0.0
+                    if kind < 2:
+                        for s in range(k + 1):
+                            A[count, s * n + i] = T_v[k, s] if kind == 0 else T_q[k, s]
+                    else:
+                        A[count, k * n + i] = 1.0
+                        if kind == 3 and k > 0:
+                            A[count, (k - 1) * n + i] = -1.0
+                    bounds[0, count], bounds[1, count] = low, high
+                    labels[0, count], labels[1, count], labels[2, count] = kind, k + (kind < 2), i
+                    count += 1
+    # "ramp": |v_N ± Δt (m u_{N−1} − j Δt m(m+1)/2)| ≤ v_max, speed while the input goes back to zero.
+    for i in range(n):
+        step = j_max[i] * dt
+        if not (math.isfinite(step) and math.isfinite(v_max[i]) and a_max[i] > step):
+            continue
+        for m in range(1, math.ceil(min(a_max[i] / step, RAMP_STEPS)) + 1):
+            A[count] = 0.0
+            for s in range(N):
+                A[count, s * n + i] = T_v[N - 1, s]
+            A[count, (N - 1) * n + i] += m * dt
+            room = v_max[i] + dt * step * m * (m + 1) / 2
+            bounds[0, count], bounds[1, count] = -room - v[i], room - v[i]
+            labels[0, count], labels[1, count], labels[2, count] = 4, N, i
+            count += 1
+    # "stop": q_N + mΔt v_N ∓ ½a(mΔt)² inside the range, where full braking for m steps leads; left out where
+    # the fastest motion that the input bounds permit does not get there.
+    for m in range(1, STOP_STEPS + 1):
+        ahead = m * dt
+        for i in range(n):
+            a = a_max[i]
+            if not (math.isfinite(a) and (math.isfinite(q_lower[i]) or math.isfinite(q_upper[i]))):
+                continue
+            fastest = min(v_max[i], abs(v[i]) + a * T)
+            if not ahead < fastest / a + dt:
+                continue
+            end, brake = q[i] + T * v[i], 0.5 * a * ahead**2
+            far = 0.5 * a * T**2 + ahead * fastest - brake
+            if not (end + far > q_upper[i] or end - far < q_lower[i]):
+                continue
+            A[count] = 0.0
+            for s in range(N):
+                A[count, s * n + i] = T_q[N - 1, s] + ahead * T_v[N - 1, s]
+            coasting = end + ahead * v[i]
+            bounds[0, count] = q_lower[i] - brake - coasting
+            bounds[1, count] = q_upper[i] + brake - coasting
+            labels[0, count], labels[1, count], labels[2, count] = 5, N, i
+            count += 1
+    return count
