@@ -57,13 +57,9 @@ def cached(**options: Any) -> Callable[[Function], Any]:
 _ANY_ORDER = {"reassoc", "contract", "nsz"}
 """Sums may be taken in any order; NaN and infinity keep their meaning."""
 
-piece = njit(
-    error_model="numpy",
-    fastmath=_ANY_ORDER,
-    pipeline_class=Piece,
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-)
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": _ANY_ORDER, "no_cfunc_wrapper": True}
+_PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
+piece = njit(**_PIECE)
 """Compiles a function as a part of every `entry` that calls it, wherever that stands."""
 
 
@@ -88,8 +84,7 @@ def entry(*arguments: Any) -> Callable[[Function], Any]:
             code.replace(co_freevars=("sources",)), function.__globals__, function.__name__, None, (sources,)
         )
         stamped.__module__, stamped.__qualname__ = function.__module__, function.__qualname__
-        options = {"error_model": "numpy", "fastmath": _ANY_ORDER, "pipeline_class": Whole}
-        return _compiled_now(cached(**options, no_cfunc_wrapper=True)(stamped), arguments)
+        return _compiled_now(cached(**_OPTIONS, pipeline_class=Whole)(stamped), arguments)
 
     return compile_now
 
@@ -173,7 +168,9 @@ class _FirstWord(event.Listener):
     def on_start(self, event: Any) -> None:
         if not self._said:
             self._said = True
-            getLogger(__name__).warning("compiling the controller's inner loops: about a minute, this once")
+            getLogger(__name__).warning(
+                "compiling the controller's inner loops: about half a minute, this once"
+            )
 
     def on_end(self, event: Any) -> None:
         """Nothing: it was said."""

@@ -7,14 +7,15 @@ in Python and in C; then it does so again, along with each caller, up to the top
 
 from __future__ import annotations
 
+from abc import ABC
 from typing import Any
 
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 
-class _Linked(JITCodeLibrary):
-    """Code together with the code of all pieces that it calls, each of them once."""
+class _Linking(JITCodeLibrary, ABC):
+    """Code that names the code of all pieces it calls, each of them once."""
 
     def add_linking_library(self, library: Any) -> None:
         """A library whose functions this one calls."""
@@ -24,7 +25,11 @@ class _Linked(JITCodeLibrary):
                 super().add_linking_library(each)
 
 
-class _Loose(_Linked):
+class _Linked(_Linking):
+    """Code together with that of its pieces."""
+
+
+class _Loose(_Linking):
     """Code of one piece, not optimised and without what it calls: nobody can run it as it is."""
 
     @property
@@ -51,22 +56,32 @@ class _Loose(_Linked):
         """Nothing: what would look there is not yet."""
 
 
-class Whole(Compiler):
+class _Compiling(Compiler, ABC):
+    """Compiles into a library of our own."""
+
+    library: type[_Linking]
+
+    def compile_extra(self, func: Any) -> Any:
+        """Numba's entry point."""
+        self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
+        return super().compile_extra(func)
+
+
+class Whole(_Compiling):
     """Compiles a function that Python calls."""
 
     library = _Linked
 
     def compile_extra(self, func: Any) -> Any:
         """Numba's entry point."""
-        self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
-        self.state.library.enable_object_caching()
         found = super().compile_extra(func)
         for each in found._find_referenced_environments():
             found.library.codegen.set_env(each.env_name, each)
         return found
 
 
-class Piece(Whole):
+class Piece(_Compiling):
     """Compiles a function that only compiled functions call. Python must not: there is no code to run."""
 
     library = _Loose

@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from himpc.cascade.compiled import told
 from himpc.cascade.compiling import compile_all, compiled_functions
 from himpc.catalog import CONTROLLERS
+from himpc.tick.kernel.linear import dot
 from lessons.events import Set
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
@@ -127,6 +129,26 @@ def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
     for _ in range(2):
         process = start(tmp_path, script)
         assert process.communicate(timeout=120)[1].splitlines()[-1] == "1"
+
+
+def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> None:
+    """When it changes, those that call it are compiled afresh."""
+    for folder in ("install/parts", "home", "tmp"):
+        (tmp_path / folder).mkdir(parents=True)
+    above, below = SMALL.split("\n\n@entry")
+    (tmp_path / "install" / "parts" / "part.py").write_text(above)
+    (tmp_path / "install" / "small.py").write_text(
+        f"from himpc.cascade.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n@entry{below}"
+    )
+    assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]
+    (tmp_path / "install" / "parts" / "part.py").write_text(f"{above}\n# changed")
+    assert compiled_and_place(start(tmp_path))[0] == 2
+
+
+def test_nobody_but_compiled_code_calls_a_piece() -> None:
+    """There is no code of its own to run: it is said, and nothing crashes."""
+    with pytest.raises(TypeError, match="dot is a piece of compiled functions"):
+        dot(np.ones(2), np.ones(2), 2)
 
 
 def test_the_first_run_equals_the_second(first_and_second_run: tuple[tuple[Path, str], ...]) -> None:

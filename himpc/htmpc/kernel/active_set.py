@@ -24,6 +24,8 @@ _CLOSE = 0.05
 _SATISFIED = 1e-9
 _DEPENDENT = 1e-10
 """A row whose part outside the span of those held is shorter than this share of it depends on them."""
+_ENOUGH = 0.5
+"""See `split`: less left of a row asks for a second round."""
 _ROUNDING = 1e-7
 """By how much a row that depends on the others may be missed: more is a contradiction."""
 
@@ -199,7 +201,7 @@ def solve(
         while steps < MOST_STEPS:
             steps += 1
             shares, rest = corner[count], basis[count]
-            across = split(normal, basis, count, n, shares, rest)
+            across = split(normal, basis, count, n, shares, rest, _ENOUGH)
             copy(shares, r, count)
             backward(corner, r, count)
             first, blocking = math.inf, -1

@@ -93,13 +93,14 @@ def backward(F: Array, x: Array, d: int) -> None:
 
 
 @piece
-def split(row: Array, basis: Array, count: int, n: int, share: Array, rest: Array) -> float:
+def split(row: Array, basis: Array, count: int, n: int, share: Array, rest: Array, enough: float) -> float:
     """A row (n,) as a combination of the first `count` orthonormal ones of `basis`, and a rest.
 
     Args:
         row, basis, count, n: see there.
         share: the coefficients, (count,).
-        rest: what is left, (n,). Where that is little, a second round takes out what rounding left of them.
+        rest: what is left, (n,).
+        enough: a second round takes out what rounding left of them, unless this share of ‖row‖² is left.
 
     Returns:
         ‖rest‖².
@@ -114,7 +115,7 @@ def split(row: Array, basis: Array, count: int, n: int, share: Array, rest: Arra
             share[q] += along
             subtract(along, basis[q], rest, n)
         after = dot(rest, rest, n)
-        if after > 0.5 * before:
+        if after > enough * before:
             break
     return after
 

@@ -17,7 +17,7 @@ _ROUNDS = 4
 """The normal equations lose digits on long horizons; refinement brings them back."""
 _ROUNDING = 2e-14
 """A gradient below this share of ‖G‖‖e‖ is rounding: no better point can be told from this one."""
-_MET = 1e-10
+_MET = 1e-11
 """N·m: how exactly rows that are taken as equalities are met."""
 
 
@@ -80,7 +80,7 @@ def resolve(taken: Taken, place: int, D: int, budget: Array) -> float:
     `basis`, not yet of length one. Returns the length of what is new, 0 if the row depends on the others."""
     budget[0] -= 4.0 * D * (place + 1.0)
     white = taken.white[place]
-    left = split(white, taken.basis, place, D, taken.corner[place], taken.basis[place])
+    left = split(white, taken.basis, place, D, taken.corner[place], taken.basis[place], 1.0)
     length, whole = math.sqrt(left), math.sqrt(dot(white, white, D))
     return length if length > _DEPENDENT * whole and length > 1e-14 else 0.0
 
@@ -152,12 +152,8 @@ def refine(level: Level, taken: Taken, k: int) -> float:
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
     x, z, slope = level.x, level.z, level.slope
-    gradient, lost = math.inf, math.inf
+    gradient, lost, share = math.inf, math.inf, 1.0 / math.sqrt(rho)
     for attempt in range(_ROUNDS + 1):
-        for c in range(d, D):
-            x[c] = 0.0
-        for p in range(k):
-            subtract(taken.pull[p] / rho, taken.normal[p, d:], x[d:], D - d)
         apply(level.seen, x, first, last, level.start, level.offset, level.pushed)
         for j in range(N):
             for i in range(first, last):
@@ -165,32 +161,34 @@ def refine(level: Level, taken: Taken, k: int) -> float:
         add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_1)
         gather_effects(level.C, level.e_1, first, last, level.row_knots, level.pushed)
         gather(level.seen, level.pushed, first, last, level.start, level.offset, slope)
-        subtract(-rho, x, slope, d)
+        for c in range(d, D):
+            slope[c] = 0.0
+        subtract(-rho, x, slope, D)
         lost = 0.0
         for p in range(k):
-            subtract(-taken.pull[p], taken.normal[p], slope, d)
+            subtract(-taken.pull[p], taken.normal[p], slope, D)
             taken.lost[p] = dot(taken.normal[p], x, D) - taken.target[p]
             lost = max(lost, abs(taken.lost[p]))
-        gradient = math.sqrt(dot(slope, slope, d))
+        gradient = math.sqrt(dot(slope, slope, D))
         if gradient <= level.accuracy and lost <= _MET:
             return gradient
         if gradient <= _ROUNDING * level.size[0] * level.size[1] and lost <= _MET:
             break
         if attempt == _ROUNDS:
             break
-        for c in range(d):
-            z[c] = -slope[c]
+        for c in range(D):
+            z[c] = -slope[c] if c < d else -share * slope[c]
         forward(level.F, z, d)
         for p in range(k):
-            taken.change[p] = dot(taken.white[p], z, d) + taken.lost[p]
+            taken.change[p] = dot(taken.white[p], z, D) + taken.lost[p]
         forward(taken.corner, taken.change, k)
         backward(taken.corner, taken.change, k)
         for p in range(k):
-            subtract(taken.change[p], taken.white[p], z, d)
+            subtract(taken.change[p], taken.white[p], z, D)
             taken.pull[p] += taken.change[p]
         backward(level.F, z, d)
-        for c in range(d):
-            x[c] += z[c]
+        for c in range(D):
+            x[c] += z[c] if c < d else share * z[c]
     scale = max(1.0, (rho + level.size[0] * level.size[0]) * math.sqrt(dot(x, x, d)))
     scale = max(scale, level.size[0] * level.size[1])
     residual = max(gradient / scale, lost)
