@@ -81,7 +81,10 @@ class CompiledTick:
         i["known"][:], i["pressed_count"][:], f["U_was"][:] = 0, 0, 0.0
         if memory.x_dot is not None and memory.form is self._form:
             f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
-        f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
+        if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
+            f["path"][:] = memory.predicted_q  # what goes on as it was does so to the last bit
+        else:
+            f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
         for place, level in enumerate(self._form.levels if self._levels else ()):
             before = memory.solutions.get(level.name)
             if before is not None:

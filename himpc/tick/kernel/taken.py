@@ -19,6 +19,8 @@ _ROUNDING = 2e-14
 """A gradient below this share of ‖G‖‖e‖ is rounding: no better point can be told from this one."""
 _MET = 1e-11
 """N·m: how exactly rows that are taken as equalities are met."""
+_WORTH = 1e-8
+"""What the cost may gain by what they are missed by."""
 
 
 class Taken(NamedTuple):
@@ -152,7 +154,7 @@ def refine(level: Level, taken: Taken, k: int) -> float:
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
     x, z, slope = level.x, level.z, level.slope
-    gradient, lost, share = math.inf, math.inf, 1.0 / math.sqrt(rho)
+    gradient, lost, worth, share = math.inf, math.inf, math.inf, 1.0 / math.sqrt(rho)
     for attempt in range(_ROUNDS + 1):
         apply(level.seen, x, first, last, level.start, level.offset, level.pushed)
         for j in range(N):
@@ -164,15 +166,16 @@ def refine(level: Level, taken: Taken, k: int) -> float:
         for c in range(d, D):
             slope[c] = 0.0
         subtract(-rho, x, slope, D)
-        lost = 0.0
+        lost = worth = 0.0
         for p in range(k):
             subtract(-taken.pull[p], taken.normal[p], slope, D)
             taken.lost[p] = dot(taken.normal[p], x, D) - taken.target[p]
-            lost = max(lost, abs(taken.lost[p]))
+            lost, worth = max(lost, abs(taken.lost[p])), max(worth, abs(taken.pull[p] * taken.lost[p]))
         gradient = math.sqrt(dot(slope, slope, D))
-        if gradient <= level.accuracy and lost <= _MET:
+        met = lost <= _MET and worth <= _WORTH
+        if met and gradient <= level.accuracy:
             return gradient
-        if gradient <= _ROUNDING * level.size[0] * level.size[1] and lost <= _MET:
+        if met and gradient <= _ROUNDING * level.size[0] * level.size[1]:
             break
         if attempt == _ROUNDS:
             break
