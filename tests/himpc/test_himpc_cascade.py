@@ -14,6 +14,9 @@ from himpc.cascade.level import LevelProblem
 from himpc.cascade.null_space import RANK_TOLERANCE
 from himpc.limits import Rows
 from himpc.qp import is_installed
+from himpc.tick.kernel.active_set import TOLERANCE
+from himpc.tick.kernel.solve import solve
+from himpc.tick.problems import arena_of
 
 Array = NDArray[np.float64]
 
@@ -142,12 +145,43 @@ def test_warm_starts_change_nothing(seed: int, n: int, N: int, levels: int) -> N
     """What was active a tick ago only saves time: the optimum of the new problem is found all the same."""
     hierarchy = random_hierarchy(seed, n, N, levels)
     before = {solution.name: solution for solution in hierarchy.solve()}
-    rng = np.random.default_rng(seed)
-    moved = [shifted(p, rng.normal(0, 3, p.free.shape)) for p in hierarchy.problems]
-    changed = Hierarchy(moved, hierarchy.rows)
+    changed = with_other_errors(hierarchy, seed)
     warm = changed.solve(previous=before)
     assert_sound(changed, warm)
     assert largest_difference(warm, changed.solve()) <= 1e-6
+
+
+@pytest.mark.parametrize(
+    ("seed", "n", "N", "levels"),
+    [(161, 7, 6, 2), (29, 8, 6, 2), (17, 7, 6, 2), (98, 8, 6, 2), (75, 8, 6, 2), (26, 8, 6, 3)],
+)
+def test_corners_that_many_bounds_make_are_found(seed: int, n: int, N: int, levels: int) -> None:
+    """Where nearly all freedom is at bounds, the rounding of a point looks like a bound that cannot be kept."""
+    hierarchy = with_other_errors(random_hierarchy(seed, n, N, levels), seed)
+    found = hierarchy.solve()
+    assert_sound(hierarchy, found)
+    assert max(len(solution.active) for solution in found) >= 25
+    assert largest_difference(found, hierarchy.solve("explicit")) <= 1e-6
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_level_that_is_tried_once_more_still_follows_its_own_tasks(seed: int) -> None:
+    hierarchy = random_hierarchy(seed, 6, 4, 3)
+    arena = arena_of(hierarchy.problems, hierarchy.rows, {})
+    for place in range(3):
+        assert solve(*arena.arguments, place, 0.0)
+        first = arena.f["U"][place].copy()
+        if place:
+            assert solve(*arena.arguments, place, TOLERANCE)
+            assert np.abs(arena.f["U"][place] - first).max() <= 1e-4
+            arena.f["U"][place] = first
+
+
+def with_other_errors(hierarchy: Hierarchy, seed: int) -> Hierarchy:
+    """The same hierarchy with other free residuals."""
+    rng = np.random.default_rng(seed)
+    moved = [shifted(p, rng.normal(0, 3, p.free.shape)) for p in hierarchy.problems]
+    return Hierarchy(moved, hierarchy.rows)
 
 
 def test_multipliers_tell_what_room_is_worth() -> None:

@@ -181,6 +181,7 @@ def optimum(
         excess, r, a, side = worst(value, low, high)
         if not excess > TOLERANCE:
             return kkt, k
+        exact = True
         while excess > TOLERANCE:
             if not excess < math.inf:
                 return FAILED, 0
@@ -189,15 +190,18 @@ def optimum(
             normal_of(level, taken, k, L, low, high)
             met, k = take(level, taken, k, excess, budget)
             if not met:
-                if excess > _ROUNDED or budget[0] < 0.0:
+                if budget[0] < 0.0 or (exact and excess > _ROUNDED):
                     return FAILED, 0
-                if side > 0:
+                if exact and side > 0:
                     high[r, a] += excess
-                else:
+                elif exact:
                     low[r, a] -= excess
                 balance(level, taken, k, ideal)
                 k = release(level, taken, k, ideal, budget)
             settle(level, taken, k, ideal)
+            if not met and not exact:
+                break  # at a vertex the rounding of a point that is not refined looks like an excess
             increments(level, U)
             sums(U, value)
             excess, r, a, side = worst(value, low, high)
+            exact = False

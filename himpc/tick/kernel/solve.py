@@ -24,7 +24,8 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
     """Problem i of the cascade, those above it known; False if no optimum was found within what is left of
     the tick's budget.
 
-    room: N·m by which bounds give way where the levels above leave none.
+    room: N·m by which bounds give way where the levels above leave none. Positive only to try a level once
+        more: its directions stand from the first attempt and would else count as those of a level above.
     """
     s = vector(whole, whole_where[WHOLE_AT.sizes], 10)
     n, N, M, r, b, w = s[0], s[1], s[2], s[4], s[7], s[8]
@@ -66,8 +67,10 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         matrix(whole, whole_where[WHOLE_AT.active_joint], r, k),
     )
     multiplier, slack = matrix(data, where[AT.multiplier], r, k), matrix(data, where[AT.slack], r, k)
-    own_directions(i, levels, B, metric[i], reflector, Q, seen, count, start)
-    whole[whole_where[WHOLE_AT.left] + i] = count_coordinates(levels[i, KNOTS], n, count, start, offset, rest)
+    if not room > 0.0:
+        own_directions(i, levels, B, metric[i], reflector, Q, seen, count, start)
+        left = count_coordinates(levels[i, KNOTS], n, count, start, offset, rest)
+        whole[whole_where[WHOLE_AT.left] + i] = left
     level = Level(
         levels[i, FIRST],
         levels[i, LAST],
