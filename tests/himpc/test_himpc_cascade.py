@@ -156,7 +156,7 @@ def test_warm_starts_change_nothing(seed: int, n: int, N: int, levels: int) -> N
     [(161, 7, 6, 2), (29, 8, 6, 2), (17, 7, 6, 2), (98, 8, 6, 2), (75, 8, 6, 2), (26, 8, 6, 3)],
 )
 def test_corners_that_many_bounds_make_are_found(seed: int, n: int, N: int, levels: int) -> None:
-    """Where nearly all freedom is at bounds, the rounding of a point looks like a bound that cannot be kept."""
+    """Where nearly all freedom is at bounds, rounding of a point looks like a bound that cannot be kept."""
     hierarchy = with_other_errors(random_hierarchy(seed, n, N, levels), seed)
     found = hierarchy.solve()
     assert_sound(hierarchy, found)
