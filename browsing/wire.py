@@ -41,6 +41,7 @@ class Wire:
         commands: by identity, what the palette holds.
         made: every control there ever was, in the order they came.
         notices: (title, body) of every notification.
+        standing: by identity, of those that were not taken back.
         eye: m, where the page last told the browser to look from.
     """
 
@@ -50,6 +51,7 @@ class Wire:
         self.commands: dict[str, dict[str, Any]] = {}
         self.made: list[dict[str, Any]] = []
         self.notices: list[tuple[str, str]] = []
+        self.standing: dict[str, tuple[str, str]] = {}
         self.eye: tuple[float, ...] = ()
         self._socket = connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None)
         self.say(camera())
@@ -112,6 +114,9 @@ class Wire:
             case "NotificationShowMessage" | "NotificationUpdateMessage":
                 props = message.get("props", message)
                 self.notices.append((str(props.get("title")), str(props.get("body"))))
+                self.standing[message["uuid"]] = self.notices[-1]
+            case "RemoveNotificationMessage":
+                self.standing.pop(message["uuid"], None)
             case "SetCameraPositionMessage":
                 self.eye = tuple(message["position"])
             case "GuiRemoveMessage":

@@ -13,6 +13,7 @@ import tyro
 from app.commands.output import print_table, write_json
 from app.commands.progress import progress_bar
 from robots import InputError
+from robots.errors import unknown_name
 
 if TYPE_CHECKING:
     from lessons.exercises.grade import Grade
@@ -30,12 +31,14 @@ def grade(
 ) -> int:
     """Judge a solution of an exercise by what it does; without a file, list the exercises.
 
+    The name of an exercise instead of a file shows that one, with --hints N as many of its hints.
+
     Every file is run in a process of its own, a minute at most. A folder of submissions gives one table;
     stopped, the same command carries on. Exit code 0: all points; 1: some are missing; 2: it cannot be run.
 
     Args:
-        file: Python file with the solution, or a folder of them; or a text of what a learner did, as the
-            page wrote it.
+        file: Python file with the solution, or a folder of them; or the name of an exercise; or a text of
+            what a learner did, as the page wrote it.
         exercise: name of the exercise; by default what the file says in EXERCISE.
         hints: show so many hints of the exercise.
         seed: decides the disturbances.
@@ -45,11 +48,14 @@ def grade(
         key: file with the key of your lab, to tell whether it signed what was handed in.
         json: write JSON to this file, or to standard output for "-".
     """
+    from lessons.exercises import EXERCISES
     from lessons.exercises.grade import as_data
     from lessons.exercises.grade import grade as grade_file
 
-    if file is None:
-        return _list(exercise, hints, json)
+    if file is None or (exercise is None and str(file) in EXERCISES and not file.exists()):
+        return _list(None if file is None else str(file), hints, json)
+    if not file.exists() and exercise is None and not file.suffix:
+        raise unknown_name("file or exercise called", str(file), EXERCISES)
     if file.is_dir():
         return _folder(file, exercise, seed, out, scheduler, json)
     if file.suffix in _TEXTS:

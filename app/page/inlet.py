@@ -10,6 +10,7 @@ from typing import Any
 import viser
 
 from app.adapter import private
+from app.adapter.late import too_late
 from app.page.values import NotAllowed, allowed, in_reach
 from app.panels.widgets.in_view import tells_what_is_seen
 
@@ -39,6 +40,9 @@ class Inlet:
                 case _:
                     await go_on(message)
         except Exception as error:
+            if too_late(error):
+                self._say("Not taken", _GONE)
+                return
             traceback.print_exc()
             self._say("That did not work", f"{type(error).__name__}: {error}"[:300])
 

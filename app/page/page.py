@@ -19,6 +19,7 @@ from app.client.progress import Notebook
 from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.messages import Ready
+from app.page.fault import FaultNotice
 from app.page.inlet import Inlet
 from app.panels.widgets.command import add_command
 from lessons.scenes.names import ALL_SCENES
@@ -56,6 +57,7 @@ class Page:
         self._greet = greet
         self._client = client
         self._inlet = Inlet(client)
+        self._fault = FaultNotice(client)
         self._dark = dark
         self._by_path = by_path
         self._event_loop = loop
@@ -143,6 +145,7 @@ class Page:
         """What is wrong with the learner's own code; says also when a saved text took over."""
         status = self.learner.status
         own = None if status is None else status.own
+        self._fault.show(None if own is None else own.fault)
         if own is None:
             return None
         if own.saves > self._saves:

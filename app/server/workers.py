@@ -9,6 +9,8 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
+from app.adapter.late import too_late
+
 THREADS = 4
 WAITING = 64
 """Calls that wait for a thread; whatever comes beside them is dropped."""
@@ -26,7 +28,7 @@ class Workers(ThreadPoolExecutor):
         if not self._room.acquire(blocking=False):
             return _dropped()
         try:
-            future = super().submit(fn, *args, **kwargs)
+            future = super().submit(_in_time, fn, *args, **kwargs)
         except RuntimeError:  # shut down: its page has been closed
             self._room.release()
             return _dropped()
@@ -38,6 +40,16 @@ def told(future: Future[Any]) -> None:
     """Done-callback: an exception in a thread of its own is not lost."""
     if not future.cancelled() and (error := future.exception()) is not None:
         traceback.print_exception(error, file=sys.stderr)
+
+
+def _in_time(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """What it gives; None if what it wrote to is gone meanwhile."""
+    try:
+        return fn(*args, **kwargs)
+    except RuntimeError as error:
+        if not too_late(error):
+            raise
+        return None
 
 
 def _dropped() -> Future[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,6 +12,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.process import wait_until
+from app.panels.torque.add_task import AddTask
 from app.server.server import PageServer
 from browsing.wire import Wire
 from himpc.tasks.axes import OnAxes
@@ -127,6 +129,38 @@ def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) 
         assert wait_until(lambda: np.allclose(target(), before), LONG)
         assert wait_until(lambda: wire.controls[first]["value"] == pytest.approx(before[0], abs=0.051), LONG)
         assert wire.find("x, °") is None and wire.notices == []
+
+
+def test_a_control_may_be_written_after_its_panel_was_rebuilt(
+    server: PageServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A callback that is still on its way when its controls are taken away ends without a word."""
+    begun, rebuilt, ended = (threading.Event() for _ in range(3))
+    show = AddTask._show
+
+    def slowly(panel: AddTask) -> None:
+        if threading.current_thread().name.startswith("page"):
+            begun.set()
+            rebuilt.wait(LONG)
+            try:
+                show(panel)
+            finally:
+                ended.set()
+        else:
+            show(panel)
+
+    monkeypatch.setattr(AddTask, "_show", slowly)
+    with Wire(server.url) as wire:
+        choose(wire, "Kind", "com")
+        assert begun.wait(LONG)
+        press(wire, "Add")
+        shown(wire, "Remove com")
+        rebuilt.set()
+        assert ended.wait(LONG)
+        choose(wire, "Kind", "damping")  # its callback comes after the other one's end
+        assert wait_until(lambda: wire.shows("all joints come to rest"), LONG)
+    said = capfd.readouterr()
+    assert "removed" not in said.err + said.out
 
 
 def axes(learner: Learner, name: str) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import pytest
 
-from app.html.text import figure, readable
-from app.panels.lesson.exercise_cards import belonging_to, exercise_cards
+from app.html.text import figure, formula, readable
+from app.panels.lesson.exercise_cards import belonging_to, card, exercise_cards
 from lessons.course import COURSE
 from lessons.exercises import EXERCISES, load_exercise, start_of
 
@@ -16,6 +18,18 @@ def test_an_exercise_has_its_card_and_ends_its_lesson(name: str) -> None:
     for html in (exercise_cards(), belonging_to(exercise.lesson)):
         assert f"--from {name}" in html
         assert f"--scene {exercise.scene} --controller" in html
+        assert formula(exercise.equation) in html
+        assert all(escape(check.text) in html for check in exercise.checks(0))
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_hints_of_an_exercise_open_one_by_one(name: str) -> None:
+    """Each is inside what the one before unfolds."""
+    hints = load_exercise(name).hints
+    opened = card(load_exercise(name)).split("<summary>Hint ")
+    assert [each[0] for each in opened[1:]] == [str(number) for number in range(1, len(hints) + 1)]
+    assert "</details>" not in "".join(opened[1:-1])
+    assert opened[-1].count("</details>") == len(hints)
 
 
 @pytest.mark.parametrize("name", EXERCISES)

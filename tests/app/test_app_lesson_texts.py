@@ -18,9 +18,26 @@ from app.link.exercise import Curve, Exercise, Lecture
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.logarithmic import STEPS, place_of, value_at
+from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
 from lessons.replay.progress import Progress, progress_from
 from lessons.teaching.prediction import Grade, Value
+
+CALLED = {
+    "com": "centre of mass",
+    "relative_position": "relative pose",
+    "relative_orientation": "relative pose",
+    "relative_pose": "relative pose",
+    "plane_distance": "distance to a plane",
+}
+"""Kinds of tasks whose word on the command line is not the one of the glossary."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_task_is_a_word_with_its_unit(kind: str) -> None:
+    meaning = words()[CALLED.get(kind, kind)]
+    unitless = ("pose", "damping")  # a pose is two kinds, and damping has no target
+    assert kind in unitless or " in m" in meaning or " in rad" in meaning
 
 
 def test_progress_survives_the_browser_and_whatever_stands_there() -> None:

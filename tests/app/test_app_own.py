@@ -154,8 +154,16 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
             file.write_text("def torque(now):\n    return oops\n")
             assert eventually(lambda: page.shows("line 2: NameError"))
             assert page.shows("YOUR CODE")
+
+            def faults() -> list[str]:  # in sight wherever the panel is scrolled to
+                return [body for title, body in list(page.standing.values()) if title == "Your code"]
+
+            assert ["line 2: NameError" in each for each in faults()] == [True]
+            file.write_text("def torque(now):\n    return now.q[7]\n")
+            assert eventually(lambda: ["line 2: IndexError" in each for each in faults()] == [True])
             file.write_text(HOLDS + "\n")
             assert eventually(lambda: any("took over at t" in body for _, body in page.notices))
+            assert eventually(lambda: faults() == [])
             learner.load(SceneChoice(RunSpec("planar3-circle")))
             assert eventually(lambda: learner.choice.run.scene == "planar3-circle")
             assert learner.settings is not None

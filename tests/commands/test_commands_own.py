@@ -72,12 +72,13 @@ def test_new_writes_over_nothing_of_ones_own(capsys: pytest.CaptureFixture[str])
 def test_grade_lists_the_exercises_and_their_own_hints(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["grade"]) == 0
     assert "joint-pd" in capsys.readouterr().out
-    import app.commands.grade as command
-
-    assert command.grade(None, "two-levels", hints=2) == 0
+    assert main(["grade", "two-levels", "--hints", "2"]) == 0
     out = capsys.readouterr().out
     assert "hint 2 of 4" in out
     assert "hint 3" not in out
+    assert "joint-pd" not in out
+    assert main(["grade", "two-level"]) == 2
+    assert "did you mean 'two-levels'" in capsys.readouterr().err
 
 
 def test_grade_has_exit_codes_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,10 +1,12 @@
-"""Exercises as cards: what to write, and the commands that begin and judge it."""
+"""Exercises as cards: what to write, the commands that begin and judge it, what it is judged by, hints."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from app.html.markdown import rendered_line
-from app.html.palette import LEVELS, css
-from app.html.text import block, esc
+from app.html.palette import DAMPING, LEVELS, css
+from app.html.text import badge, block, esc, formula, readable
 from lessons.course import load_lesson
 from lessons.exercises import EXERCISES, exercises_of, load_exercise
 from lessons.exercises.exercise import Exercise
@@ -31,6 +33,24 @@ def card(exercise: Exercise) -> str:
     return block(
         f"<b>{esc(exercise.card.title)}</b><br>{rendered_line(exercise.card.question)}"
         f'<div style="opacity:0.75">{exercise.card.minutes} min · after “{esc(lesson)}”</div>'
-        f'<div style="overflow-wrap:anywhere">{lines}</div>',
+        f"{formula(exercise.equation)}"
+        f'<div style="overflow-wrap:anywhere">{lines}</div>'
+        f"{_judged_by(exercise)}{_hints(exercise.hints)}",
         f"border-left:3px solid {css(LEVELS[0])};margin:0.3em 0",
     )
+
+
+def _judged_by(exercise: Exercise) -> str:
+    lines = "".join(
+        f"<li>{esc(each.text)} {esc(readable(each.condition))} {badge(f'{each.points}', DAMPING)}</li>"
+        for each in exercise.checks(0)
+    )
+    return f"<details><summary>What it is judged by, with points</summary><ul>{lines}</ul></details>"
+
+
+def _hints(hints: Sequence[str], number: int = 1) -> str:
+    """The first hint to unfold; the next one is found in it."""
+    if not hints:
+        return ""
+    first = rendered_line(hints[0])
+    return f"<details><summary>Hint {number}</summary>{first}{_hints(hints[1:], number + 1)}</details>"
