@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -24,6 +26,14 @@ JOINT_CAPS = Caps(speed=1.0, acceleration=5.0, jerk=100.0)
 
 _ROOM = 200
 """Periods after which the samples that are left move to the front of a new array."""
+
+
+@cache
+def _filter() -> Callable[..., None]:
+    """It loads the compiler: only a target that moves needs it."""
+    from himpc.tick.kernel.target import roll
+
+    return roll
 
 
 class Target:
@@ -53,7 +63,7 @@ class Target:
         self._samples = np.zeros((2, value.size + 3 * self._m + 1))
         self._samples[0, : value.size], self._samples[0, -1], self._known = value.ravel(), 1.0, 1
         self._time: float | None = None
-        self._period = 0.0
+        self._period, self._rests = 0.0, True
         self._rest: tuple[int, Preview] | None = None
 
     @property
@@ -64,7 +74,7 @@ class Target:
     def move(self, raw: Array) -> None:
         """Puts the hand somewhere else. The motion so far continues smoothly from where it is."""
         self.raw = np.array(raw, float)
-        self._samples[0, -1] = 0.0
+        self._samples[0, -1], self._rests = 0.0, False
         self._forget_future()
 
     def jump(self, value: Array) -> None:
@@ -76,36 +86,59 @@ class Target:
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         """The filtered motion at t … t + N·T_s; each later t advances the filter by one period."""
+        if self._rests_at(t, T_s):
+            if self._rest is None or self._rest[0] != N:
+                self._rest = N, self._gathered(np.zeros((3, N + 1, self._m)))
+            return self._rest[1]
+        motion = np.empty((3, N + 1, self._m))
+        self._roll(motion)
+        return self._gathered(motion)
+
+    def stays(self, t: float, seen: object) -> bool:
+        """Whether the preview at t is what somebody has seen before: the target rests."""
+        if self._rest is None or self._rest[1] is not seen:
+            return False
+        self._time = t
+        return True
+
+    def show(self, t: float, T_s: float, motion: Array) -> Array | None:
+        """`preview`, without its objects, for whoever asks every period.
+
+        Args:
+            t, T_s: s.
+            motion: takes displacement, velocity and acceleration, (3, N+1, m).
+
+        Returns:
+            x_d, its numbers row by row. None, and nothing is written, if the target rests or is seen in some
+            of its axes only.
+        """
+        if self._axes is not None or motion.shape[2] != self._m or self._rests_at(t, T_s):
+            return None
+        self._roll(motion)
+        return self._samples[0, : self.raw.size]
+
+    def _rests_at(self, t: float, T_s: float) -> bool:
         if T_s != self._period:
             self._period = T_s
             self._forget_future()
         later, self._time = self._time is not None and t > self._time, t
-        rests = self._samples[0, -1] > 0.0
-        if later and not rests:
+        if later and not self._rests:
             if self._known == 1:
-                self._roll(1)
+                self._roll(np.empty((3, 2, self._m)))
             self._samples = self._samples[1:]
             self._known -= 1
-            rests = self._samples[0, -1] > 0.0
-        if rests:
-            if self._rest is None or self._rest[0] != N:
-                self._rest = N, self._gathered(np.zeros((3, N + 1, self._m)))
-            return self._rest[1]
-        return self._gathered(self._roll(N))
+            self._rests = bool(self._samples[0, -1] > 0.0)
+        return self._rests
 
-    def _roll(self, N: int) -> Array:
-        """Displacement, velocity and acceleration at knots 0 … N, (3, N+1, m)."""
-        # It loads the compiler: only a target that moves needs it.
-        from himpc.tick.kernel.target import roll
-
-        if len(self._samples) < N + 2:
-            samples = np.zeros((N + 2 + _ROOM, self._samples.shape[1]))
+    def _roll(self, motion: Array) -> None:
+        """Displacement, velocity and acceleration at knots 0 … N into (3, N+1, m) numbers."""
+        count = motion.shape[1]
+        if len(self._samples) < count + 1:
+            samples = np.zeros((count + 1 + _ROOM, self._samples.shape[1]))
             samples[: self._known] = self._samples[: self._known]
             self._samples = samples
-        motion = np.empty((3, N + 1, self._m))
-        roll(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
-        self._known = max(self._known, N + 1)
-        return motion
+        _filter()(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
+        self._known = max(self._known, count)
 
     def _gathered(self, motion: Array) -> Preview:
         seen = motion if self._axes is None else motion[:, :, self._axes]

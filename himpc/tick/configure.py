@@ -132,9 +132,15 @@ def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach
         f["R_d"][place] = preview.value
     else:
         f["x_d"][span] = preview.value
-    f["displacement"][:, span] = preview.displacement[:reach]
-    f["velocity_d"][:, span] = preview.velocity[:reach]
-    f["acceleration_d"][:, span] = preview.acceleration[:reach]
+    write_motion(arena, span, preview, reach)
+
+
+def write_motion(arena: Arena, span: slice, preview: Preview, reach: int) -> None:
+    """How a reference moves from where it is, at `reach` knots; one knot stands for all."""
+    motion = arena.f["motion"]
+    motion[0, :, span] = preview.displacement[:reach]
+    motion[1, :, span] = preview.velocity[:reach]
+    motion[2, :, span] = preview.acceleration[:reach]
 
 
 def write_curve(arena: Arena, place: int, span: slice, reference: Reference) -> bool:

@@ -31,7 +31,7 @@ def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequen
         (size,), or None if the row has a task that the arena knows no reference of.
     """
     found = np.full(layout.size, arena.where[AT.nothing])
-    n, fields = len(layout.joints), layout.fields
+    n, fields, knots = len(layout.joints), layout.fields, arena.f["motion"][0].size
 
     def put(field: str, name: str, skipped: int = 0) -> None:
         where = fields[field]
@@ -55,8 +55,9 @@ def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequen
         else:
             put(f"x/{info.name}", "value", first)
             put(f"x_d/{info.name}", "x_d", first)
-        for field, name in (("error", "error"), ("v_d", "velocity_d"), ("a_d", "acceleration_d")):
-            put(f"{field}/{info.name}", name, first)
+        put(f"error/{info.name}", "error", first)
+        for which, field in ((1, "v_d"), (2, "a_d")):
+            put(f"{field}/{info.name}", "motion", which * knots + first)
     for place, level in enumerate(levels):
         for field in ("cost", "kkt", "rung", "time_us", "leak", "active"):
             put(f"{field}/{level}", field, place)

@@ -9,7 +9,7 @@ import numpy as np
 from himpc.configuration import Configuration
 from himpc.references import Preview
 from himpc.tasks import FrameOrientation, Task
-from himpc.tick.configure import Span, is_built_in
+from himpc.tick.configure import Span, is_built_in, write_motion
 from himpc.tick.kernel.arena import Arena, Array
 from robots import Robot
 
@@ -67,7 +67,4 @@ class GivenRows:
             self._arena.f["value"][span] = value
 
     def _ask(self, span: slice, asked: Preview) -> None:
-        f, reach = self._arena.f, len(self._arena.f["displacement"])
-        f["displacement"][:, span] = asked.displacement[:reach]
-        f["velocity_d"][:, span] = asked.velocity[:reach]
-        f["acceleration_d"][:, span] = asked.acceleration[:reach]
+        write_motion(self._arena, span, asked, len(self._arena.f["path"]))

@@ -24,6 +24,7 @@ from himpc.tick.given import GivenRows
 from himpc.tick.kernel.arena import NOW, Array, Snapshot
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
+from himpc.tick.kernel.references import SAMPLED
 from himpc.tick.ladder import Asks, solve_levels
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, budget_of, write_effects
@@ -201,21 +202,35 @@ class CompiledTick:
             self._limits = limits
             write_limits(self.arena, limits, len(self._kinds) == 3)
         references: Mapping[str, Reference] = {}
+        t = 0.0
         if isinstance(previews, Outlook):
-            references, f["scalars"][NOW] = previews.references, previews.t
+            references, t = previews.references, previews.t
+            f["scalars"][NOW] = t
         for place, task, span in self._led:
             reference, read = references.get(task.name), self._read.get(place)
-            if reference is not None and reference is read:
+            target = reference if isinstance(reference, Target) else None
+            if (reference is not None and reference is read) or (target and target.stays(t, read)):
                 continue
-            dragged = isinstance(reference, Target)
-            if reference is not None and not dragged and write_curve(self.arena, place, span, reference):
+            if target and self._shows(place, span, target, t):
+                self._read[place] = None
+            elif reference is not None and not target and write_curve(self.arena, place, span, reference):
                 self._read[place] = reference
-                continue
-            preview = previews[task.name]
-            if preview is not read:
-                write_preview(self.arena, place, span, preview, self._settings.horizon + 1)
-            # A target at rest shows the same preview again; of others nobody knows whether it has changed.
-            self._read[place] = preview if dragged else None
+            else:
+                preview = previews[task.name]
+                if preview is not read:
+                    write_preview(self.arena, place, span, preview, self._settings.horizon + 1)
+                # A target at rest shows it again; of others nobody knows whether it has changed.
+                self._read[place] = preview if target else None
+
+    def _shows(self, place: int, span: slice, target: Target, t: float) -> bool:
+        """Whether a target on its way has put its motion where the kernel reads it."""
+        f = self.arena.f
+        x_d = target.show(t, self._settings.T_s, f["motion"][:, :, span])
+        if x_d is None:
+            return False
+        self.arena.i["law"][place] = SAMPLED
+        (f["x_d"][span] if target.raw.ndim == 1 else f["R_d"][place].reshape(9))[:] = x_d
+        return True
 
     def _solutions(self, found: Snapshot, rungs: Sequence[tuple[Rung, float]]) -> list[LevelSolution]:
         return solutions([level.name for level in self._form.levels], found, rungs) if self._levels else []

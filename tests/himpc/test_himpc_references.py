@@ -95,6 +95,40 @@ def test_an_eased_phase_rests_at_both_ends_of_a_turn() -> None:
 # ------------------------------------------------------------------ the dragged target
 
 
+@given(seeds, st.booleans(), st.integers(1, 12))
+@settings(max_examples=30)
+def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: int) -> None:
+    """A target that is read without objects goes the same way to the last bit, also through rest and moves."""
+    rng = np.random.default_rng(seed)
+    start = np.eye(3) if turns else np.zeros(3)
+    one, other = Target(start), Target(start)
+    room = np.full((3, N + 1, 5), np.nan)
+    motion, seen = room[:, :, 1:4], None
+    shown = stayed = 0
+    moves = {int(k): rng.normal(0, 0.02, 3) for k in rng.integers(0, 300, 3)}
+    for k in range(900):
+        if k in moves:
+            for target in (one, other):
+                target.move(exp3(moves[k]) if turns else moves[k])
+        t = k * T_S
+        wanted = one.preview(t, T_S, N)
+        if other.stays(t, seen):
+            stayed += 1
+        else:
+            x_d = other.show(t, T_S, motion)
+            shown += x_d is not None
+            if x_d is None:
+                seen = other.preview(t, T_S, N)
+                x_d, motion[0], motion[1], motion[2] = seen.value.ravel(), *seen[1:]
+            else:
+                seen = None
+            value = x_d.copy()
+        np.testing.assert_array_equal(value.reshape(start.shape), wanted.value)
+        for found, expected in zip(motion, wanted[1:], strict=True):
+            np.testing.assert_array_equal(found, expected)
+    assert shown > 200
+
+
 def drive(target: Target, ticks: int, hand: Callable[[int], Array | None], N: int = 5) -> list[Preview]:
     """The previews of `ticks` control periods; `hand(k)` may move the raw target before tick k."""
     previews = []

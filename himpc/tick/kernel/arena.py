@@ -24,9 +24,7 @@ NUMBERS = {
     "tau_0": "n",
     "x_d": "M",
     "R_d": "T 3 3",
-    "displacement": "N1 M",
-    "velocity_d": "N1 M",
-    "acceleration_d": "N1 M",
+    "motion": "3 N1 M",  # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
     "given": "N1 G n",
     "curve": "M 4",
     "pace": "T 2",

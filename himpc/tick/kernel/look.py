@@ -77,11 +77,8 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         place(at, parent, turns, turn, shift, axis, placed, z)
         points(placed, frame_joint, frame_shift, point)
         jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[j], B[j])
-    displacement, velocity_d, acceleration_d = (
-        matrix(data, where[AT.displacement], N + 1, M),
-        matrix(data, where[AT.velocity_d], N + 1, M),
-        matrix(data, where[AT.acceleration_d], N + 1, M),
-    )
+    motion = matrices(data, where[AT.motion], 3, N + 1, M)
+    displacement, velocity_d, acceleration_d = motion[0], motion[1], motion[2]
     curves(
         scalars[NOW],
         T_s,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.cascade.compiled import MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
+from himpc.cascade.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.kinematics import turned_away
 from himpc.tick.kernel.linear import copy, dot
@@ -120,7 +120,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
             then[a] = now[a] + step[a]
 
 
-@entry(MATRIX, WHOLE, VECTOR, VECTOR, NUMBER, MATRICES)
+@entry(MATRIX, WHOLE, VECTOR, VECTOR, NUMBER, GIVEN_MATRICES)
 def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: Array) -> None:
     """Rolls the filter forward with the raw target frozen, and gathers its preview.
 
