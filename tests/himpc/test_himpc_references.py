@@ -98,7 +98,7 @@ def test_an_eased_phase_rests_at_both_ends_of_a_turn() -> None:
 @given(seeds, st.booleans(), st.integers(1, 12))
 @settings(max_examples=30)
 def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: int) -> None:
-    """A target that is read without objects goes the same way to the last bit, also through rest and moves."""
+    """A target that is read without objects goes the same way to the last bit, through rest and moves."""
     rng = np.random.default_rng(seed)
     start = np.eye(3) if turns else np.zeros(3)
     one, other = Target(start), Target(start)
