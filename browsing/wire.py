@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import msgspec
@@ -40,6 +40,7 @@ class Wire:
         controls: by identity, what the page shows, as the message that made it with the updates since.
         commands: by identity, what the palette holds.
         made: every control there ever was, in the order they came.
+        controls_3d: by name, to whom arrows and rings in the 3D view belong.
         notices: (title, body) of every notification.
         standing: by identity, of those that were not taken back.
         eye: m, where the page last told the browser to look from.
@@ -50,6 +51,7 @@ class Wire:
         self.controls: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, dict[str, Any]] = {}
         self.made: list[dict[str, Any]] = []
+        self.controls_3d: dict[str, str] = {}
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
         self.eye: tuple[float, ...] = ()
@@ -76,6 +78,12 @@ class Wire:
     def write(self, uuid: str, /, **updates: Any) -> None:
         """Writes attributes of a control, as its input does with `value`."""
         self.say(_messages.GuiUpdateMessage(uuid, updates))
+
+    def turn(self, node: str, xyzw: Sequence[float]) -> None:
+        """Turns rings in the 3D view to an orientation."""
+        x, y, z, w = (float(part) for part in xyzw)
+        owner = self.controls_3d[node]
+        self.say(_messages.TransformControlsUpdateMessage(node, (w, x, y, z), (0.0, 0.0, 0.0), owner))
 
     def press_key(self, hotkey: str) -> None:
         """Triggers the command that has a key."""
@@ -119,6 +127,8 @@ class Wire:
                 self.standing.pop(message["uuid"], None)
             case "SetCameraPositionMessage":
                 self.eye = tuple(message["position"])
+            case "TransformControlsMessage":
+                self.controls_3d[message["name"]] = message["owner"]
             case "GuiRemoveMessage":
                 self.controls.pop(message["uuid"], None)
             case "GuiUpdateMessage" if message["uuid"] in self.controls:

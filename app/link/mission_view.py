@@ -10,8 +10,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class MissionRow:
-    """A task of a mission. goal: m, None for a given trajectory; hold: s at the goal, None: until released;
-    there_s: for how long it has been at its goal; done_at: s, when it was completed."""
+    """A task of a mission. goal: m, or x y z w of an orientation; None for a given trajectory; hold: s at the
+    goal, None: until released; there_s: for how long it has been at its goal; done_at: s, when it was
+    completed."""
 
     name: str
     role: str

@@ -44,6 +44,7 @@ class VelocityFace:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._points = [task for task in context.ready.tasks if task.kind == "position"]
+        self._turned = next((task for task in context.ready.tasks if task.kind == "orientation"), None)
         self._base = base_joints(context.ready.robot)
 
     # ---------------------------------------------------------------- building
@@ -90,13 +91,20 @@ class VelocityFace:
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         del robot  # velocity servos do not feel a pull
         context, ready = self._context, self._context.ready
-        size = gizmo_size(ready.robot)
+        size, poses = gizmo_size(ready.robot), context.poses()
         self._frames = Frames(scene)
         self._obstacles = Obstacles(scene, self._put)
         self._people = People(scene)
         self._carried = Carried(scene)
         self._goals = Goals(
-            scene, ready, context.colours, size, context.post, self._status, self._begin.dragged
+            scene,
+            ready,
+            context.colours,
+            np.zeros((ready.robot.n + 1, 7)) if poses is None else poses,
+            size,
+            context.post,
+            self._status,
+            self._begin.dragged,
         )
         self._trails = {
             task.name: Trails(scene, [], context.colours[task.level], f"_{task.name}", scale=1)
@@ -159,6 +167,7 @@ class VelocityFace:
     def follow(self, moment: Moment) -> None:
         tip = moment.poses[-1]
         self._frames.actual(tip)
+        self._goals.turn(moment.poses, moment.status.targets, moment.live)
         if self._base:
             self._along.follow(moment.poses[len(self._base) - 1, :3], bool(self._begin.along.value))
         mission = moment.status.mission
@@ -196,11 +205,12 @@ class VelocityFace:
         self._joint_plots.draw(moment.window, beside)
 
     def _draw_desired(self, latest: np.ndarray) -> None:
-        """What the hand is to do now: the point of its reference."""
-        hand = next((task for task in self._points if "z" in task.axes), None)
+        """What the hand is to do now: the point of its reference, turned as its orientation's is."""
+        hand, turned = next((task for task in self._points if "z" in task.axes), None), self._turned
         if hand is not None:
             fields = self._context.ready.layout.fields
-            self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), None)
+            wanted = None if turned is None else latest[fields[f"x_d/{turned.name}"]]
+            self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), wanted)
 
     def write(self, now: Snapshot[VelocitySettings]) -> None:
         self._begin.update(now)

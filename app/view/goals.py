@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import viser
@@ -13,7 +14,8 @@ from app.html.text import free_name, quantity
 from app.link.messages import Ready, Status, TaskView
 from app.link.mission_view import MissionRow
 from app.view.goal import Goal
-from lessons.events import InsertTask, MoveTarget
+from app.view.targets import Targets
+from lessons.events import Event, InsertTask, MoveTarget
 
 _THERE = 5e-3
 """m: a point this near has got there."""
@@ -30,20 +32,22 @@ def open_row(rows: Sequence[MissionRow], role: str) -> MissionRow | None:
 
 
 class Goals:
-    """A goal per position role. One that is sent along a given trajectory from the start cannot be dragged:
-    it shows what is asked of its point now."""
+    """A goal per position role, rings about the robot's hand per orientation role. One that is sent along a
+    given trajectory from the start cannot be dragged: it shows what is asked of its point now."""
 
     def __init__(
         self,
         scene: viser.SceneApi,
         ready: Ready,
         colours: dict[str, RGB],
+        poses: np.ndarray,
         size: float,
         post: Send,
         status: Callable[[], Status | None],
         dragged: Callable[[], None],
     ) -> None:
-        """size: of the arrows of a hand, m; status: the newest one; dragged: called at every move."""
+        """poses (n + 1, 7): of joints and tip now; size: of the arrows of a hand, m; status: the newest one;
+        dragged: called at every move."""
         self._post, self._status, self._dragged = post, status, dragged
         self._roles = {task.name: task for task in ready.tasks if task.kind == "position"}
         self._given = frozenset(name for name, task in self._roles.items() if task.raw is None)
@@ -60,6 +64,8 @@ class Goals:
             for name, task in self._roles.items()
         }
         self._asked: dict[str, str] = {}
+        turning = tuple(task for task in ready.tasks if task.kind == "orientation")
+        self._rings = Targets(scene, replace(ready, tasks=turning), colours, poses, 0.75 * size, self._turned)
 
     def _moved(self, task: TaskView, place: np.ndarray) -> None:
         """Moves the role's open task; if none is left, a new one keeps the point where the hand puts it."""
@@ -77,6 +83,20 @@ class Goals:
         else:
             name = self._asked[task.name] = free_name(f"{task.name} by hand", names)
             self._post(InsertTask(name, task.name, goal, hold=None))
+
+    def _turned(self, event: Event) -> None:
+        """Turns the role's open task."""
+        status = self._status()
+        if status is None or status.mission is None or not isinstance(event, MoveTarget):
+            return
+        row = open_row(status.mission.rows, event.task)
+        if row is not None:
+            self._dragged()
+            self._post(MoveTarget(row.name, event.value))
+
+    def turn(self, poses: np.ndarray, targets: dict[str, np.ndarray], live: bool) -> None:
+        """Rings go along with the hand; arguments as of `app.view.targets.Targets.follow`."""
+        self._rings.follow(poses, targets, live)
 
     def follow(self, status: Status, latest: np.ndarray | None, fields: dict[str, slice]) -> None:
         """Goals and lines of a new status and the newest row of telemetry."""

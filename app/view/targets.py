@@ -45,8 +45,8 @@ class Targets:
         ]
 
     def follow(self, poses: np.ndarray, raw: dict[str, np.ndarray], live: bool) -> None:
-        """poses (n + 1, 7) of the instant that is shown; raw: where the session has each target; live:
-        whether it is now, so that they can be dragged."""
+        """poses (n + 1, 7) of the instant that is shown; raw: where the session has each target that there
+        is; live: whether it is now, so that they can be dragged."""
         for target in self._targets:
             target.follow(poses, raw.get(target.name), live)
 
@@ -123,8 +123,9 @@ class _Target:
         base = pin.SE3.Identity()
         if task.kind.startswith("relative"):
             base = frame_pose(self._robot, poses, task.root)
-        if self._control.visible != live:
-            self._control.visible = live
+        shown = live and raw is not None
+        if self._control.visible != shown:
+            self._control.visible = shown
         _put(self._base, base.translation, base.rotation)
         if raw is None or time.monotonic() - self._touched < HOLD:
             return

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.missions.mission import Go, Mission, MissionTask, Point, check_mission, find
+from himpc.missions.mission import Follow, Go, Mission, MissionTask, Point, check_mission, find
 from himpc.references import Reference
 from robots import InputError
 
@@ -142,19 +142,27 @@ def release(progress: Progress, name: str) -> Progress:
 
 
 def move(progress: Progress, name: str, goal: Point) -> Progress:
-    """Puts a task's goal elsewhere (m); points on the way are dropped, law and speed stay.
+    """Puts a task's goal elsewhere: m, or x y z w where an orientation is held; points on the way are
+    dropped, law and speed stay.
 
     Raises:
         InputError: no such task, it is completed, it follows a given trajectory, or the goal does not fit.
     """
     place = _ahead(progress, name)
     task = progress.mission[place]
-    if not isinstance(task.motion, Go):
-        raise InputError(f"task '{name}' follows a given trajectory: it cannot be moved")
-    if len(goal) != len(task.motion.goal):
-        raise InputError(f"the goal of task '{name}' needs {len(task.motion.goal)} numbers, not {len(goal)}")
-    moved = replace(task, motion=replace(task.motion, goal=goal, via=()))
+    moved = replace(task, motion=_elsewhere(task, goal))
     return replace(progress, mission=_spliced(progress.mission, place, place + 1, moved))
+
+
+def _elsewhere(task: MissionTask, goal: Point) -> Go | Follow:
+    motion, name = task.motion, task.name
+    if isinstance(motion, Go):
+        if len(goal) != len(motion.goal):
+            raise InputError(f"the goal of task '{name}' needs {len(motion.goal)} numbers, not {len(goal)}")
+        return replace(motion, goal=goal, via=())
+    if motion.rotation is None:
+        raise InputError(f"task '{name}' follows a given trajectory: it cannot be moved")
+    return motion.turned(goal)
 
 
 def insert(progress: Progress, task: MissionTask, before: str | None = None) -> Progress:

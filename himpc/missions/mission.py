@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.references import Hold, Law, Path, Reference, Started
+from himpc.rotation import from_quaternion
 from robots import InputError
 from robots.errors import unknown_name
 
@@ -59,6 +60,19 @@ class Follow:
 
     reference: Reference
     duration: float = math.inf
+
+    @property
+    def rotation(self) -> Array | None:
+        """The orientation (3, 3) that is held all the time; None: it moves, or is a point."""
+        reference = self.reference
+        return reference.value if isinstance(reference, Hold) and reference.value.ndim == 2 else None
+
+    def turned(self, xyzw: Point) -> Follow:
+        """The same with another orientation held. Raises InputError for what is no quaternion x y z w."""
+        if len(xyzw) != 4 or not all(math.isfinite(x) for x in xyzw) or not any(xyzw):
+            raise InputError(f"an orientation is a quaternion x y z w, not {list(xyzw)}")
+        assert isinstance(self.reference, Hold)
+        return replace(self, reference=replace(self.reference, value=from_quaternion(np.array(xyzw))))
 
     def planned(self, start: Array, t: float) -> tuple[Reference, float]:
         """The reference from time t (s) on, and the time at which it ends, s."""

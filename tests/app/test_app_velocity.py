@@ -13,11 +13,16 @@ from app.html.text import free_name
 from app.link.choice import SceneChoice
 from app.link.messages import Play, Post, Ready, ResetAll, Status, Step
 from app.link.mission_view import MissionView
+from app.server.server import PageServer
 from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import Body
+from browsing.wire import Wire, eventually
+from himpc.rotation import exp3, from_quaternion, log3, quaternion
 from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 from lessons.scenes.run_spec import RunSpec
+
+RINGS = "/targets/orientation/control"
 
 
 def opened(scene: str) -> Iterator[Body]:
@@ -172,6 +177,44 @@ def test_what_a_kind_does_not_know_is_a_sentence(body: Body) -> None:
         torque.handle(Post(Release("ee 1")))
         torque.tick()
         assert "no mission" in torque.status().notices[0]
+
+
+def test_an_arm_turns_its_hand_as_it_is_told() -> None:
+    """Once no task of that role is left, there is nothing to turn."""
+    for arm in opened("iiwa14-htmpc"):
+        arm.tick()
+        wanted = exp3(np.array([0.0, 0.0, 0.5])) @ arm.status().targets["orientation"]
+        arm.handle(Post(MoveTarget("orientation", tuple(quaternion(wanted)))))
+        arm.tick(40)
+        assert np.allclose(arm.status().targets["orientation"], wanted)
+        assert max(error(arm, "orientation"), error(arm, "position")) < 1e-3
+        (row,) = (row for row in mission(arm.status()).rows if row.role == "orientation")
+        assert row.goal == pytest.approx(quaternion(wanted)) and arm.status().notices == ()
+        arm.handle(Post(RemoveTask("orientation")))
+        arm.tick()
+        assert set(arm.status().targets) == {"position"}
+
+
+def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
+    server = PageServer(SceneChoice(RunSpec("panda-htmpc")), port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows("turn it by its rings"))
+            learner = server.sessions.learners[0]
+            assert eventually(lambda: learner.status is not None and learner.status.ticks > 0)
+            assert learner.status is not None
+            before = learner.status.targets["orientation"]
+            assert eventually(lambda: RINGS in page.controls_3d)
+            page.turn(RINGS, tuple(quaternion(exp3(np.array([0.0, 0.0, 0.5])) @ before)))
+
+            def turned() -> bool:
+                row = learner.read(lambda _, history: history.latest[history.layout.fields["x/orientation"]])
+                return row is not None and bool(np.abs(log3(from_quaternion(row) @ before.T))[2] > 0.45)
+
+            assert eventually(turned)
+            assert eventually(lambda: page.shows("turned as its rings are"))
+    finally:
+        server.close()
 
 
 def test_new_names_are_free() -> None:

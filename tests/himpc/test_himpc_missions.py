@@ -279,6 +279,19 @@ def test_a_trajectory_is_completed_at_its_end_not_in_passing() -> None:
     assert not advanced(endless, 1, 1e6, at(0, 0), STILL).done
 
 
+def test_a_held_orientation_is_turned_and_goes_on_being_held() -> None:
+    """A quarter turn about z; of any length, and nothing else is taken."""
+    turn = MissionTask("turn", "ee", Follow(Hold(np.eye(3))), hold=None)
+    progress = advanced(Progress((turn,)), 1, 0.0, {"ee": np.eye(3)}, STILL)
+    moved = advanced(move(progress, "turn", (0.0, 0.0, 2.0, 2.0)), 1, 0.1, {"ee": np.eye(3)}, STILL)
+    wanted = moved.window[0].reference.preview(5.0, 0.1, 0).value
+    np.testing.assert_allclose(wanted, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
+    assert not moved.done
+    for wrong in ((0.0, 0.0, 0.0), (0.0,) * 4, (math.nan, 0.0, 0.0, 1.0)):
+        with pytest.raises(InputError, match="quaternion x y z w"):
+            move(progress, "turn", wrong)
+
+
 def test_what_cannot_be_done_to_a_mission_is_refused_in_a_sentence() -> None:
     """Unknown or completed tasks, twin names, goals that do not fit."""
     progress = advanced(Progress(delivery()), 2, 0.0, at(0, 1), STILL)

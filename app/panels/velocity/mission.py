@@ -162,11 +162,18 @@ def _line(row: MissionRow, colours: dict[str, RGB], first: bool) -> str:
         "active": f"background:{css(colour, 0.16)};font-weight:{600 if first else 400}",
         "ahead": "",
     }[row.state]
-    goal = "a given trajectory" if row.goal is None else "(" + ", ".join(f"{x:.2f}" for x in row.goal) + ") m"
     return (
         f"<tr style='{style}'><td style='width:1.3em;text-align:center'>{mark}</td>"
-        f"<td>{swatch(colour)}{esc(row.name)}</td><td>{goal}</td><td>{_when(row)}</td></tr>"
+        f"<td>{swatch(colour)}{esc(row.name)}</td><td>{_where(row.goal)}</td><td>{_when(row)}</td></tr>"
     )
+
+
+def _where(goal: tuple[float, ...] | None) -> str:
+    if goal is None:
+        return "a given trajectory"
+    if len(goal) == 4:
+        return "turned as its rings are"
+    return "(" + ", ".join(f"{x:.2f}" for x in goal) + ") m"
 
 
 def _when(row: MissionRow) -> str:

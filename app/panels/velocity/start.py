@@ -140,7 +140,7 @@ _NEXT_MISSION = (
     "waits for somebody is ended there by <b>Release</b>.",
 )
 _FIRST_ARM = (
-    "Drag the target by its arrows.",
+    "Drag the target by its arrows, turn it by its rings.",
     "The hand follows: that is <b>level 1</b>. Orientation (level 2) gets only the freedom that is left.",
 )
 _NEXT_ARM = (

@@ -11,6 +11,7 @@ from app.link.mission_view import MissionRow, MissionView, Person
 from app.worker.reports.report import Run
 from himpc.htmpc import base_joints
 from himpc.missions import Go, MissionTask
+from himpc.rotation import quaternion
 from himpc.tasks import FramePosition, Task
 from lessons.session.velocity import VelocitySession
 
@@ -26,7 +27,7 @@ _AROUND = 1.9
 class VelocityRun(Run):
     """See `app.worker.reports.report.Run`.
 
-    A target belongs to a role: it is the goal of the role's first open task."""
+    A target belongs to a role: it is the goal of the role's first open task, (m,) m or (3, 3)."""
 
     session: VelocitySession
 
@@ -55,8 +56,10 @@ class VelocityRun(Run):
         progress = self.session.progress
         found: dict[str, np.ndarray] = {}
         for task in progress.mission[progress.place :]:
-            if task.role not in found and isinstance(task.motion, Go):
-                found[task.role] = np.array(task.motion.goal)
+            motion = task.motion
+            raw = np.array(motion.goal) if isinstance(motion, Go) else motion.rotation
+            if task.role not in found and raw is not None:
+                found[task.role] = raw
         return found
 
     def path(self) -> np.ndarray:
@@ -85,7 +88,7 @@ class VelocityRun(Run):
             return MissionRow(
                 name=task.name,
                 role=task.role,
-                goal=task.motion.goal if isinstance(task.motion, Go) else None,
+                goal=_goal(task),
                 tolerance=task.tolerance,
                 hold=task.hold,
                 state="done" if place < progress.place else "active" if entered is not None else "ahead",
@@ -132,6 +135,14 @@ class VelocityRun(Run):
                 Person((float(hand[0]), float(hand[1]), float(hand[2])), (float(x), float(y)), balls)
             )
         return tuple(people)
+
+
+def _goal(task: MissionTask) -> tuple[float, ...] | None:
+    """See `MissionRow`."""
+    if isinstance(task.motion, Go):
+        return task.motion.goal
+    held = task.motion.rotation
+    return None if held is None else tuple(quaternion(held).tolist())
 
 
 def _point(values: tuple[float, ...] | np.ndarray) -> np.ndarray:
