@@ -113,7 +113,7 @@ def test_what_cannot_be_graded_is_a_sentence(what: str, file) -> None:
         ("import subprocess; subprocess.run(['true'])", "may not do that"),
         ("import os; os.system('true')", "may not do that"),
         ("now.q[0] = 3", "read-only"),
-        ("print('x' * 10**6)", ""),
+        ("print('x' * 10**5)", ""),  # more than a pipe holds
         ("[0] * 10**13", "memory"),
     ],
 )
@@ -134,9 +134,9 @@ def test_a_grade_comes_out_the_same_twice(file) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("while True: pass", "takes longer than 6 s"),
-        ("import time; time.sleep(100)", "takes longer than 6 s"),
-        ("    import time; time.sleep(0.4); return now.gravity", "takes longer than 6 s"),
+        ("while True: pass", "takes longer than 4 s"),
+        ("import time; time.sleep(100)", "takes longer than 4 s"),
+        ("    import time; time.sleep(0.4); return now.gravity", "takes longer than 4 s"),
     ],
     ids=["endless when loaded", "sleeps when loaded", "sleeps a little, always"],
 )
@@ -145,7 +145,7 @@ def test_what_never_ends_is_ended_and_its_grade_is_a_sentence(text: str, words: 
         f"def torque(now):\n{text}\n" if text.startswith(" ") else f"{text}\ndef torque(now): return now.q\n"
     )
     source = Source(str(tmp_path / "mine.py"), law)
-    found = grade_apart(Submission(source, "joint-pd", within=replace(WITHIN, seconds=6.0)))
+    found = grade_apart(Submission(source, "joint-pd", within=replace(WITHIN, seconds=4.0)))
     assert words in found.error
     assert found.points == 0
 
