@@ -160,6 +160,16 @@ def test_a_payload_that_is_dropped_is_noticed() -> None:
     assert distance[500:].max() < 5e-3
 
 
+def test_switched_on_early_it_brings_an_arm_back() -> None:
+    """After a second of running away; from a pose where M̄ as it was set is unstable nothing would."""
+    session = session_of("iiwa14-circle", M_bar_adapt=False, plant__payload_kg=2.0)
+    lost = np.linalg.norm(field(session, rows_of(session, 1000), "error/position"), axis=1)
+    session.post(Set("M_bar_adapt", True))
+    back = np.linalg.norm(field(session, rows_of(session, 5000), "error/position"), axis=1)
+    assert lost.max() > 0.02
+    assert back[-1000:].max() < 2e-3
+
+
 def test_rounding_of_the_sensors_takes_M_bar_back_to_what_was_set() -> None:
     """Encoders of 0.005° make accelerations of 87 rad/s² out of nothing: no reason to raise M̄."""
     session = session_of("iiwa14-circle", M_bar_adapt=True, plant__encoder_resolution_deg=0.005)
