@@ -18,7 +18,8 @@ def new(
         kind: what the file is to be.
         file: where to write it.
         start: begin with one there is: an example controller (pd, osf, one_level_qp, himpc_one_page) or the
-            file of an exercise (himpc-lab grade lists them), a scene, or a lesson.
+            file of an exercise (himpc-lab grade lists them), a scene, a lesson, or a kind of task (com,
+            plane_distance, …).
     """
     from lessons.exercises import EXERCISES, load_exercise
     from lessons.own.new import write_new

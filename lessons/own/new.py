@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
+from himpc.tasks import KINDS
 from lessons.course import COURSE
 from lessons.exercises import EXERCISES, start_of
 from lessons.own.files import is_file
@@ -16,12 +17,22 @@ from robots.errors import unknown_name
 
 EXAMPLES: tuple[str, ...] = ("pd", "osf", "one_level_qp", "himpc_one_page")
 """Controllers there are to begin with."""
+TASKS: tuple[str, ...] = (
+    "position",
+    "orientation",
+    "com",
+    "relative_position",
+    "relative_orientation",
+    "plane_distance",
+)
+"""Kinds of tasks there are to begin with. What is on joints has little to be changed; what points has a
+target that is no value of its coordinates, which a task of a file must have."""
 
 
 def choices(kind: Kind) -> Sequence[str]:
-    """What a new file of a kind may begin with; nothing: there is one beginning."""
+    """What a new file of a kind may begin with."""
     controllers = (*EXAMPLES, *EXERCISES)
-    return {"controller": controllers, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": ()}[kind]
+    return {"controller": controllers, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": TASKS}[kind]
 
 
 def text_of(kind: Kind, start: str | None, file: str) -> str:
@@ -37,6 +48,8 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
         text = _read("lessons.course", start.replace("-", "_"))
     elif kind == "scene" and start is not None:
         text = _SCENE.format(scene=start)
+    elif kind == "task" and start is not None:
+        text = _task(start)
     else:
         text = _read("lessons.own.begin", kind)
     return text.replace("FILE.py", file)
@@ -58,6 +71,18 @@ def write_new(kind: Kind, path: str, start: str | None = None) -> None:
 
 def _read(package: str, name: str) -> str:
     return Path(str(files(package) / f"{name}.py")).read_text(encoding="utf-8")
+
+
+def _task(word: str) -> str:
+    """The source of one of the lab's kinds, as a task of a file."""
+    of = KINDS[word].makes[0]
+    package, _, module = of.__module__.rpartition(".")
+    says, rest = _read(package, module).split('"""\n', 1)
+    return (
+        f'{says}\n\n    himpc-lab run FILE.py\n\nThe lab\'s own kind "{word}", to be changed.\n"""\n{rest}\n'
+        "\n"
+        f'TASK = {of.__name__}(name="my_{word}", K_p=100.0, K_v=20.0)\n'
+    )
 
 
 _SCENE = '''"""The scene {scene}, to be changed.

@@ -131,6 +131,27 @@ def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) 
         assert wire.find("x, °") is None and wire.notices == []
 
 
+def test_where_a_posture_wants_what_slides_is_set_in_metres() -> None:
+    """A base without limits goes 2 m to each side."""
+    run = RunSpec("ridgeback-ur10-hold", set=('stack.add={"task": "posture"}',))
+    server = PageServer(SceneChoice(run), port=0, max_sessions=1, grace=2.0)
+    try:
+        with Wire(server.url) as wire:
+            slider = shown(wire, "base_x, m")
+            assert [wire.controls[slider]["props"][end] for end in ("min", "max")] == [-2.0, 2.0]
+            learner = server.sessions.learners[0]
+            assert wait_until(lambda: learner.status is not None, LONG)
+            wire.write(slider, value=0.3)
+
+            def wanted() -> float:
+                return 0.0 if learner.status is None else float(learner.status.targets["posture"][0])
+
+            assert wait_until(lambda: wanted() == pytest.approx(0.3), LONG)
+            assert wire.notices == []
+    finally:
+        server.close()
+
+
 def test_a_control_may_be_written_after_its_panel_was_rebuilt(
     server: PageServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

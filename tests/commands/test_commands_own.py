@@ -9,6 +9,7 @@ import pytest
 
 from app.__main__ import main
 from lessons.exercises import EXERCISES
+from lessons.own.new import TASKS
 
 
 @pytest.fixture(autouse=True)
@@ -41,6 +42,20 @@ def test_new_file_of_ones_own_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert json.loads(Path("b.json").read_text())["scene"] == "my_scene.py"
     assert main(["run", "my_task.py", "--duration", "0.02", "--json", "c.json"]) == 0
     assert json.loads(Path("c.json").read_text())["tasks"][1]["name"] == "reach"
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("word", TASKS)
+def test_a_new_task_may_begin_with_a_kind_of_the_lab(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """It is a kind of its own then, and moves the arm like the lab's."""
+    assert main(["new", "task", "mine.py", "--from", word]) == 0
+    line = ["--duration", "0.02", "--set", "plant.payload_kg=1", "--json", "a.json"]
+    errors = {}
+    for task in ("mine.py", word):
+        stack = [{"task": task, "name": "x", "K_p": 100.0, "K_v": 20.0}, {"task": "posture"}]
+        assert main(["run", "iiwa14-hold", "--set", f"stack={json.dumps(stack)}", *line]) == 0
+        errors[task] = json.loads(Path("a.json").read_text())["tasks"][0]["max_abs"]
+    assert errors["mine.py"] == pytest.approx(errors[word], rel=1e-9, abs=1e-12)
     capsys.readouterr()
 
 
