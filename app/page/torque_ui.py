@@ -49,9 +49,8 @@ class TorqueFace:
     def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
         context = self._context
         ready, bindings, settings = context.ready, context.bindings, context.settings
-        by_hand = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         with tabs.add_tab("Start"):
-            self._start = StartPanel(gui, context.post, ready.robot.joint_names, by_hand, context.dark)
+            self._start = StartPanel(gui, context.post, ready, settings, context.colours, context.dark)
         with tabs.add_tab("Tasks"):
             self._tasks = TasksPanel(
                 gui,
@@ -212,7 +211,7 @@ class TorqueFace:
             # The snapshot's row is its own copy.
             now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
         self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
-        self._start.update(now)
+        self._start.update(now, self._context.colours)
         self._tasks.update(now)
         self._controller.update(now)
         self._inside.write(now.status, now.settings)

@@ -53,7 +53,10 @@ class VelocityFace:
         context = self._context
         ready, bindings, colours = context.ready, context.bindings, context.colours
         with tabs.add_tab("Start"):
-            self._begin = BeginPanel(gui, ready.choice.run.scene, colours, bool(self._base), context.dark)
+            roles = [level.name for level in context.settings.levels]
+            self._begin = BeginPanel(
+                gui, ready.choice.run.scene, roles, colours, bool(self._base), context.dark
+            )
         with tabs.add_tab("Mission"):
             self._mission = MissionPanel(
                 gui,

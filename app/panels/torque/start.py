@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import viser
 
 from app.client.wish import Send
-from app.html.palette import BAD, GOOD
+from app.html.palette import BAD, GOOD, RGB
 from app.html.text import block, esc, quantity
+from app.link.messages import Ready
+from app.panels.torque.guide import guide
 from app.panels.widgets.command import add_command
 from app.panels.widgets.snapshot import Snapshot
 from app.view.reachability import Verdict
@@ -33,13 +35,20 @@ class StartPanel:
     """Guidance that follows what the learner has already done."""
 
     def __init__(
-        self, gui: viser.GuiApi, post: Send, bodies: tuple[str, ...], draggable: bool, dark: bool
+        self,
+        gui: viser.GuiApi,
+        post: Send,
+        ready: Ready,
+        settings: TorqueSettings,
+        colours: Mapping[str, RGB],
+        dark: bool,
     ) -> None:
+        """settings: in force; colours: per level."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
-        self._draggable = draggable
-        self._guide = gui.add_html(_GUIDE if draggable else _GUIDE_FOLLOWING)
+        self._guide = gui.add_html(guide(ready.tasks, settings.levels, colours, dragged=False))
+        draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         self._where = gui.add_html("", visible=draggable)
         with gui.add_folder("Target", visible=draggable):
             self.clamp = gui.add_checkbox(
@@ -50,6 +59,7 @@ class StartPanel:
             )
             recall = gui.add_button("Bring the target to the hand")
         with gui.add_folder("Push the robot"):
+            bodies = ready.robot.joint_names
             body = gui.add_dropdown("Body", bodies, initial_value=bodies[-1])
             force = gui.add_slider("Force [N]", min=5.0, max=100.0, step=5.0, initial_value=30.0)
             buttons = gui.add_button_group(
@@ -100,9 +110,7 @@ class StartPanel:
 
     def dragged(self) -> None:
         """The first drag happened: go on to what comes next."""
-        if not self._dragged:
-            self._dragged = True
-            self._guide.content = _GUIDE_NEXT
+        self._dragged = True
 
     def show_verdict(self, verdict: Verdict | None, clamped: bool) -> None:
         """Where the target is, in words."""
@@ -122,27 +130,11 @@ class StartPanel:
             text += " This orientation cannot be met there: the lower level gives way."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: Snapshot[TorqueSettings]) -> None:
-        """The button offers what is not the case."""
+    def update(self, now: Snapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
+        """The guide names the levels as they are; the button offers what is not the case."""
+        told = guide(now.ready.tasks, now.settings.levels, colours, self._dragged)
+        if self._guide.content != told:
+            self._guide.content = told
         label = _DROP if now.settings.plant.payload_kg > 0 else _PICK_UP
         if self._load.label != label:
             self._load.label = label
-
-
-_GUIDE = block(
-    '<div style="font-size:1.15em"><b>Drag the target by its arrows.</b></div>'
-    "It is the orange ball at the robot's hand, and the hand follows it: that is <b>level 1</b>. "
-    "Orientation (level 2) and posture (level 3) get only the freedom that is left.",
-    "padding-top:0.5em",
-)
-_GUIDE_FOLLOWING = block(
-    '<div style="font-size:1.15em"><b>Watch the hand follow the curve.</b></div>'
-    "Then switch a level off in the tab <b>Tasks</b>, or push the robot below, and see which errors grow.",
-    "padding-top:0.5em",
-)
-_GUIDE_NEXT = block(
-    '<div style="font-size:1.15em"><b>Now switch a level off.</b></div>'
-    "Open <b>Tasks</b> (or press 2): its error grows while level 1 stays where it is. Then drag the target "
-    "out of reach, push the robot below, or put 5 kg on its hand in <b>Plant</b>.",
-    "padding-top:0.5em",
-)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import viser
 
@@ -22,9 +22,15 @@ class BeginPanel:
     """Guidance that follows what the learner has already done. The callbacks are set by the face."""
 
     def __init__(
-        self, gui: viser.GuiApi, scene: str, colours: dict[str, RGB], drives: bool, dark: bool
+        self,
+        gui: viser.GuiApi,
+        scene: str,
+        roles: Sequence[str],
+        colours: dict[str, RGB],
+        drives: bool,
+        dark: bool,
     ) -> None:
-        """scene: its name; colours: per role; drives: whether there is a mobile base."""
+        """scene: its name; roles: in their order; drives: whether there is a mobile base."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_swap: Callable[[], None] = lambda: None
         self.on_look: Callable[[], None] = lambda: None
@@ -32,8 +38,9 @@ class BeginPanel:
         self.on_clear: Callable[[], None] = lambda: None
         self._colours = colours
         self._dragged = False
-        self._next = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
-        self._guide = gui.add_html(_guide(_FIRST.get(scene, _WATCH if drives else _FIRST_ARM)))
+        self._scene, self._drives = scene, drives
+        places = {role: place for place, role in enumerate(roles, start=1)}
+        self._guide = gui.add_html(guide(scene, drives, places, dragged=False))
         self._live = gui.add_html("")
         swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         look = gui.add_button("Look at the robot", hint="Turns the camera to where it is now")
@@ -77,11 +84,13 @@ class BeginPanel:
 
     def dragged(self) -> None:
         """The first drag happened: go on to what comes next."""
-        if not self._dragged:
-            self._dragged = True
-            self._guide.content = _guide(self._next)
+        self._dragged = True
 
     def update(self, now: Snapshot[VelocitySettings]) -> None:
+        places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
+        told = guide(self._scene, self._drives, places, self._dragged)
+        if self._guide.content != told:
+            self._guide.content = told
         lines = [self._line(now, level.name, level.tasks[0].unit) for level in now.settings.levels]
         mission = now.status.mission
         if mission is not None and mission.done:
@@ -107,21 +116,37 @@ def last_ball(settings: VelocitySettings) -> Ball | None:
     return next((each for each in reversed(settings.htmpc.obstacles) if isinstance(each, Ball)), None)
 
 
-def _guide(text: tuple[str, str]) -> str:
-    head, rest = text
-    return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
+def guide(scene: str, drives: bool, places: Mapping[str, float], dragged: bool) -> str:
+    """HTML of what to try.
+
+    Args:
+        scene: its name.
+        drives: whether there is a mobile base.
+        places: the level that each role is now, 1 the highest; NaN: it has no task.
+        dragged: whether the first thing has been done, so that the next can be offered.
+    """
+    first = _FIRST.get(scene, _WATCH if drives else _FIRST_ARM)
+    then = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
+    head, rest = then if dragged else first
+    levels = {
+        role: f"<b>level {place:.0f}</b>" if place == place else "without a task"
+        for role, place in places.items()
+    }
+    return block(
+        f'<div style="font-size:1.15em"><b>{head}</b></div>{rest.format(**levels)}', "padding-top:0.5em"
+    )
 
 
 _FIRST = {
     "ridgeback-ur10-drag": (
         "Drag the two targets by their arrows.",
-        "The orange ball is for the robot's hand: <b>level 1</b>. The blue disc on the floor is for its "
-        "base: <b>level 2</b>. Drag the disc so far from the ball that the arm is too short for both.",
+        "The orange ball is for the robot's hand: {ee}. The blue disc on the floor is for its base: {base}. "
+        "Drag the disc so far from the ball that the arm is too short for both.",
     ),
     "ridgeback-ur10-square": (
         "Watch the base stop where the arm is stretched.",
-        "The hand has to stay (<b>level 1</b>); the base is sent out of reach for 8 s, then home (<b>level "
-        "2</b>). Reset and swap which comes first, or set N to 1 in <b>Control</b>.",
+        "The hand has to stay ({ee}); the base is sent out of reach for 8 s, then home ({base}). "
+        "Reset and swap which comes first, or set N to 1 in <b>Control</b>.",
     ),
 }
 _WATCH = (
@@ -141,7 +166,8 @@ _NEXT_MISSION = (
 )
 _FIRST_ARM = (
     "Drag the target by its arrows, turn it by its rings.",
-    "The hand follows: that is <b>level 1</b>. Orientation (level 2) gets only the freedom that is left.",
+    "Where the hand is: {position}. How it is turned: {orientation}. Level 2 gets only the freedom that "
+    "level 1 leaves.",
 )
 _NEXT_ARM = (
     "Now swap which comes first.",
