@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[1]
 WIDTH, HEIGHT = 1200, 920
 PLOTS = 404  # width of the panel on the left, which has nothing to show before a run
 SHOWN = 0.58  # of the pixels, in the pictures that are kept
-QUALITY = 32
+QUALITY = 25
 
 
 def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image]]:

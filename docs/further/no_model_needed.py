@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from docs.further.kit import Further, Line, Question, inertia
+from docs.further.kit import Further, Line, Question, inertia, measured
 
 LEFT = 1 - 0.033 / 0.1
 
@@ -109,10 +109,10 @@ FURTHER = Further(
             "tenth of the slowest component of an error is left? What does the last line of the "
             "derivation say about an error along a curve?",
             r"$⟨slow⟩$ ms and $⟨fast⟩$ ms. Along a curve the error is about $M/\bar M$ times the change of "
-            r"acceleration per step, so four times the $\bar M$ leaves a little less than a quarter: "
-            r"*Further than "
-            "the proof* measures a fifth.",
+            r"acceleration per step, so four times the $\bar M$ leaves a quarter or less: *Further than the "
+            r"proof* measures ⟨left⟩.",
             {
+                "left": (measured("no-model-needed", "The largest error is at most a quarter"), ".2f"),
                 "slow": (math.log(0.1) / math.log(0.985), ".0f"),
                 "fast": (math.log(0.1) / math.log(0.94), ".0f"),
             },

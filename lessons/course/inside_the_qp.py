@@ -145,8 +145,8 @@ BOUND = Step(
     """,
     do="Make the torque scarcer, to 0.1: from when on does the disc 1 hit the frame, too?",
     why=r"""
-    Level 1 moves along its valley, where other points are as good, and loses nothing: the error is
-    the same as with all the torque. Level 2 slides along the line until the frame stops it, short
+    Level 1 moves along its valley, where other points are as good, and loses nothing: its error is
+    no larger than with all the torque. Level 2 slides along the line until the frame stops it, short
     of the point where its ellipse would touch. Such a bound is *active*, and its multiplier is the
     price that this level would pay for a little more room. With a tenth of the torque the whole
     valley is outside for a while: then level 1 pays as well.

@@ -131,13 +131,13 @@ SMALL = Step(
 FURTHER = Step(
     title="Further than the proof",
     text=r"""
-    Now upwards. Twice the $\bar M$ halves the error; here it is four times as large. Remark 4
+    Now upwards. Twice the $\bar M$ leaves 0.41 of the error; here it is four times as large. Remark 4
     guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For four times
-    $\bar M$ this norm is 1.21.
+    $\bar M$ this norm is 1.21 where the arm begins.
     """,
     do="Which of the two numbers changes its mind first on the way up from 1, norm or radius?",
     why=r"""
-    The error is a fifth, and nothing trembles. A norm below 1 is enough, it is not necessary: it
+    The error is less than a fifth, and nothing trembles. A norm below 1 is enough, it is not necessary: it
     asks that *no* error grows even for a single step. In the long run the eigenvalues decide, and
     the largest of them is 0.94.
     """,
@@ -164,7 +164,7 @@ FURTHER = Step(
             "at most",
             0.25,
             fails_with=("M_bar_scale=2",),
-            because="twice the M̄ only halves it",
+            because="twice the M̄ still leaves 0.41 of it",
         ),
     ),
     set=("M_bar_scale=4",),
@@ -178,10 +178,10 @@ FURTHER = Step(
 LARGE = Step(
     title="M̄ too large",
     text=r"""
-    Four times the $\bar M$ was a fifth of the error, six times is better still. Now it is eight times
-    as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is multiplied by $1 - \lambda$
-    in every step. (Remark 4 prints $1 - \bar M_i/\lambda_i(M)$; the two agree for a diagonal $M$
-    only.)
+    Four times the $\bar M$ left less than a fifth of the error, six times is better still. Now it is
+    eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is multiplied by
+    $1 - \lambda$ in every step. (Remark 4 prints $1 - \bar M_i/\lambda_i(M)$; the two agree for a
+    diagonal $M$ only.)
     """,
     do="Reset, go up from 4 in small steps, and read the gauge each time before you let it run.",
     why=r"""

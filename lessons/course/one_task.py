@@ -37,8 +37,8 @@ SPRING = Step(
     do="Push the arm yourself, wherever you like.",
     why=r"""
     Twice it is thrown off: when the push begins, and, to the other side, when it ends, because by
-    then the torques had learned to push back. Each time it comes home within half a second and
-    without swinging: with $K_V = 2\sqrt{K_P}$ the wish is critically damped. There is no spring in
+    then the torques had learned to push back. Half a second later it is home, and it has not swung:
+    with $K_V = 2\sqrt{K_P}$ the wish is critically damped. There is no spring in
     the arm. The controller looks for torques that make (4) true.
     """,
     prediction=Sketch(

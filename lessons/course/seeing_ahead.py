@@ -127,7 +127,7 @@ NO_PLAN = Step(
     """,
     do="Compare the two speeds: who is the faster right after a jump, who shortly before the goal?",
     why=r"""
-    Both are surprised at 8 s, and still it is far behind, 15 cm from home at the end where the ghost
+    Both are surprised at 8 s, and still it is far behind, 16 cm from home at the end where the ghost
     has long arrived. A gain is one curve for all occasions: a velocity in proportion to the error,
     limited so that the first jolt is bearable, is slow at the end. A plan uses the acceleration there
     is, and brakes when it must. The paper, which tuned both to do equally well in Part 1, counts 42 %

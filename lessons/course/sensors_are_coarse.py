@@ -39,9 +39,9 @@ ROUNDING = Step(
     The paper finds the same limit (Table VIII) and calls it chattering.
     """,
     prediction=Choice(
-        "Without rounding the motion needs 4 % of the torque limit. With it, the largest demand is …",
+        "Without rounding the motion needs 3 % of the torque limit. With it, the largest demand is …",
         (
-            Option("still about 4 %", high=8.0),
+            Option("still about 3 %", high=8.0),
             Option("10 to 30 %", 10.0, 30.0),
             Option("more than half the limit", low=50.0),
         ),

@@ -36,7 +36,7 @@ INVERSE = Step(
     prediction=Choice(
         "The hand should only move sideways. How much torque does OSF ask for, at most?",
         (
-            Option("what the motion needs, a quarter of the limit", high=100.0),
+            Option("what the motion needs, less than half of the limit", high=100.0),
             Option("a few times the limit", 100.0, 1e4),
             Option("more than a thousand times the limit", low=1e5),
         ),

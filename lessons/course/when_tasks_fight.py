@@ -34,7 +34,7 @@ PROJECTION = Step(
     """,
     do="Switch to HIMPC in good time, and back, while the arm moves.",
     why=r"""
-    Dividing by almost nothing gives almost infinity: the demanded torque reaches a thousand times
+    Dividing by almost nothing gives almost infinity: the demanded torque passes a thousand times
     the limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
     singularity is made by the algorithm, and is called algorithmic for that.
     """,
