@@ -168,11 +168,12 @@ def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
                 axes.annotate(
                     "–",
                     (group + offset, 0.0),
-                    (0, 2),
+                    (0, 1),
                     xycoords=("data", "axes fraction"),
                     textcoords="offset points",
                     ha="center",
-                    fontsize=7,
+                    fontsize=11,
+                    fontweight="bold",
                     color=colour(key),
                 )
 
