@@ -25,6 +25,7 @@ from lessons.papers.printed import printed
 from lessons.papers.reproduce import Report, as_data, reproduce, write
 from lessons.plots.panels import Bars, Curve, Panel, Picture
 from lessons.scenes.run_spec import RunSpec
+from lessons.scenes.scene import Scene
 from robots import InputError
 
 QUICK = (False, True)
@@ -53,12 +54,40 @@ def test_the_papers_tables_and_figures_are_there() -> None:
     assert tables | figures | {"himpc-accuracy", "himpc-ablations", "himpc-value"} <= set(ITEMS)
 
 
+@pytest.fixture(scope="module")
+def prepared() -> dict[RunSpec, Scene]:
+    """Every scene that some item runs, once."""
+    jobs = (job for item in ITEMS.values() for quick in QUICK for job in item.jobs(quick))
+    return {spec: spec.prepared() for spec in dict.fromkeys(job.spec for job in jobs)}
+
+
+@pytest.mark.parametrize("quick", QUICK)
+def test_no_two_jobs_compute_the_same(quick: bool, prepared: dict[RunSpec, Scene]) -> None:
+    """A setting that a scene has anyway makes another key of the same run: it would be run twice."""
+    seen: dict[str, Work] = {}
+    for job in dict.fromkeys(job for item in ITEMS.values() for job in item.jobs(quick)):
+        scene, spec = prepared[job.spec], job.spec
+        events = scene.events if spec.events is None else spec.events
+        duration = scene.duration if spec.duration is None else spec.duration
+        parts = (
+            type(job),
+            replace(job, spec=RunSpec("")),
+            scene.name,
+            scene.settings,
+            events,
+            duration,
+            spec.seed,
+        )
+        twin = seen.setdefault(repr(parts), job)
+        assert twin is job, f"{twin.spec.command_line()} and {spec.command_line()}"
+
+
 @pytest.mark.parametrize("quick", QUICK)
 @pytest.mark.parametrize("name", ITEMS)
-def test_every_job_can_be_set_up(name: str, quick: bool) -> None:
+def test_every_job_can_be_set_up(name: str, quick: bool, prepared: dict[RunSpec, Scene]) -> None:
     """Scene, controller and every assignment exist, so that no item fails for a typo."""
     for job in ITEMS[name].jobs(quick):
-        scene = job.spec.prepared()
+        scene = prepared[job.spec]
         assert scene.settings.controller == job.spec.controller
         assert {text.partition("=")[0] for text in job.spec.set} <= set(scene.settings.paths())
 
