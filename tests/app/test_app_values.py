@@ -84,3 +84,27 @@ def assert_is_alive(page: Wire, learner: Any, runs: bool) -> None:
     assert speed is not None
     page.write(speed, value=0.5)
     assert eventually(lambda: learner.status.speed == 0.5)
+
+
+def test_a_press_whose_panel_goes_meanwhile_is_told_of(capfd: pytest.CaptureFixture[str]) -> None:
+    """What its callback then writes is gone: a notice, and no traceback."""
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    try:
+        with Wire(server.url) as page:
+            assert eventually(lambda: page.shows("every command, searchable"))
+            (client,) = server._viser.get_clients().values()
+            folder = client.gui.add_folder("Goes")
+            with folder:
+                button, words = client.gui.add_button("Rebuild me"), client.gui.add_html("")
+
+            @button.on_click
+            async def _(_: object) -> None:
+                folder.remove()
+                words.content = "too late"
+
+            assert eventually(lambda: page.find("Rebuild me") is not None)
+            page.write(str(page.find("Rebuild me")), value=True)
+            assert eventually(lambda: "Not taken" in [title for title, _ in page.notices])
+    finally:
+        server.close()
+    assert "Traceback" not in capfd.readouterr().err
