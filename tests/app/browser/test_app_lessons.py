@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,8 +18,11 @@ from browsing.hands import SELDOM, eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
+from lessons.own.new import text_of
+from lessons.own.resolve import lesson_named
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge
+from lessons.teaching.lesson import Lesson
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +55,24 @@ def test_a_page_can_open_at_a_lesson(learner_page: Page) -> None:
 def test_a_lesson_is_walked_through(learner_page: Page, school: PageServer, name: str) -> None:
     page, lesson = learner_page, load_lesson(name)
     open_lesson(page, lesson)
+    walk(page, school, lesson)
+    assert eventually(page, lambda: kept(page)["seen"].get(name) == list(range(len(parts_of(lesson)))))
+
+
+def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(text_of("lesson", None, "mine.py"))
+    server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
+    page = open_page(browser, server.url, 1000, 700, rest=SELDOM)
+    try:
+        walk(page, server, lesson_named(str(file)))
+    finally:
+        page.context.close()
+        server.close()
+
+
+def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
+    """Every part of the lesson that is open, as a learner would: whatever it claims holds."""
     for part in parts_of(lesson):
         expect_part(page, lesson, part)
         if isinstance(part, Challenge):
@@ -66,7 +88,6 @@ def test_a_lesson_is_walked_through(learner_page: Page, school: PageServer, name
         expect(page.get_by_text("Now you:")).to_be_visible()
         if part is not parts_of(lesson)[-1]:
             page.get_by_role("button", name="Next: ").click()
-    assert eventually(page, lambda: kept(page)["seen"].get(name) == list(range(len(parts_of(lesson)))))
 
 
 def kept(page: Page) -> dict[str, Any]:
