@@ -16,7 +16,8 @@ from app.panels.inside.matrix import TITLE as HESSIAN
 from app.panels.inside.plane import TITLE as PLANE
 from app.panels.inside.spectrum import TITLE as SPECTRUM
 from app.server.server import PageServer
-from browsing.hands import SELDOM, drag_target, eventually, open_page, press, set_number, tab
+from browsing.another import show_scene
+from browsing.hands import drag_target, eventually, open_page, press, set_number, tab
 from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
 from lessons.scenes.run_spec import RunSpec
@@ -177,20 +178,16 @@ def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
     tab(sheet, "Start")
 
 
-def test_one_knot_is_a_click_away(browser: Browser) -> None:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    page = open_page(browser, server.url, 1300, 700, rest=SELDOM)
-    try:
-        tab(page, "Inside")
-        expect(page.get_by_text("Later knots are held")).to_be_visible()
-        press(page, "Look one knot ahead (N = 1)")
-        learner = learner_of(server)
-        assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 1)
-        expect(page.get_by_text("Later knots are held")).to_be_hidden()
-        learner.send(Post(Set("controller", "osf")))
-        expect(page.get_by_text("osf solves no such QP")).to_be_visible()
-        learner.send(Watch(plane=(7, 9)))  # a stranger's joints
-        assert eventually(page, lambda: learner.failure is None and learner.status is not None)
-    finally:
-        page.context.close()
-        server.close()
+def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
+    """From another scene, which stays on the page: this test is the last one."""
+    page, learner = shared, learner_of(drawing)
+    show_scene(page, learner, SceneChoice(RunSpec("planar3-hold")))
+    tab(page, "Inside")
+    expect(page.get_by_text("Later knots are held")).to_be_visible()
+    press(page, "Look one knot ahead (N = 1)")
+    assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 1)
+    expect(page.get_by_text("Later knots are held")).to_be_hidden()
+    learner.send(Post(Set("controller", "osf")))
+    expect(page.get_by_text("osf solves no such QP")).to_be_visible()
+    learner.send(Watch(plane=(7, 9)))  # a stranger's joints
+    assert eventually(page, lambda: learner.failure is None and learner.status is not None)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
+from browsing.another import show_scene
 from browsing.hands import drag_target, eventually, open_page, press, target_position
 from lessons.scenes.run_spec import RunSpec
 
@@ -20,10 +23,28 @@ ONE_JOINT = """<robot name="one"><link name="base"/><link name="arm"><inertial><
 ALONG = 0.15  # m, along y
 
 
+def one(kind: str, axis: str) -> SceneChoice:
+    return SceneChoice(RunSpec("hold"), urdf_text=ONE_JOINT.format(kind=kind, axis=axis))
+
+
 def joint(learner: Learner) -> float:
     found = learner.read(lambda _, history: float(history.latest[history.layout.fields["q"]][0]))
     assert found is not None
     return found
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[PageServer]:
+    running = PageServer(one("revolute", "0 0 1"), port=0, max_sessions=1)
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, server: PageServer) -> Iterator[Page]:
+    opened = open_page(browser, server.url)
+    yield opened
+    opened.context.close()
 
 
 @pytest.mark.parametrize(
@@ -31,28 +52,24 @@ def joint(learner: Learner) -> float:
     [("revolute", "0 0 1", np.arctan2(ALONG, 0.3)), ("prismatic", "0 1 0", ALONG)],
     ids=["revolute", "prismatic"],
 )
-def test_one_joint_holds_is_dragged_and_runs(browser: Browser, kind: str, axis: str, there: float) -> None:
+def test_one_joint_holds_is_dragged_and_runs(
+    page: Page, server: PageServer, kind: str, axis: str, there: float
+) -> None:
     """A hinge comes as near to the dragged target as it can, a slide comes to it."""
-    choice = SceneChoice(RunSpec("hold"), urdf_text=ONE_JOINT.format(kind=kind, axis=axis))
-    server = PageServer(choice, port=0, max_sessions=1)
-    try:
-        page = open_page(browser, server.url)
-        learner = server.sessions.learners[0]
-        assert eventually(page, lambda: learner.status is not None and learner.status.t > 1.0)
-        home = joint(learner)
-        assert abs(home) < 1e-3
-        before = np.array(target_position(page))
-        drag_target(page, axis=1, along=ALONG, arm=0.08)
-        moved = np.array(target_position(page)) - before
-        assert moved[1] == pytest.approx(ALONG, abs=0.02) and np.abs(moved[[0, 2]]).max() < 0.02
-        there *= float(moved[1]) / ALONG  # a hand is not exact
-        assert eventually(page, lambda: abs(joint(learner) - there) < 0.02), joint(learner)
-        press(page, "Reset all")
-        assert eventually(page, lambda: abs(joint(learner) - home) < 0.01)
-        expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
-        ticks = 0 if learner.status is None else learner.status.ticks
-        assert eventually(page, lambda: learner.status is not None and learner.status.ticks > ticks + 100)
-        assert learner.trouble() is None
-        page.context.close()
-    finally:
-        server.close()
+    learner = server.sessions.learners[0]
+    show_scene(page, learner, one(kind, axis))
+    assert eventually(page, lambda: learner.status is not None and learner.status.t > 1.0)
+    home = joint(learner)
+    assert abs(home) < 1e-3
+    before = np.array(target_position(page))
+    drag_target(page, axis=1, along=ALONG, arm=0.08)
+    moved = np.array(target_position(page)) - before
+    assert moved[1] == pytest.approx(ALONG, abs=0.02) and np.abs(moved[[0, 2]]).max() < 0.02
+    there *= float(moved[1]) / ALONG  # a hand is not exact
+    assert eventually(page, lambda: abs(joint(learner) - there) < 0.02), joint(learner)
+    press(page, "Reset all")
+    assert eventually(page, lambda: abs(joint(learner) - home) < 0.01)
+    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    ticks = 0 if learner.status is None else learner.status.ticks
+    assert eventually(page, lambda: learner.status is not None and learner.status.ticks > ticks + 100)
+    assert learner.trouble() is None

@@ -1,37 +1,25 @@
-"""A classroom: one robot for all pages, steered by who has the token."""
+"""A classroom without a browser: what watchers may do, and who has the token."""
 
 from __future__ import annotations
 
 import asyncio
 import inspect
 import re
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from playwright.sync_api import Browser, expect
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.messages import Play
-from app.link.process import wait_until
 from app.panels.run.classroom import Guesses
 from app.server.classroom import STEERING, Classroom, Watcher
 from app.server.door import new_token
-from app.server.server import PageServer
-from browsing.hands import SELDOM, open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
-ROOT = Path(__file__).parents[3] / "app"
-
-
-@pytest.fixture(scope="module")
-def classroom() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True)
-    yield running
-    running.close()
+ROOT = Path(__file__).parents[2] / "app"
 
 
 def test_watchers_change_nothing() -> None:
@@ -108,23 +96,3 @@ def test_the_token_is_long_and_only_itself() -> None:
     assert len(token.token) == 22  # 128 bits
     assert token.is_right(token.token)
     assert not any(map(token.is_right, ("", token.token[:-1], token.token + "a", "\ud800é")))
-
-
-def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
-    """A page without it sees the same robot and cannot stop it; with it the page can."""
-    assert isinstance(classroom.sessions, Classroom)
-    (learner,) = classroom.sessions.learners
-    page = open_page(browser, classroom.url, 1300, 700, rest=SELDOM)
-    watching = page.get_by_text("you are watching")
-    expect(watching).to_be_visible()
-    press(page, "Pause")
-    expect(page.get_by_text(STEERING).first).to_be_attached()
-    assert learner.status is not None
-    assert learner.status.running
-    write(page, "Instructor's token", "wrong")
-    expect(page.get_by_text("That is not the token.")).to_be_visible()
-    write(page, "Instructor's token", classroom.sessions.token)
-    expect(watching).to_have_count(0)
-    press(page, "Pause")
-    assert wait_until(lambda: learner.status is not None and not learner.status.running, 60)
-    page.context.close()

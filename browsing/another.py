@@ -1,0 +1,21 @@
+"""Another scene on a page that is open: quicker than opening one."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Page, expect
+
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
+from app.link.messages import Load
+from browsing.hands import eventually, tab, wait_for_scene
+
+
+def show_scene(page: Page, learner: Learner, choice: SceneChoice) -> None:
+    """Loads a torque-level scene, unless it is there, and waits for the page to be built anew."""
+    if learner.choice == choice:
+        return
+    tab(page, "Robot")  # a page that is built anew begins with another tab
+    learner.send(Load(choice))
+    assert eventually(page, lambda: learner.choice == choice)
+    expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
+    wait_for_scene(page)

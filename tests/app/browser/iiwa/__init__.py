@@ -1,0 +1,1 @@
+"""Tests in a browser that share one page of the iiwa."""

@@ -1,0 +1,43 @@
+"""One server and one page for all tests that can share them: without a graphics card a page takes both cores
+ten seconds to open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
+from browsing.another import show_scene
+from browsing.hands import eventually, open_page, press, tab, wait_for_scene
+from lessons.scenes.run_spec import RunSpec
+
+CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
+
+
+@pytest.fixture(scope="package")
+def server() -> Iterator[PageServer]:
+    running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0)
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="package")
+def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
+    opened = open_page(browser, server.url)
+    yield opened
+    opened.context.close()
+
+
+@pytest.fixture
+def page(shared_page: Page, server: PageServer) -> Page:
+    """The page as it was when it was opened, whatever the tests before did, and nobody else on the server."""
+    assert eventually(shared_page, lambda: len(server.sessions.learners) == 1)
+    show_scene(shared_page, server.sessions.learners[0], CHOICE)
+    tab(shared_page, "Start")
+    press(shared_page, "Reset all")
+    expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    wait_for_scene(shared_page)
+    return shared_page
