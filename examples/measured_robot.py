@@ -41,9 +41,8 @@ def main(seconds: float = 2.0) -> None:
     hand = Target(position)
     hand.move(position + np.array([0.0, 0.0, 0.05]))
     references = {"hand": hand, "wrist": Hold(rotation), "posture": Hold(robot.home)}
-    tau = driver.plant.tau
+    late, ticks, tau = 0, round(seconds / T_S), driver.plant.tau
     controller.reset(tau)
-    late, ticks = 0, round(seconds / T_S)
     for tick in range(ticks):
         q, v = driver.read()
         plan = controller.step(q, v, previews(references, tick * T_S, T_S, 5), tau)

@@ -42,8 +42,7 @@ def main(seconds: float = 2.0) -> None:
     )
     references = {"hand": circle, "q1": Hold(robot.home[:1])}
 
-    largest = 0.0
-    tau = np.zeros(robot.n)
+    largest, tau = 0.0, np.zeros(robot.n)
     steps = round(seconds / T_S)
     for _ in range(steps):
         # Time-delay estimation needs the torque that acted since the last step.
