@@ -205,9 +205,10 @@ def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
             assert learner.status is not None
             before = learner.status.targets["orientation"]
             assert eventually(lambda: RINGS in page.controls_3d)
-            page.turn(RINGS, tuple(quaternion(exp3(np.array([0.0, 0.0, 0.5])) @ before)))
+            wanted = tuple(quaternion(exp3(np.array([0.0, 0.0, 0.5])) @ before))
 
             def turned() -> bool:
+                page.turn(RINGS, wanted)  # as a hand does: not once, maybe before anybody listens
                 row = learner.read(lambda _, history: history.latest[history.layout.fields["x/orientation"]])
                 return row is not None and bool(np.abs(log3(from_quaternion(row) @ before.T))[2] > 0.45)
 
