@@ -64,7 +64,11 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "-q",
         "--no-deps",
     ]
-    done = subprocess.run([*pip, "--no-index", str(wheel)], capture_output=True, text=True, check=False)
+    # Whoever has the checkout in PYTHONPATH would be told that it is installed already.
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [*pip, "--no-index", str(wheel)], env=alone, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     here = Path(sysconfig.get_path("purelib"))
     (there,) = home.glob("lib/python*/site-packages")

@@ -103,8 +103,8 @@ def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: i
     start = np.eye(3) if turns else np.zeros(3)
     one, other = Target(start), Target(start)
     room = np.full((3, N + 1, 5), np.nan)
-    motion, seen = room[:, :, 1:4], None
-    shown = stayed = 0
+    motion, seen, value = room[:, :, 1:4], None, start.ravel()
+    shown = 0
     moves = {int(k): rng.normal(0, 0.02, 3) for k in rng.integers(0, 300, 3)}
     for k in range(900):
         if k in moves:
@@ -112,9 +112,7 @@ def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: i
                 target.move(exp3(moves[k]) if turns else moves[k])
         t = k * T_S
         wanted = one.preview(t, T_S, N)
-        if other.stays(t, seen):
-            stayed += 1
-        else:
+        if not other.stays(t, seen):
             x_d = other.show(t, T_S, motion)
             shown += x_d is not None
             if x_d is None:
