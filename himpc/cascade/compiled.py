@@ -30,6 +30,7 @@ INDICES, TABLE, FLAGS = intp[::1], int64[:, ::1], boolean[:, ::1]
 """Arrays of our own, contiguous."""
 FIXED, FIXED_VECTOR = types.Array(float64, 2, "C", readonly=True), types.Array(float64, 1, "C", readonly=True)
 """The same, not to be written to."""
+GIVEN_VECTOR = types.Array(float64, 1, "A", readonly=True)
 GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """What others hand over: it may be a slice."""
 

@@ -14,7 +14,7 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.active_set import SCRATCH, solve
+from himpc.htmpc.kernel.active_set import SCRATCH, factor, solve
 from himpc.htmpc.rows import Rows
 from himpc.qp import QPSolution
 
@@ -32,6 +32,7 @@ class ActiveSet:
         self._room(0)
 
     def _room(self, n: int) -> None:
+        self._L = np.empty((n, n))
         self._active, self._side = np.empty(n, np.intp), np.empty(n)
         self._corner, self._basis = np.empty((n + 1, n + 1)), np.empty((n + 1, n))
         self._scratch, self._watched = np.empty((SCRATCH, n + 1)), np.empty(0, np.intp)
@@ -42,11 +43,7 @@ class ActiveSet:
         if len(H) != len(self._active):
             self._room(len(H))
         self._H, self._count = H, 0
-        try:
-            self._L = np.linalg.cholesky(H)
-        except np.linalg.LinAlgError:
-            return False
-        return True
+        return factor(H, self._L)
 
     def solve(self, g: Array, rows: Rows, same: int) -> QPSolution:
         """min ½xᵀHx + gᵀx under the rows; lower = upper is an equality.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.clearance import Clearances, CollisionModel
 from himpc.htmpc.geometry import Placed
+from himpc.htmpc.kernel.rows import COLLISION
 from himpc.htmpc.prediction import integrator
 from himpc.htmpc.rows import Rows, Table
 
@@ -43,7 +44,7 @@ class Avoidance:
         A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance
         free = np.full(len(room), np.inf)
-        return Rows(A, room, free, np.full(len(room), 7), near.knot + 1, np.arange(len(room)))
+        return Rows(A, room, free, np.full(len(room), COLLISION), near.knot + 1, np.arange(len(room)))
 
     def depths(self, near: Clearances, N: int) -> Array:
         """By how much each knot is inside the margin at worst, (N,) m, ≥ 0."""

@@ -64,8 +64,9 @@ class Effort:
         V = start.v + T_v @ U
         change = D @ U
         change[0] -= start.u
-        value = 0.5 * float((w.S * V**2).sum() + (w.R * U**2).sum() + (w.W * change**2).sum())
-        return value, (T_v.T @ (w.S * V) + w.R * U + D.T @ (w.W * change)).ravel()
+        v, u, d = w.S * V, w.R * U, w.W * change
+        value = 0.5 * float(np.vdot(v, V) + np.vdot(u, U) + np.vdot(d, change))
+        return value, (T_v.T @ v + u + D.T @ d).ravel()
 
     def about(self, rest: tuple[float, Array], U: Array) -> tuple[float, Array]:
         """Value and gradient of (10) from those at U = 0: it is quadratic."""

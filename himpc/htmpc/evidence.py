@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
 from himpc.htmpc.plan import LevelEvidence
 from himpc.htmpc.problem import Iterate
 from himpc.htmpc.rows import KINDS, Rows
@@ -14,7 +15,6 @@ from himpc.plan import Binding
 
 Array = NDArray[np.float64]
 
-_LEXICOGRAPHIC = KINDS.index("lexicographic")
 _FELT = 1e-6
 """Smaller multipliers are rounding."""
 
@@ -46,7 +46,7 @@ def _binding(name: str, rows: Rows, multipliers: Array, joints: tuple[str, ...])
     )
     found: list[Binding] = []
     for kind, knot, part, multiplier in each:
-        joint = joints[part] if kind < _LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
+        joint = joints[part] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
         side = "upper" if multiplier > 0 else "lower"
         found.append(Binding(name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
     return tuple(found)

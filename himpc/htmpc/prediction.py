@@ -14,13 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.htmpc.kernel.motion import brake
 from himpc.htmpc.settings import Bounds
 
 Array = NDArray[np.float64]
-
-
-_NO_JERK_BOUND = 1e9
-"""Stands in for an infinite jerk where it is multiplied by a speed that may be zero."""
 
 
 class Integrator(NamedTuple):
@@ -69,8 +66,12 @@ def velocities(start: Start, U: Array, dt: float) -> Array:
 
 def positions(start: Start, U: Array, dt: float) -> Array:
     """q at knots 1 … N, (N, n), for inputs U (N, n)."""
-    matrices = integrator(len(U), dt)
-    return start.q + matrices.t[:, None] * start.v + matrices.T_q @ U
+    return coasting(start, len(U), dt) + integrator(len(U), dt).T_q @ U
+
+
+def coasting(start: Start, N: int, dt: float) -> Array:
+    """q at knots 1 … N without inputs, (N, n)."""
+    return start.q + integrator(N, dt).t[:, None] * start.v
 
 
 def braking(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> Array:
@@ -80,20 +81,7 @@ def braking(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> A
     bounds exclude each other (a limit was tightened) the jerk bound holds.
     """
     U = np.empty((N, len(start.v)))
-    q, v, u = start
-    for k in range(N):
-        excess = np.maximum(q - bounds.q_upper, 0.0) - np.maximum(bounds.q_lower - q, 0.0)
-        speed = np.minimum(0.2 * bounds.v, 1.0)
-        back = np.clip(-excess / (5 * dt), -speed, speed)
-        step = bounds.j * (min(period, dt) if k == 0 else dt)
-        # A jerk bound needs time to end the braking: with u = √(2j|v|) speed and input reach zero together.
-        gap = back - v
-        jerk = np.minimum(bounds.j, _NO_JERK_BOUND)
-        most = np.minimum(bounds.a, 0.7 * np.sqrt(2.0 * jerk * np.abs(gap)))
-        wanted = np.clip(gap / dt, -most, most)
-        u = np.clip(wanted, u - step, u + step)
-        q, v = q + dt * v + 0.5 * dt * dt * u, v + dt * u
-        U[k] = u
+    brake(*start, dt, period, bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j, U)
     return U
 
 
@@ -122,6 +110,8 @@ class Motion(NamedTuple):
         rest = s - whole * self.dt
         q = self.start.q + whole * self.dt * self.start.v
         q = q + self.dt**2 * ((whole - np.arange(whole) - 0.5) @ self.U[:whole])
+        if rest == 0.0:
+            return q
         v = self.velocity(whole * self.dt)
         u = self.U[whole] if whole < len(self.U) else np.zeros_like(v)
         return q + rest * v + 0.5 * rest * rest * u

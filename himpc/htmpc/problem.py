@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,21 +13,19 @@ from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import PENALTY, Avoidance
 from himpc.htmpc.clearance import Clearances
 from himpc.htmpc.cost import Effort, barrier, barrier_value, gauss_newton
+from himpc.htmpc.kernel.rows import LEXICOGRAPHIC, guard
 from himpc.htmpc.kinematics import Desired, Knots
-from himpc.htmpc.prediction import Start, braking, integrator, positions
-from himpc.htmpc.rows import KINDS, Rows, Table
+from himpc.htmpc.prediction import Start, braking, coasting, integrator
+from himpc.htmpc.rows import Rows, Table
 from himpc.htmpc.settings import Bounds, HTMPCSettings
 from himpc.htmpc.tracking import Guard, Tracking
 from robots import Robot
 
 Array = NDArray[np.float64]
-_Part = tuple[NDArray[Any], ...]
-"""Bounds and labels of some rows."""
 
 PROXIMAL = 0.03
 """Share of the effort weights that the proximal form has. It only damps: with the full weights a level keeps
 errors of centimetres late in its horizon, which (12) then grants to the levels below."""
-_LEXICOGRAPHIC = KINDS.index("lexicographic")
 _RIDGE = 1e-8
 """Keeps the Hessian positive definite when effort weights are set to zero."""
 
@@ -75,6 +72,16 @@ class Tick:
         """Value and gradient (N·n,) of (10) without inputs."""
         return self.effort.absolute(self.start, np.zeros_like(self.plan))
 
+    @cached_property
+    def coasting(self) -> Array:
+        """q at knots 1 … N without inputs, (N, n)."""
+        return coasting(self.start, self.settings.horizon, self.settings.dt)
+
+    @cached_property
+    def T_q(self) -> Array:
+        """∂q_k/∂u_s, (N, N)."""
+        return integrator(self.settings.horizon, self.settings.dt).T_q
+
     def iterate(self, U: Array) -> Iterate:
         """Inputs (N, n) with what follows from them."""
         return Iterate(self, U)
@@ -86,10 +93,11 @@ class Iterate:
     def __init__(self, tick: Tick, U: Array) -> None:
         self.tick = tick
         self.U = U
-        self.q = positions(tick.start, U, tick.settings.dt)
+        self.q = tick.coasting + tick.T_q @ U
         self.knots = Knots(tick.robot, tick.data, self.q)
         self._errors: dict[str, Array] = {}
         self._jacobians: dict[str, Array] = {}
+        self._efforts: dict[bool, tuple[float, Array]] = {}
 
     def errors(self, level: Tracking) -> Array:
         """e at knots 1 … N, (N, m)."""
@@ -103,6 +111,19 @@ class Iterate:
         if level.name not in self._jacobians:
             self._jacobians[level.name] = level.jacobian(self.knots)
         return self._jacobians[level.name]
+
+    def effort(self, absolute: bool) -> tuple[float, Array]:
+        """Value and gradient (N·n,) of J_eff: (10) itself, or its proximal form."""
+        found = self._efforts.get(absolute)
+        if found is None:
+            tick = self.tick
+            if absolute:
+                found = tick.effort.about(tick.rest, self.U)
+            else:
+                value, slope = tick.effort.relative(self.U, tick.plan)
+                found = PROXIMAL * value, PROXIMAL * slope
+            self._efforts[absolute] = found
+        return found
 
     @cached_property
     def near(self) -> Clearances | None:
@@ -161,66 +182,65 @@ class Problem:
     def merit(self, at: Iterate) -> float:
         """J_l + J_eff, with barriers or penalties for (7c) and (7d)."""
         tick = self.tick
-        value = self.level.cost(at.errors(self.level)) + self._effort(at.U)[0]
+        value = self.level.cost(at.errors(self.level)) + at.effort(self.absolute)[0]
         if self.softened:
             return value + barrier_value(self._soft_rows(at), at.U.ravel())
         return value + PENALTY * float(at.depths.sum()) if tick.avoidance is not None else value
 
     def model(self, at: Iterate) -> tuple[Array, Array]:
         """Hessian (k, k), Gauss-Newton for the errors, and gradient (k,) with respect to the inputs."""
-        tick, N, dt = self.tick, self.tick.settings.horizon, self.tick.settings.dt
+        tick = self.tick
         H, g = gauss_newton(
-            *(at.jacobian(self.level), self.level.Q, at.errors(self.level), integrator(N, dt).T_q),
+            *(at.jacobian(self.level), self.level.Q, at.errors(self.level), tick.T_q),
             *(tick.effort.hessian, 1.0 if self.absolute else PROXIMAL, _RIDGE),
         )
-        g = g + self._effort(at.U)[1]
+        g += at.effort(self.absolute)[1]
         if self.softened:
             _, slope, curvature = barrier(self._soft_rows(at), at.U.ravel())
             H, g = H + curvature, g + slope
         return H, g
 
     def rows(self, at: Iterate, slopes: Iterate | None = None) -> Rows:
-        """The QP's rows for the change d of the inputs, without those that are softened.
+        """The QP's rows for the change d of the inputs, without those that are softened, or may be by slacks.
 
         With `slopes` they lead back: the guards' rows are strict, and have the Jacobians of that iterate.
-        They are views of the tick's table; the next call fills it anew behind the rows of (7d).
+        They lie in the tick's table; the next call fills it anew behind the rows of (7d).
         """
-        tick = self.tick
+        tick, table = self.tick, self.tick.table
         first = place = len(tick.rows.A)
-        parts: list[_Part] = []
         if not self.softened:
-            limits, first = tick.rows.about(at.U.ravel()), 0
-            parts.append(limits[1:])
-        for guard in self.guards:
-            bounds = self._guarded(guard, place, at, slopes)
-            parts.append(bounds)
-            place += len(bounds[0])
-        if not self.softened and at.near is not None and len(at.near.knot) and self.guards:
+            table.about(at.U.ravel(), place)
+            first = 0
+        for above in self.guards:
+            place = self._guarded(above, place, at, slopes)
+        if self.guards and not self.softened and at.near is not None and len(at.near.knot):
             # Below the first level the depth reached is kept: the rows contain d = 0.
             rows = self._avoidance_rows(at, place)
-            parts.append(rows.widened(np.zeros(at.U.size))[1:])
-            place += len(rows.A)
-        return _stacked(tick.table.A[first:place], *parts)
+            place = table.put(place, rows.widened(np.zeros(at.U.size)))
+        return table.changes(first, place)
 
-    def _guarded(self, guard: Guard, place: int, at: Iterate, slopes: Iterate | None) -> _Part:
-        """Writes (12) or (11) for a level above into the table; returns its bounds and labels."""
-        settings, table, strict = self.tick.settings, self.tick.table, slopes is not None
-        N, T_q = settings.horizon, integrator(settings.horizon, settings.dt).T_q
-        e, J = at.errors(guard.tracking), (slopes or at).jacobian(guard.tracking)
-        if settings.lexicographic == "per_coordinate":
-            knots, parts = np.divmod(np.arange(e.size), e.shape[1])
-            if not strict:  # else they are there
-                table.spread(place, knots, J.reshape(e.size, -1), T_q)
-            return *guard.room(e, strict), np.full(e.size, _LEXICOGRAPHIC), knots + 1, parts
-        pull = np.einsum("km,kmj->kj", guard.tracking.Q * e, J)
+    def _guarded(self, above: Guard, place: int, at: Iterate, slopes: Iterate | None) -> int:
+        """Writes (12) or (11) for a level above into the table; returns where its rows end."""
+        tick, table, strict = self.tick, self.tick.table, slopes is not None
+        e, J = at.errors(above.tracking), (slopes or at).jacobian(above.tracking)
+        if tick.settings.lexicographic == "per_coordinate":
+            table.reserve(place + e.size)
+            guard(J, e, above.best, strict, tick.T_q, place, table.A, table.room, table.labels)
+            return place + e.size
+        pull = np.einsum("km,kmj->kj", above.tracking.Q * e, J)
         table.reserve(place + 1)
-        table.A[place] = (T_q.T @ pull).ravel()
-        bounds = np.array([-np.inf]), np.array([guard.gap(e, strict)])
-        return *bounds, np.array([_LEXICOGRAPHIC]), np.array([N]), np.array([0])
+        table.A[place] = (tick.T_q.T @ pull).ravel()
+        table.room[:, place] = -np.inf, above.gap(e, strict)
+        table.labels[:, place] = LEXICOGRAPHIC, tick.settings.horizon, 0
+        return place + 1
 
-    def both(self, rows: Rows, slack: Rows) -> Rows:
-        """`rows` and `slack_rows` of the same iterate: they stand side by side in the table."""
-        return _stacked(self.tick.table.A[: len(rows.A) + len(slack.A)], rows[1:], slack[1:])
+    def with_slack(self, at: Iterate, rows: Rows) -> tuple[Rows, int]:
+        """`rows` of an iterate, followed by (7c) where slacks may buy it: on the first level; and how many
+        rows that are."""
+        if not self.forced or at.near is None or not len(at.near.knot):
+            return rows, 0
+        slack, place = self._avoidance_rows(at, len(rows.A)), len(rows.A)
+        return self.tick.table.changes(0, self.tick.table.put(place, slack)), len(slack.A)
 
     @property
     def unchanging(self) -> int:
@@ -230,27 +250,14 @@ class Problem:
             guarded = sum(guard.best.size for guard in self.guards)
         return guarded + (0 if self.softened else len(self.tick.rows.A))
 
-    def slack_rows(self, at: Iterate) -> Rows | None:
-        """(7c) for the first level, whose violation it buys; None if nothing is near."""
-        if not self.forced or at.near is None or not len(at.near.knot):
-            return None
-        return self._avoidance_rows(at, len(self.tick.rows.A))
-
     def allowed(self, at: Iterate, share: float = 1.0) -> bool:
         """(13): whether no level above has got worse by more than (a share of) its tolerance."""
         settings = self.tick.settings
         per_coordinate = settings.lexicographic == "per_coordinate"
+        delta = share * settings.delta_m
         return all(
-            guard.excess(at.errors(guard.tracking), per_coordinate, share * settings.delta_m) <= 0.0
-            for guard in self.guards
+            above.excess(at.errors(above.tracking), per_coordinate, delta) <= 0.0 for above in self.guards
         )
-
-    def _effort(self, U: Array) -> tuple[float, Array]:
-        effort = self.tick.effort
-        if self.absolute:
-            return effort.about(self.tick.rest, U)
-        value, slope = effort.relative(U, self.tick.plan)
-        return PROXIMAL * value, PROXIMAL * slope
 
     def _avoidance_rows(self, at: Iterate, place: int) -> Rows:
         avoidance, tick = self.tick.avoidance, self.tick
@@ -259,19 +266,11 @@ class Problem:
         return avoidance.rows(at.near, len(at.U), tick.settings.dt, tick.table, place)
 
     def _soft_rows(self, at: Iterate) -> Rows:
+        """(7d) and (7c) on the inputs."""
+        hard = self.tick.rows
         if at.near is None or not len(at.near.knot):
-            return self.tick.rows
-        place = len(self.tick.rows.A)
-        rows = self._avoidance_rows(at, place)
-        every = self.tick.table.A[: place + len(rows.A)]
-        moved = rows._replace(lower=rows.lower + rows.A @ at.U.ravel())
-        return _stacked(every, self.tick.rows[1:], moved[1:])
-
-
-def _stacked(A: Array, *parts: _Part) -> Rows:
-    """Rows whose bounds and labels come in parts."""
-    if not parts:
-        nothing = np.zeros(0, np.int64)
-        return Rows(A, np.zeros(0), np.zeros(0), nothing, nothing, nothing)
-    lower, upper, kind, knot, part = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return Rows(A, lower, upper, kind, knot, part)
+            return hard
+        near = self._avoidance_rows(at, len(hard.A))
+        near = near._replace(lower=near.lower + near.A @ at.U.ravel())
+        A = self.tick.table.A[: len(hard.A) + len(near.A)]
+        return Rows(A, *(np.concatenate(pair) for pair in zip(hard[1:], near[1:], strict=True)))

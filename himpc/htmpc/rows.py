@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.rows import RAMP_STEPS, STOP_STEPS, limits, spread
+from himpc.htmpc.kernel.rows import ACCELERATION, RAMP_STEPS, STOP_STEPS, about, limits, spread
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.settings import Bounds
 
@@ -40,42 +40,29 @@ class Rows(NamedTuple):
         A, lower, upper, kind, knot, part = self
         return Rows(A[chosen], lower[chosen], upper[chosen], kind[chosen], knot[chosen], part[chosen])
 
-    def about(self, u: Array) -> Rows:
-        """The same rows for the change d of u, u + d."""
+    def widened(self, u: Array, last: int = 0) -> Rows:
+        """Bounds moved out just far enough to contain u, but for so many rows at the end."""
         value = self.A @ u
-        return self._replace(lower=self.lower - value, upper=self.upper - value)
-
-    def widened(self, u: Array) -> Rows:
-        """Bounds moved out just far enough to contain u."""
-        value = self.A @ u
-        return self._replace(lower=np.minimum(self.lower, value), upper=np.maximum(self.upper, value))
-
-    def violation(self, u: Array) -> float:
-        """By how much u leaves the bounds, largest row."""
-        value = self.A @ u
-        excess = np.maximum(self.lower - value, value - self.upper)
-        return max(0.0, float(excess.max(initial=0.0)))
-
-
-def joined(*parts: Rows) -> Rows:
-    """All rows of several groups."""
-    return Rows(
-        np.concatenate([rows.A for rows in parts]),
-        np.concatenate([rows.lower for rows in parts]),
-        np.concatenate([rows.upper for rows in parts]),
-        np.concatenate([rows.kind for rows in parts]),
-        np.concatenate([rows.knot for rows in parts]),
-        np.concatenate([rows.part for rows in parts]),
-    )
+        lower, upper = np.minimum(self.lower, value), np.maximum(self.upper, value)
+        end = len(value) - last
+        lower[end:], upper[end:] = self.lower[end:], self.upper[end:]
+        return self._replace(lower=lower, upper=upper)
 
 
 class Table:
-    """Room for all rows of a controller: one array, filled anew at every step. Rows are views of it."""
+    """Room for all rows of a controller, filled anew at every step: those of (7d) first, then those of a QP.
+
+    Attributes:
+        A: rows on the inputs u, or on their change d.
+        bounds: (2, …), lower and upper on Au, for the rows of (7d).
+        room: (2, …), lower and upper on Ad.
+        labels: (3, …), kind, knot and part.
+    """
 
     def __init__(self, columns: int) -> None:
         """columns: N·n."""
         self.A = np.zeros((0, columns))
-        self.bounds = np.zeros((2, 0))
+        self.bounds, self.room = np.zeros((2, 0)), np.zeros((2, 0))
         self.labels = np.zeros((3, 0), np.int64)
 
     def reserve(self, count: int) -> None:
@@ -83,8 +70,35 @@ class Table:
         missing = count - len(self.A)
         if missing > 0:
             self.A = np.vstack([self.A, np.zeros((missing + 100, self.A.shape[1]))])
-            self.bounds = np.hstack([self.bounds, np.zeros((2, missing + 100))])
-            self.labels = np.hstack([self.labels, np.zeros((3, missing + 100), np.int64)])
+            self.bounds, self.room, self.labels = (
+                np.hstack([each, np.zeros((len(each), missing + 100), each.dtype)])
+                for each in (self.bounds, self.room, self.labels)
+            )
+
+    def absolute(self, count: int) -> Rows:
+        """The first rows, on u: views."""
+        return Rows(self.A[:count], *self.bounds[:, :count], *self.labels[:, :count])
+
+    def changes(self, first: int, end: int) -> Rows:
+        """Rows on d from one place to another: views, but for the labels."""
+        return Rows(self.A[first:end], *self.room[:, first:end], *self.labels[:, first:end].copy())
+
+    def about(self, u: Array, count: int) -> None:
+        """Makes the room of the first rows that around u."""
+        about(self.A, self.bounds, u, count, self.room)
+
+    def outside(self, count: int) -> float:
+        """By how much the u of `about` leaves the bounds of the first rows, largest row."""
+        lower, upper = self.room[:, :count]
+        return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
+
+    def put(self, place: int, rows: Rows) -> int:
+        """Bounds and labels of rows on d whose A is there already; returns where they end."""
+        end = place + len(rows.A)
+        self.room[0, place:end], self.room[1, place:end] = rows.lower, rows.upper
+        self.labels[0, place:end], self.labels[1, place:end] = rows.kind, rows.knot
+        self.labels[2, place:end] = rows.part
+        return end
 
     def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
         """From a place on, the rows whose values at knots (r,) have slopes (r, n) in q; returns them."""
@@ -104,14 +118,12 @@ def limit_rows(
     table = Table(N * n) if table is None else table
     table.reserve((4 * N + RAMP_STEPS + STOP_STEPS) * n)
     matrices = integrator(N, dt)
-    q, v, u = (np.array(each, float) for each in start)
-    every = (bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j)
-    in_force = (np.array(each, float) for each in every)
     count = limits(
-        *(matrices.T_v, matrices.T_q, matrices.t, q, v, u, *in_force, period, dt),
+        *(matrices.T_v, matrices.T_q, matrices.t, *start),
+        *(bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j, period, dt),
         *(table.A, table.bounds, table.labels),
     )
-    return Rows(table.A[:count], *table.bounds[:, :count], *table.labels[:, :count])
+    return table.absolute(count)
 
 
 def held(rows: Rows, brake: Array, joints: NDArray[np.int64], table: Table) -> Rows:
@@ -120,15 +132,11 @@ def held(rows: Rows, brake: Array, joints: NDArray[np.int64], table: Table) -> R
     N, n = brake.shape
     chosen = (np.arange(N)[:, None] * n + joints).ravel()
     value = brake.ravel()[chosen]
-    fixed = Rows(
-        np.eye(N * n)[chosen],
-        value,
-        value,
-        np.full(len(chosen), 2),
-        np.repeat(np.arange(N), len(joints)),
-        np.tile(joints, N),
-    )
-    found = joined(rows.take(~np.isin(rows.part, joints)), fixed)
-    table.reserve(len(found.A))
-    table.A[: len(found.A)] = found.A
-    return found._replace(A=table.A[: len(found.A)])
+    labels = np.full(len(chosen), ACCELERATION), np.repeat(np.arange(N), len(joints)), np.tile(joints, N)
+    left = rows.take(~np.isin(rows.part, joints))
+    count = len(left.A) + len(chosen)
+    table.reserve(count)
+    table.A[:count] = np.vstack([left.A, np.eye(N * n)[chosen]])
+    table.bounds[:, :count] = np.hstack([left[1:3], [value, value]])
+    table.labels[:, :count] = np.hstack([left[3:], labels])
+    return table.absolute(count)

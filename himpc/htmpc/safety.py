@@ -53,7 +53,7 @@ def commandable(v: Array, last: Array | None, bounds: Bounds) -> Array:
         bounds: in force.
     """
     most = bounds.v if last is None else np.maximum(bounds.v, np.abs(last))
-    return np.clip(v, -most, most)
+    return np.minimum(np.maximum(v, -most), most)
 
 
 def permitted(start: Start, U: Array, bounds: Bounds, period: float) -> Array:
@@ -69,7 +69,9 @@ def permitted(start: Start, U: Array, bounds: Bounds, period: float) -> Array:
         period: s, how long the first input is commanded.
     """
     fastest = np.maximum(bounds.v, np.abs(start.v))
-    first = np.clip(U[0], (-fastest - start.v) / period, (fastest - start.v) / period)
+    first = np.minimum(np.maximum(U[0], (-fastest - start.v) / period), (fastest - start.v) / period)
     # An acceleration bound tightened below the present input is reached within the jerk bound.
     most = np.maximum(bounds.a, np.abs(start.u) - bounds.j * period)
-    return np.vstack([np.clip(first, -most, most), U[1:]])
+    U = U.copy()
+    U[0] = np.minimum(np.maximum(first, -most), most)
+    return U

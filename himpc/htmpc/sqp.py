@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.avoidance import PENALTY
+from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
 from himpc.htmpc.problem import Iterate, Problem
-from himpc.htmpc.rows import KINDS, Rows
+from himpc.htmpc.rows import Rows
 from himpc.htmpc.working_set import solve_by_working_set
 from himpc.qp import QPSolution
 
@@ -28,7 +29,6 @@ CORRECTIONS = 4
 """So many of the longest steps are led back before they are shortened; see `_led_back`."""
 
 _STILL = 1e-9
-_LEXICOGRAPHIC = KINDS.index("lexicographic")
 _FEASIBLE = 1e-7
 _ROUNDING = 1e-12
 
@@ -106,66 +106,63 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     """The QP's step; when its rows contradict each other, they are moved out to contain full braking."""
     tick = problem.tick
     H, g = problem.model(at)
-    rows, slack = problem.rows(at), problem.slack_rows(at)
-    every = rows if slack is None else problem.both(rows, slack)
+    rows, bought = problem.with_slack(at, problem.rows(at))
     own = tick.settings.solver == "daqp" and tick.method.begin(H)
-    solution = _solve(problem, H, g, rows, slack, own)
+    solution = _solve(problem, H, g, rows, bought, own)
     rung = "solve"
     if not solution.solved:
         # Below the first level d = 0, on it full braking: these satisfy everything that is left.
         safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
         rung = "widened"
-        solution = _solve(problem, H, g, rows.widened(safe), slack, own)
+        solution = _solve(problem, H, g, rows.widened(safe, bought), bought, own)
     if not solution.solved:
-        return _Direction(np.zeros_like(at.U), 0.0, solution, every, "keep", H, g, own)
+        return _Direction(np.zeros_like(at.U), 0.0, solution, rows, "keep", H, g, own)
     size = at.U.size
     slope = float(g @ solution.x[:size])
-    if slack is not None:
+    if bought:
         slope += PENALTY * (float(solution.x[size:].sum()) - float(at.depths.sum()))
-    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, every, rung, H, g, own)
+    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, rows, rung, H, g, own)
 
 
-def _solve(problem: Problem, H: Array, g: Array, rows: Rows, slack: Rows | None, own: bool) -> QPSolution:
-    """min ½dᵀHd + gᵀd under the rows; with slack rows, plus the price of one slack per knot.
+def _solve(problem: Problem, H: Array, g: Array, rows: Rows, bought: int, own: bool) -> QPSolution:
+    """min ½dᵀHd + gᵀd under the rows, plus the price of one slack per knot that may move the last ones out.
 
     Args:
-        problem, H, g, rows, slack: of the level.
+        problem, H, g, rows: of the level.
+        bought: how many rows slacks move out.
         own: whether the compiled method holds H; else, and where it finds no verified point, the QP solver.
     """
     solver = problem.tick.settings.solver
-    if slack is None:
+    if not bought:
         if own:
             solution = problem.tick.method.solve(g, rows, problem.unchanging)
             if solution.solved or solution.status == CONTRADICTION:
                 return solution
-        first = rows.kind == _LEXICOGRAPHIC
+        first = rows.kind == LEXICOGRAPHIC
         return solve_by_working_set(H, g, rows.A, rows.lower, rows.upper, first, solver)
     if own:
         # No slack is bought where the rows can be met and cost less than its price.
-        solution = problem.tick.method.solve(g, problem.both(rows, slack), 0)
-        if solution.solved and _price(solution, slack) <= PENALTY:
+        solution = problem.tick.method.solve(g, rows, 0)
+        if solution.solved and _price(solution, rows, bought) <= PENALTY:
             return solution
     k, N = len(g), problem.tick.settings.horizon
-    bought = np.zeros((len(slack.A), N))
-    bought[np.arange(len(slack.A)), slack.knot - 1] = 1.0
-    count = len(rows.A)
-    A = np.zeros((count + len(slack.A) + N, k + N))
-    A[:count, :k] = rows.A
-    A[count:-N, :k], A[count:-N, k:] = slack.A, bought
+    A = np.zeros((len(rows.A) + N, k + N))
+    A[:-N, :k] = rows.A
+    A[np.arange(-N - bought, -N), k + rows.knot[-bought:] - 1] = 1.0
     A[-N:, k:] = np.eye(N)
     extended = np.zeros((k + N, k + N))
     extended[:k, :k] = H
     extended[k:, k:] = PENALTY * np.eye(N)
-    lower = np.concatenate([rows.lower, slack.lower, np.zeros(N)])
-    upper = np.concatenate([rows.upper, slack.upper, np.full(N, np.inf)])
+    lower = np.concatenate([rows.lower, np.zeros(N)])
+    upper = np.concatenate([rows.upper, np.full(N, np.inf)])
     price = np.concatenate([g, np.full(N, PENALTY)])
     first = np.arange(len(A)) >= len(A) - N
     return solve_by_working_set(extended, price, A, lower, upper, first, solver)
 
 
-def _price(solution: QPSolution, slack: Rows) -> float:
+def _price(solution: QPSolution, rows: Rows, bought: int) -> float:
     """What one metre would be worth at the dearest knot."""
-    paid = np.bincount(slack.knot, np.abs(solution.multipliers[-len(slack.A) :]))
+    paid = np.bincount(rows.knot[-bought:], np.abs(solution.multipliers[-bought:]))
     return float(paid.max())
 
 
@@ -174,16 +171,18 @@ def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[floa
     tick = problem.tick
     merit = problem.merit(at)
     # From outside the bounds the first level has to come back in, whatever that costs.
-    returning = problem.forced and tick.rows.violation(at.U.ravel()) > _FEASIBLE
+    returning = problem.forced and tick.table.outside(len(tick.rows.A)) > _FEASIBLE
     alpha = 1.0
     for attempt in range(BACKTRACKS + 1):
         trial = tick.iterate(at.U + alpha * found.d)
         if returning:
             return alpha, trial
         enough = merit + DECREASE * alpha * min(found.slope, 0.0) + _ROUNDING * (1.0 + abs(merit))
-        if problem.corrects and attempt < CORRECTIONS and not problem.allowed(trial, UNCORRECTED):
+        bends = problem.corrects and attempt < CORRECTIONS
+        fine = bends and problem.allowed(trial, UNCORRECTED)
+        if bends and not fine:
             trial = _led_back(problem, at, found, trial)
-        if problem.allowed(trial) and problem.merit(trial) <= enough:
+        if (fine or problem.allowed(trial)) and problem.merit(trial) <= enough:
             return alpha, trial
         alpha *= SHRINK
     return 0.0, at
@@ -195,5 +194,5 @@ def _led_back(problem: Problem, at: Iterate, found: _Direction, trial: Iterate) 
     The levels' errors are curved: a step along their linear rows leaves (13) by the square of its length, and
     without this second-order correction only short steps are accepted.
     """
-    solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), None, found.own)
+    solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), 0, found.own)
     return problem.tick.iterate(trial.U + solution.x.reshape(trial.U.shape)) if solution.solved else trial

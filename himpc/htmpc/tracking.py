@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ class Tracking:
 
     def cost(self, e: Array) -> float:
         """J of (8) without its constant first term."""
-        return 0.5 * float((self.Q * e * e).sum())
+        return 0.5 * float(np.vdot(self.Q * e, e))
 
 
 def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
@@ -86,21 +87,20 @@ class Guard:
     tracking: Tracking
     best: Array
 
+    @cached_property
+    def reached(self) -> Array:
+        """|e*|, (N, m)."""
+        return np.abs(self.best)
+
     def excess(self, e: Array, per_coordinate: bool, delta: float) -> float:
         """The largest h_i − δ_i of (13); ≤ 0 where a step is allowed.
 
         (12): h = |e| − |e*| in every coordinate and knot. (11): h = J − J*, with δ_J = ½ Σ w δ².
         """
         if per_coordinate:
-            return float((np.abs(e) - np.abs(self.best)).max()) - delta
+            return float((np.abs(e) - self.reached).max()) - delta
         cost = self.tracking.cost
         return cost(e) - cost(self.best) - 0.5 * float(self.tracking.Q.sum()) * delta**2
-
-    def room(self, e: Array, strict: bool = False) -> tuple[Array, Array]:
-        """Bounds (N·m,) of (12) on the change of e, (N, m), in every coordinate and knot; zero is always
-        inside unless `strict`: that does not grant what a step has already taken beyond e*."""
-        room = np.abs(self.best) if strict else np.maximum(np.abs(self.best), np.abs(e))
-        return (-room - e).ravel(), (room - e).ravel()
 
     def gap(self, e: Array, strict: bool = False) -> float:
         """By how much (11) lets the cost grow from that of e; at least zero unless `strict`."""

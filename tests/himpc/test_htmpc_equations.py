@@ -14,6 +14,7 @@ from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import Avoidance
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
+from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
 from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.prediction import (
     Motion,
@@ -280,6 +281,12 @@ def excess(start: Start, U: Array, dt: float, limits: Bounds) -> dict[str, float
     }
 
 
+def violation(rows: Rows, u: Array) -> float:
+    """By how much u leaves the bounds, largest row."""
+    value = rows.A @ u
+    return max(0.0, float(np.maximum(rows.lower - value, value - rows.upper).max(initial=0.0)))
+
+
 def test_rows_hold_exactly_where_the_motion_stays_inside(robot: Robot) -> None:
     """Rows that no admissible input can reach are left out, so only admissible inputs are compared."""
     limits = bounds(robot, MotionLimits())
@@ -294,9 +301,9 @@ def test_rows_hold_exactly_where_the_motion_stays_inside(robot: Robot) -> None:
         for kind, amount in excess(start, U, 0.1, limits).items():
             of_kind = rows.take(rows.kind == KINDS.index(kind))
             if abs(amount) > 1e-9:
-                assert (of_kind.violation(U.ravel()) > 0) == (amount > 0), kind
+                assert (violation(of_kind, U.ravel()) > 0) == (amount > 0), kind
             if amount > 1e-6:
-                assert of_kind.violation(U.ravel()) == pytest.approx(amount)
+                assert violation(of_kind, U.ravel()) == pytest.approx(amount)
                 seen[kind] = seen.get(kind, 0) + 1
     assert min(seen.values()) > 3
 
@@ -310,7 +317,7 @@ def test_ramp_and_stop_rows_leave_a_way_on(robot: Robot) -> None:
         start.q[3:] = rng.uniform(robot.q_lower[3:], robot.q_upper[3:])
         start = start._replace(v=rng.uniform(-1, 1, 9) * limits.v, u=np.zeros(9))
         U = rng.uniform(-1, 1, (2, 9)) * np.minimum(limits.a, 0.1 * limits.j)
-        if limit_rows(start, 2, 0.1, 0.1, limits).violation(U.ravel()) > 0:
+        if violation(limit_rows(start, 2, 0.1, 0.1, limits), U.ravel()) > 0:
             continue
         checked += 1
         end = Start(positions(start, U, 0.1)[-1], velocities(start, U, 0.1)[-1], U[-1])
@@ -326,10 +333,15 @@ def test_widened_rows_contain_what_they_were_widened_for(robot: Robot) -> None:
     start = start_of(robot, 11)._replace(v=2.0 * limits.v)
     rows = limit_rows(start, 5, 0.1, 0.1, limits)
     u = braking(start, 5, 0.1, 0.1, limits).ravel()
-    assert rows.violation(u) > 0.1
-    assert rows.widened(u).violation(u) == 0.0
-    inside = rows.about(u)
-    assert inside.violation(np.zeros_like(u)) == pytest.approx(rows.violation(u))
+    assert violation(rows, u) > 0.1
+    assert violation(rows.widened(u), u) == 0.0
+    table = Table(45)
+    rows = limit_rows(start, 5, 0.1, 0.1, limits, table)
+    table.about(u, len(rows.A))
+    assert table.outside(len(rows.A)) == pytest.approx(violation(rows, u))
+    around = table.changes(0, len(rows.A))
+    assert violation(around, np.zeros_like(u)) == pytest.approx(violation(rows, u))
+    assert violation(around, 0.3 * u) == pytest.approx(violation(rows, 1.3 * u))
 
 
 # ------------------------------------------------------------------ lexicographic constraints
@@ -353,27 +365,29 @@ def test_guard_rows_always_contain_no_change(robot: Robot) -> None:
     """Even where an intermediate level has used its tolerance, so that |e| > |e*|."""
     tick = tick_of(robot)
     level = tracking(robot, tick.settings.stack[0], tick.settings)
+    other = tracking(robot, tick.settings.stack[1], tick.settings)
     at = tick.iterate(0.2 * np.random.default_rng(12).normal(0, 1, (4, 9)))
     e, E = at.errors(level), slopes(at, level)
     for scale in (1.0, 0.5, 2.0):
         guard = Guard(level, scale * e)
-        low, high = guard.room(e)
-        assert (low <= 0.0).all()
-        assert (high >= 0.0).all()
+        rows = Problem(tick, other, (guard,), True).rows(at)
+        rows = rows.take(rows.kind == LEXICOGRAPHIC)
+        assert (rows.lower <= 0.0).all()
+        assert (rows.upper >= 0.0).all()
         assert guard.gap(e) >= 0.0
         # What a step took beyond e* is asked back where it is to be led back.
         assert (guard.gap(e, strict=True) < 0.0) == (scale < 1.0)
-    below = Problem(tick, tracking(robot, tick.settings.stack[1], tick.settings), (Guard(level, e),), True)
+    below = Problem(tick, other, (Guard(level, e),), True)
     rows = below.rows(at)
-    rows = rows.take(rows.kind == KINDS.index("lexicographic"))
+    rows = rows.take(rows.kind == LEXICOGRAPHIC)
     np.testing.assert_allclose(rows.A, E.reshape(-1, 36), atol=1e-15)
-    assert rows.violation(np.zeros(36)) == 0.0
+    assert violation(rows, np.zeros(36)) == 0.0
     worse = np.asarray(np.linalg.lstsq(E.reshape(-1, 36), e.ravel(), rcond=None)[0], np.float64)
-    assert rows.violation(0.1 * worse) > 0.01
-    assert rows.violation(-0.1 * worse) < 1e-9
+    assert violation(rows, 0.1 * worse) > 0.01
+    assert violation(rows, -0.1 * worse) < 1e-9
     cost = tick_of(robot, lexicographic="cost")
     row = Problem(cost, below.level, (Guard(level, e),), True).rows(cost.iterate(at.U))
-    row = row.take(row.kind == KINDS.index("lexicographic"))
+    row = row.take(row.kind == LEXICOGRAPHIC)
     weight = np.asarray(level.Q * e)
     np.testing.assert_allclose(row.A[0], np.einsum("km,kmj->j", weight, E), atol=1e-12)
     np.testing.assert_array_equal(row.upper, [0.0])

@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.compiled import INDICES, MATRIX, VECTOR, WHOLE, entry, piece
-from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
+from himpc.tick.kernel.linear import (
+    backward,
+    close_gap,
+    copy,
+    copy_rows,
+    dot,
+    factorise,
+    forward,
+    split,
+    subtract,
+)
 from himpc.tick.kernel.views import borrowed
 
 Array = NDArray[np.float64]
@@ -93,6 +103,14 @@ def let_go(
     for c in range(place, count - 1):
         active[c], side[c], u[c] = active[c + 1], side[c + 1], u[c + 1]
     close_gap(corner, basis, place, count, basis.shape[1])
+
+
+@entry(MATRIX, MATRIX)
+def factor(H: Array, L: Array) -> bool:
+    """H = LLᵀ, in the lower triangle of L (n, n); False if H is not positive definite."""
+    H, L = borrowed(H), borrowed(L)
+    copy_rows(H, L)
+    return factorise(L, len(L))
 
 
 @entry(

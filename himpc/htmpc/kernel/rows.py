@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from himpc.cascade.compiled import (
     FIXED,
     FIXED_VECTOR,
+    FLAG,
+    GIVEN_MATRIX,
+    GIVEN_VECTOR,
     INDICES,
+    MATRICES,
     MATRIX,
     NUMBER,
     TABLE,
@@ -18,9 +22,13 @@ from himpc.cascade.compiled import (
     WHOLE,
     entry,
 )
+from himpc.tick.kernel.linear import dot
+from himpc.tick.kernel.views import borrowed
 
 Array = NDArray[np.float64]
 
+VELOCITY, POSITION, ACCELERATION, JERK, RAMP, STOP, LEXICOGRAPHIC, COLLISION = range(8)
+"""Kinds of rows."""
 RAMP_STEPS = 10
 """The input is taken back within at most this many knots beyond the horizon."""
 STOP_STEPS = 40
@@ -37,9 +45,52 @@ def spread(A: Array, place: int, knot: NDArray[np.intp], slopes: Array, T_q: Arr
                 A[place + r, s * n + j] = T_q[knot[r], s] * slopes[r, j]
 
 
+@entry(MATRIX, MATRIX, VECTOR, WHOLE, MATRIX)
+def about(A: Array, bounds: Array, u: Array, count: int, room: Array) -> None:
+    """The bounds of the first rows for the change d of u, u + d: A d in [lower − Au, upper − Au] = `room`."""
+    A, u = borrowed(A), borrowed(u)
+    for r in range(count):
+        value = dot(A[r], u, len(u))
+        room[0, r], room[1, r] = bounds[0, r] - value, bounds[1, r] - value
+
+
+@entry(MATRICES, GIVEN_MATRIX, GIVEN_MATRIX, FLAG, FIXED, WHOLE, MATRIX, MATRIX, TABLE)
+def guard(
+    J: Array,
+    e: Array,
+    best: Array,
+    strict: bool,
+    T_q: Array,
+    place: int,
+    A: Array,
+    room: Array,
+    labels: NDArray[np.int64],
+) -> None:
+    """Writes (12), |e + J T_q d| ≤ |e*| in every coordinate and knot, to a table from a place on.
+
+    Args:
+        J, e: (N, m, n) and (N, m), the error of a level above at the iterate. best: e*, (N, m).
+        strict: whether what a step has already taken beyond e* is not granted. The rows of A are then there.
+        T_q: (N, N), ∂q_k/∂u_s. A, room, labels: of the table.
+    """
+    N, m, n = J.shape
+    for k in range(N):
+        for p in range(m):
+            r = place + k * m + p
+            if not strict:
+                for s in range(N):
+                    for j in range(n):
+                        A[r, s * n + j] = T_q[k, s] * J[k, p, j]
+            reach = abs(best[k, p])
+            if not strict:
+                reach = max(reach, abs(e[k, p]))
+            room[0, r], room[1, r] = -reach - e[k, p], reach - e[k, p]
+            labels[0, r], labels[1, r], labels[2, r] = LEXICOGRAPHIC, k + 1, p
+
+
 @entry(
-    *(FIXED, FIXED, FIXED_VECTOR, VECTOR, VECTOR, VECTOR),
-    *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER),
+    *(FIXED, FIXED, FIXED_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR),
+    *(GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, NUMBER, NUMBER),
     *(MATRIX, MATRIX, TABLE),
 )
 def limits(
@@ -67,12 +118,12 @@ def limits(
         for k in range(N):
             for i in range(n):
                 a = a_max[i]
-                if kind == 0:
+                if kind == VELOCITY:
                     middle, low, high, reach = v[i], -v_max[i], v_max[i], t[k] * a
-                elif kind == 1:
+                elif kind == POSITION:
                     middle, low, high = q[i] + t[k] * v[i], q_lower[i], q_upper[i]
                     reach = 0.5 * t[k] ** 2 * a
-                elif kind == 2:
+                elif kind == ACCELERATION:
                     middle, low, high, reach = 0.0, -a, a, math.inf
                 else:
                     change = j_max[i] * (min(period, dt) if k == 0 else dt)
@@ -81,15 +132,15 @@ def limits(
                 low, high = low - middle, high - middle
                 if (math.isfinite(low) or math.isfinite(high)) and (high < reach or low > -reach):
                     A[count] = 0.0
-                    if kind < 2:
+                    if kind <= POSITION:
                         for s in range(k + 1):
-                            A[count, s * n + i] = T_v[k, s] if kind == 0 else T_q[k, s]
+                            A[count, s * n + i] = T_v[k, s] if kind == VELOCITY else T_q[k, s]
                     else:
                         A[count, k * n + i] = 1.0
-                        if kind == 3 and k > 0:
+                        if kind == JERK and k > 0:
                             A[count, (k - 1) * n + i] = -1.0
                     bounds[0, count], bounds[1, count] = low, high
-                    labels[0, count], labels[1, count], labels[2, count] = kind, k + (kind < 2), i
+                    labels[0, count], labels[1, count], labels[2, count] = kind, k + (kind <= POSITION), i
                     count += 1
     # "ramp": |v_N ± Δt (m u_{N−1} − j Δt m(m+1)/2)| ≤ v_max, speed while the input goes back to zero.
     for i in range(n):
@@ -103,7 +154,7 @@ def limits(
             A[count, (N - 1) * n + i] += m * dt
             room = v_max[i] + dt * step * m * (m + 1) / 2
             bounds[0, count], bounds[1, count] = -room - v[i], room - v[i]
-            labels[0, count], labels[1, count], labels[2, count] = 4, N, i
+            labels[0, count], labels[1, count], labels[2, count] = RAMP, N, i
             count += 1
     # "stop": q_N + mΔt v_N ∓ ½a(mΔt)² inside the range, where full braking for m steps leads; left out where
     # the fastest motion that the input bounds permit does not get there.
@@ -126,6 +177,6 @@ def limits(
             coasting = end + ahead * v[i]
             bounds[0, count] = q_lower[i] - brake - coasting
             bounds[1, count] = q_upper[i] + brake - coasting
-            labels[0, count], labels[1, count], labels[2, count] = 5, N, i
+            labels[0, count], labels[1, count], labels[2, count] = STOP, N, i
             count += 1
     return count

@@ -46,31 +46,35 @@ def copy_rows(X: Array, Y: Array) -> None:
 def factorise(H: Array, d: int) -> bool:
     """The lower Cholesky factor F of H = F Fᵀ in place of its lower triangle; False if H is not positive.
 
-    H (d, d) is given by its upper triangle, from the left in panels of four rows: what is left of the matrix
-    is then read and written once for four columns, in lines as long as the matrix is wide.
+    H (d, d) is given by its upper triangle. Row by row F is what solves F_j F_iᵀ = H_ij, four rows i at once:
+    each row j above is then read once for four.
     """
-    for k in range(0, d, 4):
-        width = min(4, d - k)
-        for p in range(k, k + width):
-            row = H[p]
-            for s in range(k, p):
-                subtract(H[s, p], H[s, p:], row[p:], d - p)
-            if not row[p] > 0.0:
-                return False
-            share = 1.0 / row[p] ** 0.5
-            for c in range(p, d):
-                row[c] *= share
-        if width < 4:
-            break
-        a, b, c, e = H[k], H[k + 1], H[k + 2], H[k + 3]
-        for i in range(k + 4, d):
-            row = H[i]
-            fa, fb, fc, fe = a[i], b[i], c[i], e[i]
-            for j in range(i, d):
-                row[j] -= fa * a[j] + fb * b[j] + fc * c[j] + fe * e[j]
     for i in range(d):
         for j in range(i):
             H[i, j] = H[j, i]
+    for i in range(0, d, 4):
+        end = min(i + 4, d)
+        if end == i + 4:
+            a, b, c, e = H[i], H[i + 1], H[i + 2], H[i + 3]
+            for j in range(i):
+                row, share = H[j], 1.0 / H[j, j]
+                sum_a = sum_b = sum_c = sum_e = 0.0
+                for k in range(j):
+                    x = row[k]
+                    sum_a += a[k] * x
+                    sum_b += b[k] * x
+                    sum_c += c[k] * x
+                    sum_e += e[k] * x
+                a[j], b[j] = (a[j] - sum_a) * share, (b[j] - sum_b) * share
+                c[j], e[j] = (c[j] - sum_c) * share, (e[j] - sum_e) * share
+        for p in range(i, end):
+            row = H[p]
+            for j in range(i if end == i + 4 else 0, p):
+                row[j] = (row[j] - dot(row, H[j], j)) / H[j, j]
+            left = row[p] - dot(row, row, p)
+            if not left > 0.0:
+                return False
+            row[p] = left**0.5
     return True
 
 
