@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
-from himpc.htmpc.plan import LevelEvidence
+from himpc.htmpc.plan import Felt, LevelEvidence
 from himpc.htmpc.problem import Iterate
-from himpc.htmpc.rows import KINDS, Rows
+from himpc.htmpc.rows import Rows
 from himpc.htmpc.sqp import Solved
 from himpc.htmpc.tracking import Tracking
-from himpc.plan import Binding
 
 Array = NDArray[np.float64]
 
@@ -19,7 +17,7 @@ _FELT = 1e-6
 """Smaller multipliers are rounding."""
 
 
-def evidence(level: Tracking, solved: Solved, final: Iterate, joints: tuple[str, ...]) -> LevelEvidence:
+def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
     """What `solve_level` found for a level; `final` holds the inputs after all levels."""
     best = solved.at.errors(level)
     return LevelEvidence(
@@ -34,19 +32,12 @@ def evidence(level: Tracking, solved: Solved, final: Iterate, joints: tuple[str,
         iterations=len(solved.steps),
         unsolved=solved.unsolved,
         time_us=solved.time_us,
-        binding=_binding(level.name, solved.rows, solved.multipliers, joints),
+        felt=_felt(solved.rows, solved.multipliers),
     )
 
 
-def _binding(name: str, rows: Rows, multipliers: Array, joints: tuple[str, ...]) -> tuple[Binding, ...]:
+def _felt(rows: Rows, multipliers: Array) -> Felt:
+    """Of slacks, whose multipliers come last, nobody is told."""
     multipliers = multipliers[: len(rows.kind)]
-    felt = np.flatnonzero(np.abs(multipliers) > _FELT)
-    each = zip(
-        *(values[felt].tolist() for values in (rows.kind, rows.knot, rows.part, multipliers)), strict=True
-    )
-    found: list[Binding] = []
-    for kind, knot, part, multiplier in each:
-        joint = joints[part] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
-        side = "upper" if multiplier > 0 else "lower"
-        found.append(Binding(name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
-    return tuple(found)
+    some = np.flatnonzero(np.abs(multipliers) > _FELT)
+    return Felt(rows.kind[some], rows.knot[some], rows.part[some], multipliers[some])

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
-from himpc.htmpc.plan import LevelEvidence, VelocityPlan
+from himpc.htmpc.kernel.rows import VELOCITY
+from himpc.htmpc.plan import Felt, LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start
 from himpc.htmpc.safety import commandable, plausible
 from himpc.htmpc.settings import Bounds, HTMPCSettings, bounds
 from himpc.htmpc.tracking import check_dimensions
-from himpc.plan import Binding
 from himpc.qp import QPSolution, solve_qp
 from himpc.references import Preview
 from himpc.stack import Level
@@ -145,13 +145,9 @@ class HTIDKC:
         )
 
     def _evidence(self, level: Level, gap: Array, solution: QPSolution, begun: int) -> LevelEvidence:
-        names = self.robot.joint_names
-        felt = solution.multipliers[: len(names)]
-        binding = tuple(
-            Binding(level.name, joint, "velocity", "upper" if m > 0 else "lower", 1, abs(float(m)), 0.0)
-            for joint, m in zip(names, felt, strict=True)
-            if abs(m) > 1e-6
-        )
+        multipliers = solution.multipliers[: self.robot.n]
+        part = np.flatnonzero(np.abs(multipliers) > 1e-6)
+        felt = Felt(np.full(len(part), VELOCITY), np.ones(len(part), np.int64), part, multipliers[part])
         return LevelEvidence(
             name=level.name,
             status=solution.status,
@@ -164,7 +160,7 @@ class HTIDKC:
             iterations=1,
             unsolved=int(not solution.solved),
             time_us=(perf_counter_ns() - begun) / 1e3,
-            binding=binding,
+            felt=felt,
         )
 
 

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
 from himpc.htmpc.prediction import Motion
+from himpc.htmpc.rows import KINDS
 from himpc.htmpc.settings import Bounds
 from himpc.plan import Binding
 
 Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+
+class Felt(NamedTuple):
+    """Rows with a multiplier: kind, knot and part as in `Rows`, and the multipliers, all (r,)."""
+
+    kind: Whole
+    knot: Whole
+    part: Whole
+    multiplier: Array
 
 
 class LevelEvidence(NamedTuple):
@@ -31,7 +44,7 @@ class LevelEvidence(NamedTuple):
         iterations: QPs solved, first attempts only.
         unsolved: how many of them had no verified point.
         time_us: wall time.
-        binding: constraints with a multiplier at the last QP.
+        felt: constraints with a multiplier at the last QP.
     """
 
     name: str
@@ -45,7 +58,16 @@ class LevelEvidence(NamedTuple):
     iterations: int
     unsolved: int
     time_us: float
-    binding: tuple[Binding, ...]
+    felt: Felt
+
+    def binding(self, joint_names: Sequence[str]) -> list[Binding]:
+        """The constraints felt, in words."""
+        found: list[Binding] = []
+        for kind, knot, part, multiplier in zip(*(each.tolist() for each in self.felt), strict=True):
+            joint = joint_names[part] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
+            side = "upper" if multiplier > 0 else "lower"
+            found.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
+        return found
 
 
 class VelocityPlan(NamedTuple):
@@ -76,6 +98,10 @@ class VelocityPlan(NamedTuple):
     bounds: Bounds
     clearance: float
     step_us: float
+
+    def binding(self, joint_names: Sequence[str]) -> list[Binding]:
+        """All constraints that bind, level by level."""
+        return [each for level in self.levels for each in level.binding(joint_names)]
 
     @property
     def unsolved(self) -> int:

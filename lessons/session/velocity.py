@@ -154,7 +154,7 @@ class VelocitySession(Session):
         return np.array([task.value(Configuration(self.robot, self._data, q, q)) for q in self.plan.q])
 
     def binding(self) -> list[Binding]:
-        return [] if self.plan is None else [each for level in self.plan.levels for each in level.binding]
+        return [] if self.plan is None else self.plan.binding(self.robot.joint_names)
 
     # ---------------------------------------------------------------- one tick
 

@@ -104,7 +104,7 @@ def test_bounds_evidence_and_accuracy_on_a_square_wave(robot: Robot, rate_hz: fl
         assert plan.leak <= controller.settings.delta_m + 1e-9
         assert [level.name for level in plan.levels] == ["ee", "base"]
         assert all(0.0 <= step <= 1.0 for level in plan.levels for step in level.steps)
-    assert {each.kind for plan in plans for level in plan.levels for each in level.binding} >= {
+    assert {each.kind for plan in plans for each in plan.binding(robot.joint_names)} >= {
         "velocity",
         "jerk",
         "lexicographic",
