@@ -63,8 +63,10 @@ class LevelEvidence(NamedTuple):
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """The constraints felt, in words."""
         found: list[Binding] = []
-        for kind, knot, part, multiplier in zip(*(each.tolist() for each in self.felt), strict=True):
-            joint = joint_names[part] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
+        kinds, knots, parts, values = self.felt
+        each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), strict=True)
+        for kind, knot, part, multiplier in each:
+            joint = joint_names[int(part)] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
             side = "upper" if multiplier > 0 else "lower"
             found.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
         return found

@@ -271,6 +271,11 @@ class Problem:
         if at.near is None or not len(at.near.knot):
             return hard
         near = self._avoidance_rows(at, len(hard.A))
-        near = near._replace(lower=near.lower + near.A @ at.U.ravel())
-        A = self.tick.table.A[: len(hard.A) + len(near.A)]
-        return Rows(A, *(np.concatenate(pair) for pair in zip(hard[1:], near[1:], strict=True)))
+        return Rows(
+            self.tick.table.A[: len(hard.A) + len(near.A)],
+            np.concatenate([hard.lower, near.lower + near.A @ at.U.ravel()]),
+            np.concatenate([hard.upper, near.upper]),
+            np.concatenate([hard.kind, near.kind]),
+            np.concatenate([hard.knot, near.knot]),
+            np.concatenate([hard.part, near.part]),
+        )
