@@ -112,6 +112,14 @@ def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], Learner])
     assert wait_until(lambda: ticks(two) > held + 50, LONG)
 
 
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="Linux only")
+def test_a_simulation_lets_the_ticks_of_another_end(start: Callable[[str], Learner]) -> None:
+    pid = start("planar3-hold").pid
+    assert pid is not None
+    assert os.sched_getscheduler(pid) == os.SCHED_BATCH
+    assert os.sched_getscheduler(0) != os.SCHED_BATCH
+
+
 def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], Learner]) -> None:
     learner = start("planar3-hold")
     pid = learner.pid
