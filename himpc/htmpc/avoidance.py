@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.clearance import Clearances, CollisionModel
 from himpc.htmpc.geometry import Placed
-from himpc.htmpc.kernel.rows import COLLISION
+from himpc.htmpc.kernel.kinds import COLLISION
 from himpc.htmpc.prediction import integrator
 from himpc.htmpc.rows import Rows, Table
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.configuration import Configuration
-from himpc.htmpc.kernel.rows import VELOCITY
+from himpc.htmpc.kernel.kinds import VELOCITY
 from himpc.htmpc.plan import Felt, LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start
 from himpc.htmpc.safety import commandable, plausible

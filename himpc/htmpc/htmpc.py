@@ -13,11 +13,12 @@ from himpc.configuration import Configuration, joint_indices
 from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import Avoidance, clearance
 from himpc.htmpc.clearance import CollisionModel
+from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import Effort
 from himpc.htmpc.evidence import evidence
 from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
-from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
+from himpc.htmpc.prediction import Motion, Start, positions, underway, velocities
 from himpc.htmpc.problem import Problem, Tick
 from himpc.htmpc.rows import Table, held, limit_rows
 from himpc.htmpc.safety import commandable, permitted, plausible

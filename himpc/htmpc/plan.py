@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
+from himpc.htmpc.kernel.kinds import KINDS, LEXICOGRAPHIC
 from himpc.htmpc.prediction import Motion
-from himpc.htmpc.rows import KINDS
 from himpc.htmpc.settings import Bounds
 from himpc.plan import Binding
 

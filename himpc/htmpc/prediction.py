@@ -14,9 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.motion import brake
-from himpc.htmpc.settings import Bounds
-
 Array = NDArray[np.float64]
 
 
@@ -74,17 +71,6 @@ def coasting(start: Start, N: int, dt: float) -> Array:
     return start.q + integrator(N, dt).t[:, None] * start.v
 
 
-def braking(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> Array:
-    """Inputs (N, n) that bring every joint to rest as fast as its bounds allow, and back inside its range.
-
-    A joint beyond a position bound is sent back at up to a fifth of its speed limit. When input and jerk
-    bounds exclude each other (a limit was tightened) the jerk bound holds.
-    """
-    U = np.empty((N, len(start.v)))
-    brake(*start, dt, period, bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j, U)
-    return U
-
-
 class Motion(NamedTuple):
     """A plan as a function of time: velocities linear between knots that lie dt apart.
 
@@ -115,30 +101,6 @@ class Motion(NamedTuple):
         v = self.velocity(whole * self.dt)
         u = self.U[whole] if whole < len(self.U) else np.zeros_like(v)
         return q + rest * v + 0.5 * rest * rest * u
-
-
-def shifted(before: Motion, s: float, N: int, dt: float, bounds: Bounds) -> Array:
-    """The inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N times dt.
-
-    Each is the mean of the old input over the new interval, so the velocities at the new knots are the old
-    plan's at those times, whatever the control rate and even if N or dt has changed. Beyond its end the old
-    plan brakes: one that coasts makes hard limits infeasible for good.
-    """
-    reach = s + N * dt
-    length = len(before.U) * before.dt
-    missing = max(0, math.ceil((reach - length) / before.dt - 1e-9))
-    U = before.U
-    if missing:
-        end = Start(before.position(length), before.velocity(length), before.U[-1])
-        U = np.vstack([U, braking(end, missing, before.dt, before.dt, bounds)])
-    whole = round(s / dt)
-    if dt == before.dt and abs(s - whole * dt) < 1e-12:
-        return U[whole : whole + N].copy()
-    V = np.vstack([before.start.v, velocities(before.start, U, before.dt)])
-    old = before.dt * np.arange(len(V))
-    new = s + dt * np.arange(N + 1)
-    sampled = np.array([np.interp(new, old, column) for column in V.T]).T
-    return np.diff(sampled, axis=0) / dt
 
 
 def underway(past: Sequence[Motion], period: float, delay: float) -> Array:

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import PENALTY, Avoidance
 from himpc.htmpc.clearance import Clearances
+from himpc.htmpc.continuing import braking
 from himpc.htmpc.cost import Effort, barrier, barrier_value, gauss_newton
-from himpc.htmpc.kernel.rows import LEXICOGRAPHIC, guard
+from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC
+from himpc.htmpc.kernel.rows import guard
 from himpc.htmpc.kinematics import Desired, Knots
-from himpc.htmpc.prediction import Start, braking, coasting, integrator
+from himpc.htmpc.prediction import Start, coasting, integrator
 from himpc.htmpc.rows import Rows, Table
 from himpc.htmpc.settings import Bounds, HTMPCSettings
 from himpc.htmpc.tracking import Guard, Tracking

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.rows import ACCELERATION, RAMP_STEPS, STOP_STEPS, about, limits, spread
+from himpc.htmpc.kernel.kinds import ACCELERATION
+from himpc.htmpc.kernel.rows import RAMP_STEPS, STOP_STEPS, about, limits, spread
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.settings import Bounds
 
 Array = NDArray[np.float64]
-KINDS = ("velocity", "position", "acceleration", "jerk", "ramp", "stop", "lexicographic", "collision")
 
 
 class Rows(NamedTuple):

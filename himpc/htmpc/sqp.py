@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.avoidance import PENALTY
-from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
+from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC
 from himpc.htmpc.problem import Iterate, Problem
 from himpc.htmpc.rows import Rows
 from himpc.htmpc.working_set import solve_by_working_set

@@ -26,7 +26,7 @@ FURTHER = Step(
     The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps
     of a millisecond, and that the first of 20 torque changes is applied. The ghost looks one step
     ahead (HIQP). Remark 9 says: choose $N$ as large as the computer allows. Ours would allow it: a
-    step takes about 0.04 ms with $N = 5$, 0.13 with 20 and 0.25 with 30, of the millisecond there
+    step takes about 0.04 ms with $N = 5$, 0.12 with 20 and 0.21 with 30, of the millisecond there
     is.
     """,
     do="Go through N = 1, 2, 5, 10, 20 and read the time per step. Then leave N alone and double M̄.",

@@ -13,21 +13,20 @@ from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
 from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import Avoidance
 from himpc.htmpc.clearance import CollisionModel
+from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
-from himpc.htmpc.kernel.rows import LEXICOGRAPHIC
+from himpc.htmpc.kernel.kinds import KINDS, LEXICOGRAPHIC
 from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.prediction import (
     Motion,
     Start,
-    braking,
     integrator,
     positions,
-    shifted,
     underway,
     velocities,
 )
 from himpc.htmpc.problem import Iterate, Problem, Tick
-from himpc.htmpc.rows import KINDS, Rows, Table, limit_rows
+from himpc.htmpc.rows import Rows, Table, limit_rows
 from himpc.htmpc.settings import Bounds, efforts
 from himpc.htmpc.tracking import Guard, Tracking, tracking
 from himpc.references import Hold, Preview

@@ -166,5 +166,5 @@ def test_texts_that_name_a_step_time_name_the_readmes() -> None:
     text = load_lesson("how-far-ahead").steps[0].text
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     quoted = re.findall(r"0\.\d\d", text)
-    assert quoted == ["0.04", "0.13", "0.25"]
+    assert quoted == ["0.04", "0.12", "0.21"]
     assert all(each in readme for each in quoted)

@@ -32,7 +32,7 @@ def brake(
     j_max: Array,
     U: Array,
 ) -> None:
-    """See `prediction.braking`; U (N, n) is the result."""
+    """See `continuing.braking`; U (N, n) is the result."""
     for i in range(len(q_0)):
         q, v, u = q_0[i], v_0[i], u_0[i]
         speed = min(0.2 * v_max[i], 1.0)

@@ -22,13 +22,12 @@ from himpc.cascade.compiled import (
     WHOLE,
     entry,
 )
+from himpc.htmpc.kernel.kinds import ACCELERATION, JERK, LEXICOGRAPHIC, POSITION, RAMP, STOP, VELOCITY
 from himpc.tick.kernel.linear import dot
 from himpc.tick.kernel.views import borrowed
 
 Array = NDArray[np.float64]
 
-VELOCITY, POSITION, ACCELERATION, JERK, RAMP, STOP, LEXICOGRAPHIC, COLLISION = range(8)
-"""Kinds of rows."""
 RAMP_STEPS = 10
 """The input is taken back within at most this many knots beyond the horizon."""
 STOP_STEPS = 40
