@@ -95,9 +95,8 @@ class Table:
     def put(self, place: int, rows: Rows) -> int:
         """Bounds and labels of rows on d whose A is there already; returns where they end."""
         end = place + len(rows.A)
-        self.room[0, place:end], self.room[1, place:end] = rows.lower, rows.upper
-        self.labels[0, place:end], self.labels[1, place:end] = rows.kind, rows.knot
-        self.labels[2, place:end] = rows.part
+        self.room[:, place:end] = rows.lower, rows.upper
+        self.labels[:, place:end] = rows.kind, rows.knot, rows.part
         return end
 
     def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:

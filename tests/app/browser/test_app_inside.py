@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -53,14 +54,14 @@ def learner_of(server: PageServer) -> Learner:
     return server.sessions.learners[0]
 
 
+FIND = """([title, name]) => { const all = [...document.querySelectorAll("[data-chart]")];
+             const it = all.find((e) => e.dataset.chart === title)?.querySelector("." + name);
+             return it ? it.dataset.at : null; }"""
+
+
 def point(page: Page, name: str) -> np.ndarray | None:
     """Where a point of the picture is, N·m, to ten digits."""
-    found = page.evaluate(
-        """([title, name]) => { const all = [...document.querySelectorAll("[data-chart]")];
-             const it = all.find((e) => e.dataset.chart === title)?.querySelector("." + name);
-             return it ? it.dataset.at : null; }""",
-        [PLANE, name],
-    )
+    found = page.evaluate(FIND, [PLANE, name])
     return None if found is None else np.array([float(value) for value in str(found).split(",")])
 
 
@@ -88,35 +89,37 @@ def agrees(page: Page, server: PageServer) -> bool:
     )
 
 
-def watched(page: Page, name: str) -> None:
-    """From now on the page notes where a point is, ten times a second."""
+@contextmanager
+def watched(page: Page, names: Sequence[str]) -> Iterator[None]:
+    """Meanwhile the page notes ten times a second where points are."""
     page.evaluate(
-        """([title, name]) => {
-             const seen = ((window.seen ??= {})[name] = []);
-             const look = () => {
-               const all = [...document.querySelectorAll("[data-chart]")];
-               const it = all.find((e) => e.dataset.chart === title)?.querySelector("." + name);
-               if (it) seen.push(it.dataset.at.split(",").map(Number));
-             };
-             look();
-             setInterval(look, 100);
-           }""",
-        [PLANE, name],
+        f"""([title, names]) => {{
+             const find = {FIND};
+             window.seen = Object.fromEntries(names.map((name) => [name, []]));
+             window.looking = setInterval(() => {{
+               for (const name of names) {{
+                 const at = find([title, name]);
+                 if (at) window.seen[name].push(at.split(",").map(Number));
+               }}
+             }}, 100);
+           }}""",
+        [PLANE, list(names)],
     )
+    yield
+    page.evaluate("() => clearInterval(window.looking)")
 
 
 def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer) -> None:
     """Seen from before the drag on: where a browser is slow, all is at rest again when it ends."""
     names = ("optimum-1", "optimum-2")
-    for name in names:
-        watched(sheet, name)
 
     def moved() -> bool:
         paths = [np.array(sheet.evaluate("(name) => window.seen[name]", name)) for name in names]
-        return all(float(np.ptp(path, axis=0).max()) > 1e-3 for path in paths)
+        return all(len(path) > 1 and float(np.ptp(path, axis=0).max()) > 1e-3 for path in paths)
 
-    drag_target(sheet, axis=0, along=0.12, arm=ARM)
-    assert eventually(sheet, moved)
+    with watched(sheet, names):
+        drag_target(sheet, axis=0, along=0.12, arm=ARM)
+        assert eventually(sheet, moved)
     # At rest level 2 is held away from what it would choose alone, and the two agree with the solver.
     assert eventually(sheet, lambda: point(sheet, "wish-2") is not None)
     stand_still(sheet, drawing)
