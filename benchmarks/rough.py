@@ -216,14 +216,20 @@ def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
 
 
 def _memory_left() -> set[str]:
-    """What has a name in shared memory, and rings that this process still looks at."""
-    named = {f"/dev/shm/{path.name}" for path in Path("/dev/shm").glob("*")}
-    return named | {line.strip() for line in _maps() if "himpc-lab" in line}
+    """What has a name in shared memory and is no other living program's, and rings that this process still
+    looks at."""
+    found = {f"/dev/shm/{path.name}" for path in Path("/dev/shm").glob("*")}
+    others = {line.split()[-1] for each in psutil.pids() if each != os.getpid() for line in _maps(each)}
+    # Its owner may have taken a name away meanwhile.
+    named = {name for name in found - others if os.path.exists(name)}
+    return named | {line.strip() for line in _maps(os.getpid()) if "himpc-lab" in line}
 
 
-def _maps() -> list[str]:
-    maps = Path("/proc/self/maps")
-    return maps.read_text().splitlines() if maps.exists() else []
+def _maps(process: int) -> list[str]:
+    try:
+        return Path(f"/proc/{process}/maps").read_text().splitlines()
+    except OSError:  # it has ended, or is not ours to look at
+        return []
 
 
 if __name__ == "__main__":

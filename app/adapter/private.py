@@ -20,6 +20,7 @@ import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
+from app.adapter.plain import plain
 from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.wake import WakeUp
 from robots import InputError
@@ -42,11 +43,10 @@ _UNSENT = 32_000
 
 _OF_MODULES = (
     (_messages, ("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage")),
-    (_messages, ("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect")),
+    (_messages, ("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect", "Message")),
     (_messages, ("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage")),
-    (_messages, ("FileTransferStartUpload", "FileTransferPart", "Message")),
-    (_messages, ("TransformControlsUpdateMessage", "SceneNodeDragMessage")),
-    (_messages, ("SceneNodeClickMessage", "ScenePointerMessage")),
+    (_messages, ("FileTransferStartUpload", "FileTransferPart", "ScenePointerMessage")),
+    (_messages, ("TransformControlsUpdateMessage", "SceneNodeDragMessage", "SceneNodeClickMessage")),
     (infra.WebsockClientConnection, ("_handle_incoming_message",)),
 )
 _OF_A_SERVER = (
@@ -146,8 +146,8 @@ def _keep_awake(server: viser.ViserServer) -> None:
 def senders(server: viser.ViserServer) -> list[asyncio.Event]:
     """What wakes each of them: of all clients together, then of each."""
     websockets = server._websock_server
-    buffers = [each.message_buffer for each in list(websockets._client_state_from_id.values())]
-    return [buffer.message_event for buffer in (websockets._broadcast_buffer, *buffers)]
+    each = [one.message_buffer for one in list(websockets._client_state_from_id.values())]
+    return [buffer.message_event for buffer in (websockets._broadcast_buffer, *each)]
 
 
 # ---------------------------------------------------------------- one client
@@ -288,13 +288,13 @@ def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> No
 # ---------------------------------------------------------------- one node of the scene
 
 
-def shift(node: viser.FrameHandle, position: np.ndarray) -> None:
+def shift(node: viser.SceneNodeHandle, at: np.ndarray) -> None:
     """Moves a node, (3,) m; assigning compares at length with what was."""
-    node._impl.position[:] = position
-    node._impl.api._queue_scene_message(_messages.SetPositionMessage(node.name, tuple(position.tolist())))
+    node._impl.position[:] = at
+    node._impl.api._queue_scene_message(plain(_messages.SetPositionMessage)(node.name, tuple(at.tolist())))
 
 
-def turn(node: viser.FrameHandle, wxyz: np.ndarray) -> None:
-    """Turns a node."""
-    node._impl.wxyz[:] = wxyz
-    node._impl.api._queue_scene_message(_messages.SetOrientationMessage(node.name, tuple(wxyz.tolist())))
+def turn(node: viser.FrameHandle, to: np.ndarray) -> None:
+    """Turns a node, wxyz."""
+    node._impl.wxyz[:] = to
+    node._impl.api._queue_scene_message(plain(_messages.SetOrientationMessage)(node.name, tuple(to.tolist())))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.adapter import private
 from app.client.corners import corners
 from app.html.palette import RGB
 
@@ -70,6 +71,6 @@ class Trails:
         moving = self._scale > 1 and bool(np.linalg.norm(larger[-1] - larger[0]) > 0.03)
         self._label.visible = moving
         if moving:
-            self._label.position = larger[-1]
+            private.shift(self._label, larger[-1])
             milliseconds = 1e3 * T_s * (len(path) - 1)
             self._label.text = f"predicted {milliseconds:g} ms, motion × {self._scale}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import re
+from concurrent.futures import ThreadPoolExecutor
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -120,7 +121,8 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
     asking = Asking(gui, prediction, lambda _: None)
     slider = gui.add_slider.return_value
     slider.value = STEPS
-    asyncio.run(slider.on_update.call_args.args[0](None))
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+        elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](None))).result()
     assert figure(prediction.high, prediction.measure.unit) in picture.content
     graded = prediction.low * 2
     asking.show(

@@ -126,7 +126,8 @@ class Chart:
         low, high = self._span
         if self._log:
             values = np.log10(np.maximum(values, 10.0 ** (low - 1)))
-        values = np.clip(np.nan_to_num(values, nan=low, posinf=high, neginf=low), low, high)
+        values = np.clip(values, low, high)
+        values[np.isnan(values)] = low
         if not self._log:
             start = int(np.argmax(known))
             values[:, :start] = values[:, start : start + 1]
