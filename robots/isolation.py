@@ -11,8 +11,9 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing.connection import wait
 from pathlib import Path
-from typing import TypeVar
+from typing import NoReturn, TypeVar, final
 
 from robots.errors import InputError, shortened
 
@@ -64,7 +65,9 @@ class Fault(Exception):
     """Isolated work did not come to an end; says why, for the end of a sentence."""
 
 
-def isolated(function: Callable[..., _T], *args: object, within: Allowance | None = None) -> _T:
+def isolated(
+    function: Callable[..., _T], *args: object, within: Allowance | None = None, copied: bool = False
+) -> _T:
     """function(*args), run in a process that starts empty and ends with this one.
 
     A process of its own, not a fork: it works from any thread, and from daemonic processes, which may
@@ -74,30 +77,18 @@ def isolated(function: Callable[..., _T], *args: object, within: Allowance | Non
         function: of a module; it, its arguments and its result must be picklable.
         args: of the function.
         within: what it may cost; DEADLINE and MEMORY by default.
+        copied: whether it may start as a copy of this process instead, where the system can make one: what
+            is imported here is there at once, and counts against the limit of memory.
 
     Raises:
         InputError: the function raised it.
         Fault: it crashed, took too long or needed too much memory.
     """
     within = within or Allowance(DEADLINE)
-    folder = str(Path(__file__).parents[1])
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(dict.fromkeys((folder, *filter(None, sys.path)))),
-        # Each thread of a matrix library reserves memory that counts against the limit.
-        "OPENBLAS_NUM_THREADS": "1",
-        "OMP_NUM_THREADS": "1",
-    }
-    limits = (str(os.getpid()), str(within.seconds), str(within.memory))
-    with subprocess.Popen(
-        (sys.executable, "-P", "-c", "from robots.isolation import serve; serve()", *limits),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env=environment,
-    ) as child:
+    request = pickle.dumps((function, args))
+    with _Copy(request, within) if copied and _copies() else _empty(within) as child:
         try:
-            answer = _answer_of(child, pickle.dumps((function, args)), within.seconds)
+            answer = _answer_of(child, request, within.seconds)
         except subprocess.TimeoutExpired:
             raise Fault(within.too_long) from None
         finally:
@@ -112,7 +103,91 @@ def isolated(function: Callable[..., _T], *args: object, within: Allowance | Non
     return result
 
 
-def _answer_of(child: subprocess.Popen[bytes], request: bytes | None, seconds: float) -> bytes:
+def threads() -> int:
+    """Threads of this process (Linux)."""
+    return len(os.listdir("/proc/self/task"))
+
+
+def _copies() -> bool:
+    """Other systems' libraries do not survive a fork; nor does it go on where another thread holds a lock."""
+    return sys.platform == "linux" and hasattr(os, "pidfd_open") and threads() == 1
+
+
+def _empty(within: Allowance) -> subprocess.Popen[bytes]:
+    folder = str(Path(__file__).parents[1])
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(dict.fromkeys((folder, *filter(None, sys.path)))),
+        # Each thread of a matrix library reserves memory that counts against the limit.
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+    }
+    limits = (str(os.getpid()), str(within.seconds), str(within.memory))
+    return subprocess.Popen(
+        (sys.executable, "-P", "-c", "from robots.isolation import serve; serve()", *limits),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env=environment,
+    )
+
+
+@final
+class _Copy:
+    """A fork of this process that answers one request; of a Popen's methods what is needed here."""
+
+    def __init__(self, request: bytes, within: Allowance) -> None:
+        self.returncode = 1
+        self._answer = os.memfd_create("answer")
+        parent = os.getpid()
+        self.pid = os.fork()
+        if self.pid == 0:
+            _be_a_copy(request, within, parent, self._answer)
+        self._end = os.pidfd_open(self.pid)
+
+    def __enter__(self) -> _Copy:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.returncode = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        os.close(self._answer)
+        os.close(self._end)
+
+    def communicate(self, _: bytes | None, timeout: float) -> tuple[bytes, None]:
+        if not wait((self._end,), timeout):
+            raise subprocess.TimeoutExpired((), timeout)
+        return os.pread(self._answer, os.fstat(self._answer).st_size, 0), None
+
+    def kill(self) -> None:
+        os.kill(self.pid, signal.SIGKILL)
+
+
+def _be_a_copy(request: bytes, within: Allowance, parent: int, out: int) -> NoReturn:
+    code = 1
+    try:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        _restrict(within, parent)
+        _let_go(out)
+        with os.fdopen(out, "wb") as file:
+            file.write(_answer(request, within))
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def _let_go(out: int) -> None:
+    """Closes whatever the process that was copied has open but one; what is printed goes nowhere."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number in range(3):
+        os.dup2(nowhere, number)
+    os.closerange(3, out)
+    os.closerange(out + 1, os.sysconf("SC_OPEN_MAX"))
+    sys.stdin = os.fdopen(0, closefd=False)
+    sys.stdout = os.fdopen(1, "w", encoding="utf-8", errors="replace", closefd=False)
+    sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="replace", closefd=False)
+
+
+def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, seconds: float) -> bytes:
     """What it prints. Raises TimeoutExpired after so many seconds of its own, see `Allowance`."""
     began, longest, more = time.monotonic(), PATIENCE * seconds, seconds
     while True:

@@ -20,11 +20,11 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import NoReturn
 
 from app.link.children import Forked, one_thread_each
 from app.link.wire import Handle, Wire, packed
+from robots.isolation import threads
 from robots.orphans import end_with
 
 PATIENCE = 10.0
@@ -165,11 +165,6 @@ def serve(control: int, life: int, worker: str) -> NoReturn:
     gc.disable()
     wire.send(Prepared())
     _Nest(wire, module.main).run()
-
-
-def threads() -> int:
-    """Threads of this process."""
-    return len(list(Path("/proc/self/task").iterdir()))
 
 
 class _Nest:

@@ -121,7 +121,7 @@ def grade_apart(submission: Submission) -> Grade:
     source, asked = submission.source, submission.exercise
     with _placed(source) as here:
         try:
-            found = isolated(graded, here, asked, submission.seed, within=submission.within)
+            found = isolated(graded, here, asked, submission.seed, within=submission.within, copied=True)
         except Fault as fault:
             found = Grade(here.path, here.digest, asked or "", error=f"{here.path}: {fault}")
         except InputError as error:

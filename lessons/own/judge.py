@@ -23,7 +23,7 @@ LOADING = Allowance(20.0, 2_000_000_000, "loading it", "ends the program", "leav
 @lru_cache(maxsize=64)
 def _judged(source: Source) -> Kind:
     try:
-        return isolated(_kind, source, within=LOADING)
+        return isolated(_kind, source, within=LOADING, copied=True)
     except Fault as fault:
         raise InputError(f"{source.path}: {fault}") from None
 

@@ -6,7 +6,10 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import misbehaving
@@ -51,13 +54,62 @@ def test_what_libraries_print_does_not_spoil_the_answer() -> None:
     assert isolated(misbehaving.chatter) == "heard"
 
 
-def test_it_dies_with_its_parent(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def alone() -> Iterator[ProcessPoolExecutor]:
+    """A process with one thread, of which there can be copies."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        yield pool
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (misbehaving.crash, "SIGSEGV"),
+        (misbehaving.eat, "1 GB of memory"),
+        (misbehaving.descend, "too deeply"),
+        (misbehaving.leave, "exit code 0"),
+        (time.sleep, "takes longer than 1 s"),
+    ],
+)
+def test_a_copy_that_crashes_is_a_sentence(work, words: str, alone: ProcessPoolExecutor) -> None:
+    args, seconds = ((3600.0,), 1.0) if work is time.sleep else ((), 10.0)
+    answer = alone.submit(misbehaving.apart, work, *args, seconds=seconds).result(60)
+    assert words in answer
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems make no copies")
+def test_a_copy_has_what_is_imported_and_nothing_that_is_open(alone: ProcessPoolExecutor) -> None:
+    """What it does to itself is its own, too."""
+    for _ in range(2):
+        seen = alone.submit(misbehaving.apart, misbehaving.seen_by, "a copy").result(60)
+        assert seen == ["the original", "a copy"]
+    assert alone.submit(misbehaving.open_files).result(60)
+    assert alone.submit(misbehaving.apart, misbehaving.open_files).result(60) == {"/memfd:answer"}
+    assert alone.submit(misbehaving.apart, misbehaving.chatter).result(60) == "heard"
+
+
+def test_a_process_with_two_threads_is_not_copied() -> None:
+    """What the other thread holds would stay locked."""
+    over = threading.Event()
+    other = threading.Thread(target=over.wait)
+    other.start()
+    try:
+        assert misbehaving.apart(misbehaving.seen_by, "another") == ["another"]
+    finally:
+        over.set()
+        other.join()
+
+
+@pytest.mark.parametrize("copied", [False, True])
+def test_it_dies_with_its_parent(tmp_path: Path, copied: bool) -> None:
     file = tmp_path / "pid"
     code = (
-        f"import misbehaving; from robots.isolation import isolated as i; i(misbehaving.stay, {str(file)!r})"
+        "import misbehaving; from robots.isolation import isolated as i; "
+        f"i(misbehaving.stay, {str(file)!r}, copied={copied})"
     )
     path = os.pathsep.join(filter(None, sys.path))
-    with subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": path}) as parent:
+    environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+    with subprocess.Popen([sys.executable, "-c", code], env=environment) as parent:
         while not (file.exists() and file.read_text()):
             assert parent.poll() is None
             time.sleep(0.02)
