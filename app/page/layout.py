@@ -204,8 +204,7 @@ class Stage:
                 self._after_reset(moment.status, first=self._resets is None)
                 self._resets = moment.status.resets
             self._face.follow(moment)
-        if plots:
-            with self._client.atomic():
+            if plots:
                 self._face.draw(moment)
                 if self._ghost is not None and moment.ghost is not None:
                     self._ghost.draw(moment.ghost)
