@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+import multiprocessing
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from submissions import PD, RIGHT, SUBMISSIONS
 
 from lessons.exercises import EXERCISES, load_exercise, start_of
-from lessons.exercises.folder import grade_folder
-from lessons.exercises.grade import WITHIN, Submission, grade, grade_apart, judged_by
+from lessons.exercises.folder import Row, grade_folder
+from lessons.exercises.grade import WITHIN, Grade, Submission, grade, grade_apart, judged_by
 from lessons.own.files import Source, execute, read
 from lessons.parallel import on_cores, one_by_one
 from robots import InputError
@@ -55,6 +58,39 @@ def file(tmp_path: Path):
     return write
 
 
+@pytest.fixture(scope="module")
+def marked() -> Iterator[Callable[..., Grade]]:
+    """`grade` or `grade_apart` in a process that has one thread, as a program has that grades: it imports
+    once what every grading needs."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        yield lambda grader, *args: pool.submit(grader, *args).result()
+
+
+@dataclass(frozen=True)
+class Graded:
+    """What came of a folder: its table, as it was returned and as it was written, and each file's grade."""
+
+    rows: list[Row]
+    table: str
+    grades: dict[str, Grade]
+    shares: list[float]
+
+
+@pytest.fixture(scope="module")
+def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
+    """All submissions, on all cores."""
+    place, shares, grades = tmp_path_factory.mktemp("thirty"), [], {}
+
+    def kept(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
+        for at, found in on_cores(function, items):
+            grades[Path(items[at].source.path).stem] = found
+            yield at, found
+
+    out, folder = place / "grades.csv", folder_of(place / "all", list(SUBMISSIONS))
+    rows = grade_folder(folder, None, 0, out, kept, shares.append)
+    return Graded(rows, out.read_text(), grades, shares)
+
+
 def here(path: str, exercise: str, about: str = ""):
     """The lines of the checks about something, without the process of its own."""
     execute(read(path))
@@ -64,8 +100,10 @@ def here(path: str, exercise: str, about: str = ""):
 
 
 @pytest.mark.parametrize("exercise", EXERCISES)
-def test_right_solution_gets_every_grade_point(exercise: str, file) -> None:
-    lines = here(file(RIGHT[exercise]), exercise)
+def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) -> None:
+    found = thirty.grades[f"right_{exercise.replace('-', '_')}"]
+    assert (found.exercise, found.passed) == (exercise, True)
+    lines = found.lines
     assert [line.check for line in lines if line.why] == [], lines
     assert sum(line.of for line in lines) == 10
 
@@ -98,9 +136,9 @@ MISBEHAVING = {
 
 
 @pytest.mark.parametrize("what", MISBEHAVING)
-def test_what_cannot_be_graded_is_a_sentence(what: str, file) -> None:
+def test_what_cannot_be_graded_is_a_sentence(what: str, file, marked) -> None:
     text, words = MISBEHAVING[what]
-    found = grade(file(text))
+    found = marked(grade, file(text))
     assert words in found.error
     assert (found.points, found.passed) == (0, False)
 
@@ -117,18 +155,18 @@ def test_what_cannot_be_graded_is_a_sentence(what: str, file) -> None:
         ("[0] * 10**13", "memory"),
     ],
 )
-def test_what_a_submission_must_not_do_costs_it_the_grade(text: str, words: str, file) -> None:
+def test_what_a_submission_must_not_do_costs_it_the_grade(text: str, words: str, file, marked) -> None:
     body = f"    {text}\n    return now.gravity\n"
-    found = grade(file(f"EXERCISE = 'joint-pd'\ndef torque(now):\n{body}"))
+    found = marked(grade, file(f"EXERCISE = 'joint-pd'\ndef torque(now):\n{body}"))
     assert found.lines
     assert not found.passed
     assert any(words in line.why for line in found.lines)
     assert not Path("/tmp/himpc-grade").exists()
 
 
-def test_a_grade_comes_out_the_same_twice(file) -> None:
+def test_a_grade_comes_out_the_same_twice(file, marked) -> None:
     path = file(PD.replace("now.gravity +", "0.9 * now.gravity +"))
-    assert grade(path, "joint-pd", 3) == grade(path, "joint-pd", 3)
+    assert marked(grade, path, "joint-pd", 3) == marked(grade, path, "joint-pd", 3)
 
 
 @pytest.mark.parametrize(
@@ -140,12 +178,14 @@ def test_a_grade_comes_out_the_same_twice(file) -> None:
     ],
     ids=["endless when loaded", "sleeps when loaded", "sleeps a little, always"],
 )
-def test_what_never_ends_is_ended_and_its_grade_is_a_sentence(text: str, words: str, tmp_path: Path) -> None:
+def test_what_never_ends_is_ended_and_its_grade_is_a_sentence(
+    text: str, words: str, tmp_path: Path, marked
+) -> None:
     law = (
         f"def torque(now):\n{text}\n" if text.startswith(" ") else f"{text}\ndef torque(now): return now.q\n"
     )
     source = Source(str(tmp_path / "mine.py"), law)
-    found = grade_apart(Submission(source, "joint-pd", within=replace(WITHIN, seconds=4.0)))
+    found = marked(grade_apart, Submission(source, "joint-pd", within=replace(WITHIN, seconds=4.0)))
     assert words in found.error
     assert found.points == 0
 
@@ -165,22 +205,25 @@ def folder_of(place: Path, names: Sequence[str]) -> Path:
     return place
 
 
-def test_thirty_submissions_get_the_grades_they_deserve(tmp_path: Path) -> None:
+def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path: Path, marked) -> None:
     """Nobody loses anything through a neighbour, and twice it is the same table."""
-    out, shares = tmp_path / "grades.csv", []
-    rows = grade_folder(folder_of(tmp_path / "all", list(SUBMISSIONS)), None, 0, out, on_cores, shares.append)
-    assert len(rows) == 30
-    found = {row["file"].removesuffix(".py"): row for row in rows}
+    assert len(thirty.rows) == 30
+    found = {row["file"].removesuffix(".py"): row for row in thirty.rows}
     assert {name: int(row["points"]) for name, row in found.items()} == {
         name: each.points for name, each in SUBMISSIONS.items()
     }
     for name, each in SUBMISSIONS.items():
         assert each.words in found[name]["missed"] + found[name]["error"], name
-    assert shares[-1] == 1.0
+    assert thirty.shares[-1] == 1.0
+
+    def one_process(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
+        yield from ((place, marked(function, item)) for place, item in enumerate(items))
+
     few = ["right_time_delay", "wrong_kills", "wrong_leaves", "wrong_sign", "wrong_weighted"]
     beside = tmp_path / "again.csv"
-    grade_folder(folder_of(tmp_path / "few", few), None, 0, beside, on_cores, shares.append)
-    assert set(beside.read_text().splitlines()) < set(out.read_text().splitlines())
+    grade_folder(folder_of(tmp_path / "few", few), None, 0, beside, one_process, lambda _: None)
+    assert len(beside.read_text().splitlines()) == 1 + len(few)
+    assert set(beside.read_text().splitlines()) < set(thirty.table.splitlines())
 
 
 def test_grades_of_a_folder_are_carried_on(tmp_path: Path) -> None:
