@@ -26,15 +26,19 @@ settings.register_profile("same-every-time", derandomize=True, deadline=None, da
 settings.load_profile("same-every-time")
 
 
-_BROWSER = "tests/app/browser"
+_TOGETHER = (
+    ("tests/app/browser/",),
+    ("tests/lessons/test_lessons_course.py", "tests/lessons/test_lessons_quoted.py"),
+)
+"""Beginnings of files that share what is dear: a browser, which one core can draw; all runs of the course."""
 
 
-class OneWorkerForTheBrowser(LoadScopeScheduling):
-    """The tests in a browser share one, which one core can draw; a file of the others goes to one worker."""
+class OneWorkerForWhatIsShared(LoadScopeScheduling):
+    """Tests of `_TOGETHER` go to one worker; so does every other file."""
 
     def _split_scope(self, nodeid: str) -> str:
-        file = nodeid.split("::")[0]
-        return _BROWSER if file.startswith(f"{_BROWSER}/") else file
+        shared = (files[0] for files in _TOGETHER if nodeid.startswith(files))
+        return next(shared, nodeid.split("::")[0])
 
 
 _LONG = (
@@ -45,6 +49,7 @@ _LONG = (
     "tests/lessons/test_lessons_every_controller.py",
     "tests/test_site.py",
     "tests/lessons/test_lessons_course.py",
+    "tests/lessons/test_lessons_quoted.py",
     "tests/commands/test_commands_reproduce.py",
 )
 """What takes long comes first, of that what mostly waits: no worker is left alone with it at the end."""
@@ -107,8 +112,8 @@ def first_and_second_run(request: pytest.FixtureRequest, tmp_path: Path) -> tupl
     return (first, _run(first, NUMBA_CACHE_DIR=cache)), (second, _run(second, NUMBA_CACHE_DIR=cache))
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> OneWorkerForTheBrowser:
-    return OneWorkerForTheBrowser(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> OneWorkerForWhatIsShared:
+    return OneWorkerForWhatIsShared(config, log)
 
 
 @pytest.fixture(scope="session")

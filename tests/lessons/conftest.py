@@ -1,8 +1,10 @@
-"""The scene most tests of the session start from."""
+"""The scene most tests of the session start from, and all runs of the course."""
 
 from __future__ import annotations
 
 import pytest
+from quoted import CourseRuns
+from quoted import course_runs as made
 
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
@@ -17,3 +19,8 @@ def scene() -> TorqueScene:
 @pytest.fixture
 def session(scene: TorqueScene) -> TorqueSession:
     return TorqueSession(scene)
+
+
+@pytest.fixture(scope="session")
+def course_runs() -> CourseRuns:
+    return made()

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from latex2mathml.converter import convert
+from quoted import CourseRuns
 
 from himpc.telemetry import layout_of
 from lessons.course import COURSE, load_lesson
@@ -21,7 +22,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.velocity_rows import layout_of as mobile_layout_of
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge, Score
-from lessons.teaching.check import Verdict, check
+from lessons.teaching.check import check
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
 from lessons.teaching.lesson import Card, Ghost, Lesson, Step, card_of
@@ -32,16 +33,10 @@ from robots import InputError
 HAND = Signal("error/position", "mm")
 
 
-@pytest.fixture(scope="module")
-def verdicts() -> list[Verdict]:
-    """Every run of every lesson, once."""
-    return check([load_lesson(name) for name in COURSE])
-
-
 @pytest.mark.parametrize("name", COURSE)
-def test_everything_a_lesson_states_is_so(name: str, verdicts: list[Verdict]) -> None:
+def test_everything_a_lesson_states_is_so(name: str, course_runs: CourseRuns) -> None:
     """Claims hold and fail under their wrong setting; answers are measured; challenges can be solved."""
-    own = [verdict for verdict in verdicts if verdict.lesson == name]
+    own = [verdict for verdict in course_runs.verdicts if verdict.lesson == name]
     assert sum(bool(verdict.wrong) for verdict in own) == sum(
         len(step.claims) for step in load_lesson(name).steps
     )
