@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -21,7 +22,8 @@ OFTEN, SELDOM = 80, 300
 
 _RESTING = """(() => {
   const frame = window.requestAnimationFrame.bind(window);
-  window.requestAnimationFrame = (draw) => window.setTimeout(() => frame(draw), REST);
+  window.picturesRest = REST;
+  window.requestAnimationFrame = (draw) => window.setTimeout(() => frame(draw), window.picturesRest);
   window.cancelAnimationFrame = (id) => window.clearTimeout(id);
 })()"""
 
@@ -30,6 +32,15 @@ _PLAIN = """(() => {
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
     return context.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
   };
+  const small = document.createElement("canvas");
+  [small.width, small.height] = [64, 32];
+  const paint = small.getContext("2d");
+  paint.fillStyle = "#aaa";
+  paint.fillRect(0, 0, 64, 32);
+  const sky = small.toDataURL("image/jpeg");
+  const get = window.fetch.bind(window);
+  window.fetch = (what, options) =>
+    (what.url ?? String(what)).startsWith("data:image/jpeg") ? get(sky) : get(what, options);
 })()"""
 
 _PICTURES = """() => new Promise((done) => {
@@ -58,7 +69,7 @@ def open_page(
     width: int = 1300,
     height: int = 480,
     scale: float = SCALE,
-    rest: int = OFTEN,
+    rest: int = SELDOM,
 ) -> Page:
     """A fresh browser profile with the page loaded and the robot drawn; arguments as of `new_page`."""
     page = new_page(browser, width, height, scale, rest)
@@ -68,15 +79,16 @@ def open_page(
 
 
 def new_page(
-    browser: Browser, width: int = 1300, height: int = 480, scale: float = SCALE, rest: int = OFTEN
+    browser: Browser, width: int = 1300, height: int = 480, scale: float = SCALE, rest: int = SELDOM
 ) -> Page:
     """An empty page of a fresh browser profile, in which pictures cost little.
 
     Args:
         browser: without a graphics card every picture takes both cores a tenth of a second.
         width, height: of the page, CSS pixels.
-        scale: pixels per CSS pixel. Below 1 edges are not smoothed: nobody looks.
-        rest: ms between two pictures.
+        scale: pixels per CSS pixel. Below 1 edges are not smoothed, and the light comes from a plain grey
+            sky: nobody looks. (viser's is of a million pixels, blurred seven times: four seconds of a core.)
+        rest: ms between two pictures. While a hand drags they are `OFTEN`.
     """
     page = browser.new_context(
         viewport={"width": width, "height": height}, device_scale_factor=scale
@@ -209,14 +221,25 @@ def target_position(page: Page, node: str = "/target/ball") -> tuple[float, floa
     return float(found[0]), float(found[1]), float(found[2])
 
 
+@contextmanager
+def often(page: Page) -> Iterator[None]:
+    """Meanwhile pictures come quickly one after another."""
+    before: Any = page.evaluate(
+        "(rest) => { const before = window.picturesRest; window.picturesRest = rest; return before; }", OFTEN
+    )
+    yield
+    page.evaluate("(rest) => { window.picturesRest = rest; }", before)
+
+
 def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm: float = 0.18) -> None:
     """Pulls the gizmo's arrow of a world axis by so many metres. arm: m, where the arrow is taken hold of."""
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
-    _see(page)  # a camera that was turned is so from the next picture on
-    start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
-    end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
-    _drag(page, start, end)
+    with often(page):
+        _see(page)  # a camera that was turned is so from the next picture on
+        start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
+        end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
+        _drag(page, start, end)
 
 
 def click_on(page: Page, node: str) -> None:
@@ -229,11 +252,13 @@ def click_on(page: Page, node: str) -> None:
              return [found.x, found.y, found.z]; }""",
         node,
     )
-    page.mouse.move(*page.evaluate(_PROJECT, [node, middle]))
-    _see(page)
-    page.mouse.down()
-    page.mouse.up()
-    page.wait_for_timeout(BETWEEN)
+    with often(page):
+        _see(page)
+        page.mouse.move(*page.evaluate(_PROJECT, [node, middle]))
+        _see(page)
+        page.mouse.down()
+        page.mouse.up()
+        page.wait_for_timeout(BETWEEN)
 
 
 def turn_target(page: Page, degrees: float) -> None:
@@ -244,7 +269,9 @@ def turn_target(page: Page, degrees: float) -> None:
         at = [radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle)), 0.0]
         return page.evaluate(_PROJECT, ["/target/turn", at])
 
-    _drag(page, on_ring(45.0), on_ring(45.0 + degrees))
+    with often(page):
+        _see(page)
+        _drag(page, on_ring(45.0), on_ring(45.0 + degrees))
 
 
 def _see(page: Page) -> None:

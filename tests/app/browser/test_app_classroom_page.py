@@ -11,7 +11,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.classroom import STEERING, Classroom
 from app.server.server import PageServer
-from browsing.hands import SELDOM, open_page, press, write
+from browsing.hands import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
 
@@ -26,7 +26,7 @@ def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
     """A page without it sees the same robot and cannot stop it; with it the page can."""
     assert isinstance(classroom.sessions, Classroom)
     (learner,) = classroom.sessions.learners
-    page = open_page(browser, classroom.url, 1300, 700, rest=SELDOM)
+    page = open_page(browser, classroom.url, 1300, 700)
     watching = page.get_by_text("you are watching")
     expect(watching).to_be_visible()
     press(page, "Pause")

@@ -18,7 +18,7 @@ from app.panels.inside.plane import TITLE as PLANE
 from app.panels.inside.spectrum import TITLE as SPECTRUM
 from app.server.server import PageServer
 from browsing.another import show_scene
-from browsing.hands import drag_target, eventually, open_page, press, set_number, tab
+from browsing.hands import drag_target, eventually, often, open_page, press, set_number, tab
 from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
 from lessons.scenes.run_spec import RunSpec
@@ -105,7 +105,8 @@ def watched(page: Page, names: Sequence[str]) -> Iterator[None]:
            }}""",
         [PLANE, list(names)],
     )
-    yield
+    with often(page):
+        yield
     page.evaluate("() => clearInterval(window.looking)")
 
 

@@ -14,7 +14,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from app.link.messages import Post
 from app.server.server import PageServer
-from browsing.hands import SELDOM, eventually, key, open_page, press
+from browsing.hands import eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
@@ -34,7 +34,7 @@ def school() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, school.url, 1000, 700, rest=SELDOM)
+    opened = open_page(browser, school.url, 1000, 700)
     yield opened
     opened.context.close()
 
@@ -63,7 +63,7 @@ def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path
     file = tmp_path / "mine.py"
     file.write_text(text_of("lesson", None, "mine.py"))
     server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
-    page = open_page(browser, server.url, 1000, 700, rest=SELDOM)
+    page = open_page(browser, server.url, 1000, 700)
     try:
         walk(page, server, lesson_named(str(file)))
     finally:
