@@ -18,7 +18,10 @@ DOORS = {
     "placo": ("robots/reach.py",),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
-    "numba": ("himpc/cascade/compiled.py", "himpc/cascade/pieces.py", "himpc/tick/kernel/views.py"),
+    "numba": (
+        *("himpc/cascade/compiled.py", "himpc/cascade/loading.py", "himpc/cascade/pieces.py"),
+        "himpc/tick/kernel/views.py",
+    ),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
     "tyro": ("app/",),

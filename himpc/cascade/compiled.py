@@ -17,6 +17,7 @@ from numba import boolean, float64, int64, intp, njit, types
 from numba.core import config, event
 
 from himpc.cascade.compiler import compile_apart, compiles_here
+from himpc.cascade.loading import load
 from himpc.cascade.pieces import Piece, Whole
 
 try:
@@ -99,40 +100,19 @@ def _folders(function: Function) -> set[Path]:
 
 def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
     place, module = fast.stats.cache_path, fast.py_func.__module__
-    if place is not None and not compiles_here() and module != "__main__" and not _loaded(fast, arguments):
+    found = place is not None and load(fast, arguments)
+    if not found and place is not None and not compiles_here() and module != "__main__":
+        _FIRST_WORD.say()
         with _one_at_a_time(place, "waiting"):
-            if not _loaded(fast, arguments):
+            found = load(fast, arguments)  # somebody else may have compiled it meanwhile
+            if not found:
                 compile_apart(module, lambda name: event.end_event(_APART, name))
-    with _one_at_a_time(place, "compiling"):
-        fast.compile(arguments)
+                found = load(fast, arguments)
+    if not found:
+        with _one_at_a_time(place, "compiling"):
+            fast.compile(arguments)
     fast.disable_compile()
     return fast
-
-
-def _loaded(fast: Any, arguments: tuple[Any, ...]) -> bool:
-    """Whether a function was on disk. If so, it now is here."""
-    try:
-        with event.install_listener("numba:compile", _Refusal(fast)):
-            fast.compile(arguments)
-    except _NotOnDisk:
-        return False
-    return True
-
-
-class _NotOnDisk(Exception):
-    pass
-
-
-class _Refusal(event.Listener):
-    def __init__(self, fast: Any) -> None:
-        self._fast = fast
-
-    def on_start(self, event: Any) -> None:
-        if event.data["dispatcher"] is self._fast:
-            raise _NotOnDisk
-
-    def on_end(self, event: Any) -> None:
-        """Nothing: it never comes so far."""
 
 
 def _temporary_folder() -> str | None:
@@ -166,18 +146,23 @@ class _FirstWord(event.Listener):
     def __init__(self) -> None:
         self._said = compiles_here()  # then somebody else did
 
-    def on_start(self, event: Any) -> None:
+    def say(self) -> None:
+        """Unless it was said."""
         if not self._said:
             self._said = True
             getLogger(__name__).warning(
                 "compiling the controller's inner loops: about half a minute, this once"
             )
 
+    def on_start(self, event: Any) -> None:
+        self.say()
+
     def on_end(self, event: Any) -> None:
         """Nothing: it was said."""
 
 
-event.register("numba:compile", _FirstWord())
+_FIRST_WORD = _FirstWord()
+event.register("numba:compile", _FIRST_WORD)
 
 
 _APART = "himpc-lab:compiled-apart"

@@ -131,6 +131,19 @@ def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
         assert process.communicate(timeout=120)[1].splitlines()[-1] == "1"
 
 
+def test_what_is_on_disk_needs_no_compiler() -> None:
+    """Getting ready to compile costs a process more than all that it loads; SciPy comes along with that."""
+    compile_all(lambda *_: None)
+    script = (
+        "import sys\n"
+        "from himpc.cascade.compiling import compile_all\n"
+        "compile_all(print)\n"
+        "print(*sorted({'numba', 'scipy.linalg', 'numba.np.linalg'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "numba\n"
+
+
 def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> None:
     """When it changes, those that call it are compiled afresh."""
     for folder in ("install/parts", "home", "tmp"):
