@@ -1,7 +1,7 @@
 """How a compiled function comes from disk without the compiler.
 
-Asked for a function, Numba first gets ready to compile it: it reads what each of NumPy's functions becomes and
-imports SciPy, a fifth of a second in every process, for nothing where machine code lies on disk.
+Asked for a function, Numba first gets ready to compile it: it reads what each of NumPy's functions becomes,
+and imports SciPy. That is a third of a second in every process, for nothing where machine code lies on disk.
 """
 
 from __future__ import annotations

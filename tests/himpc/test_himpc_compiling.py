@@ -140,7 +140,9 @@ def test_what_is_on_disk_needs_no_compiler() -> None:
         "compile_all(print)\n"
         "print(*sorted({'numba', 'scipy.linalg', 'numba.np.linalg'} & set(sys.modules)))"
     )
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert done.stdout == "numba\n"
 
 
