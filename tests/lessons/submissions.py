@@ -176,7 +176,7 @@ SUBMISSIONS: dict[str, Submission] = {
     "wrong_sleeps": _bad("import time; time.sleep(0.7)", 0, "takes longer than 0.5 s"),
     "wrong_exits": _bad("raise SystemExit", 0, "it ends the program"),
     "wrong_leaves": _bad("import os; os._exit(0)", 0, "was ended by the program itself"),
-    "wrong_prints": _bad("print('x' * 10**6)", 2, "comes back"),
+    "wrong_prints": _bad("print('x' * 10**5)", 2, "comes back"),
     "wrong_opens": _bad("open('/etc/hostname').read()", 0, "may not do that (open /etc/hostname)"),
     "wrong_kills": _bad("import os; os.kill(os.getppid(), 9)", 0, "may not do that (os.kill)"),
     "wrong_memory": _bad("held = [bytes(10**9) for _ in range(10**4)]", 0, "memory"),
