@@ -14,11 +14,16 @@ from app.link.process import Process
 class Spares:
     """Keeps one child started ahead."""
 
-    def __init__(self, worker: str) -> None:
-        """worker: the module that a child runs, see `ForkServer`."""
+    def __init__(self, worker: str, lent: ForkServer | None = None) -> None:
+        """
+        Args:
+            worker: the module that a child runs, see `ForkServer`.
+            lent: a fork server of that worker that others use, too. Who made it ends it.
+        """
         self._worker = worker
+        self._lent = lent
         self._lock = threading.Lock()
-        self._server: ForkServer | None = None
+        self._server = lent
         self._given_up: list[ForkServer] = []
         self._forks = True
         self._spare: Process | None = None
@@ -74,7 +79,7 @@ class Spares:
         return Spawned(self._worker, theirs)
 
     def close(self) -> None:
-        """Ends the spare, the fork server and every child of it that is left."""
+        """Ends the spare, the fork server unless it is lent, and every child that is left of what it ends."""
         with self._lock:
             self._closed = True
             spare, self._spare = self._spare, None
@@ -83,5 +88,5 @@ class Spares:
         if spare is not None:
             spare.close()
         for server in servers:
-            if server is not None:
+            if server is not None and server is not self._lent:
                 server.close()

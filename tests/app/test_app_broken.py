@@ -21,6 +21,8 @@ from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 NEXT = Exercise("deadlines")
 
 

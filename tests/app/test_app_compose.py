@@ -21,6 +21,8 @@ from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 LONG = 60.0
 
 

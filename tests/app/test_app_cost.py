@@ -18,6 +18,8 @@ from app.server.server import PageServer
 from benchmarks.client import Second, Viewer
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 LONG = 240.0  # s: the first start of a checkout compiles
 TORQUE, STEP = "Torque, % of bound", "Control step, ms"
 

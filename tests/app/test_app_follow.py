@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from app.link.choice import SceneChoice
 from app.link.messages import Post
@@ -14,6 +15,8 @@ from app.view.follow import FollowBase
 from browsing.wire import Wire, eventually
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
+
+pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 
 def test_the_camera_keeps_its_place_beside_the_base() -> None:

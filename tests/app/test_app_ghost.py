@@ -13,6 +13,7 @@ import pytest
 
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
+from app.link.forkserver import ForkServer
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
 from app.link.process import wait_until
 from app.link.spares import Spares
@@ -107,8 +108,8 @@ def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
 
 
 @pytest.fixture
-def start() -> Iterator[Callable[[str], Learner]]:
-    spares, started = Spares(WORKER), list[Learner]()
+def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], Learner]]:
+    spares, started = Spares(WORKER, fork_server), list[Learner]()
 
     def run(scene: str) -> Learner:
         learner = Learner("token", SceneChoice(RunSpec(scene)), spares)

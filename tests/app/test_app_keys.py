@@ -15,6 +15,8 @@ from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 
 def test_the_cameras_keys_are_those_of_viser() -> None:
     source = Path(viser.__file__).parent / "client" / "src" / "CameraControls.tsx"

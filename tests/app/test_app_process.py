@@ -14,6 +14,7 @@ import pytest
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
+from app.link.forkserver import ForkServer
 from app.link.messages import Load, Play, Post, Speed, Step
 from app.link.process import wait_until
 from app.link.spares import Spares
@@ -25,8 +26,8 @@ LONG = 30.0  # s
 
 
 @pytest.fixture
-def spares() -> Iterator[Spares]:
-    made = Spares(WORKER)
+def spares(fork_server: ForkServer | None) -> Iterator[Spares]:
+    made = Spares(WORKER, fork_server)
     yield made
     made.close()
 
@@ -152,12 +153,27 @@ def test_no_child_and_no_memory_is_left(start: Callable[[str], Learner]) -> None
     assert rings() == before - 1
 
 
+def test_a_lent_fork_server_outlives_who_used_it(fork_server: ForkServer | None) -> None:
+    if fork_server is None:
+        pytest.skip("processes are not forked here")
+    for _ in range(2):
+        spares = Spares(WORKER, fork_server)
+        learner = Learner("token", SceneChoice(RunSpec("planar3-hold")), spares)
+        assert wait_until(lambda one=learner: ticks(one) > 20, LONG)
+        pid = learner.pid
+        assert pid is not None and psutil.Process(pid).ppid() == fork_server.pid
+        learner.close()
+        spares.close()
+        assert wait_until(lambda pid=pid: not psutil.pid_exists(pid), LONG)
+    assert fork_server.alive
+
+
 def rings() -> int:
     """Rings of telemetry that this process looks at."""
     return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
 
 
-def test_sessions_resume_end_and_are_limited() -> None:
+def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
     sessions = Sessions(SceneChoice(RunSpec("planar3-hold")), max_sessions=2, grace=1.0)
     try:
         one, two = sessions.enter([]), sessions.enter([])

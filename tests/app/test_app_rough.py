@@ -35,15 +35,24 @@ HERE = Path(__file__).parent
 Start = Callable[..., Learner]
 
 
+@pytest.fixture(scope="module")
+def lent(fork_server: ForkServer | None) -> Iterator[dict[str, ForkServer | None]]:
+    """By worker, the fork servers of tests that leave them as they are."""
+    stubborn = None if fork_server is None else ForkServer("stubborn")
+    yield {WORKER: fork_server, "stubborn": stubborn}
+    if stubborn is not None:
+        stubborn.close()
+
+
 @pytest.fixture
-def start() -> Iterator[Start]:
+def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
     """Learners of one worker, and what it holds."""
     made: list[Spares] = []
     started: list[Learner] = []
 
-    def run(scene: str, worker: str = WORKER, own: bool = False) -> Learner:
-        if own or not made:
-            made.append(Spares(worker))
+    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> Learner:
+        if not made:
+            made.append(Spares(worker, None if own_server else lent.get(worker)))
         learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
         started.append(learner)
         return learner
@@ -84,7 +93,7 @@ def born(learner: Learner) -> int:
 
 def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
     """What a second thread holds at that moment would stay locked in the child for ever."""
-    learner = start("iiwa14-hold")
+    learner = start("iiwa14-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     server = psutil.Process(server_of(learner).pid)
     assert psutil.Process(born(learner)).ppid() == server.pid
@@ -102,7 +111,7 @@ def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -
 
 
 def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
-    learner = start("planar3-hold")
+    learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     server = server_of(learner)
     os.kill(server.pid, signal.SIGKILL)
@@ -117,7 +126,7 @@ def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
 
 
 def test_a_fork_server_that_hangs_is_replaced(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    learner = start("planar3-hold")
+    learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     monkeypatch.setattr(forkserver, "PATIENCE", 0.2)
     before = server_of(learner).pid

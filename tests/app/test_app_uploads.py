@@ -15,6 +15,8 @@ from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 LONG = 60.0
 PART = 500_000
 LARGE = 40_000_000

@@ -22,6 +22,8 @@ from himpc.rotation import exp3, from_quaternion, log3, quaternion
 from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 RINGS = "/targets/orientation/control"
 
 

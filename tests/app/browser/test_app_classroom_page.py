@@ -14,6 +14,8 @@ from app.server.server import PageServer
 from browsing.hands import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 
 @pytest.fixture(scope="module")
 def classroom() -> Iterator[PageServer]:

@@ -23,6 +23,8 @@ from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 ARM = 0.08
 """m, where the gizmo of this small arm is taken hold of."""
 

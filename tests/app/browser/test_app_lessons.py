@@ -24,6 +24,8 @@ from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 
 @pytest.fixture(scope="module")
 def school() -> Iterator[PageServer]:

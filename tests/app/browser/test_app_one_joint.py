@@ -15,6 +15,8 @@ from browsing.another import show_scene
 from browsing.hands import drag_target, eventually, open_page, press, target_position
 from lessons.scenes.run_spec import RunSpec
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 ONE_JOINT = """<robot name="one"><link name="base"/><link name="arm"><inertial><origin xyz="0.1 0 0"/>
 <mass value="1"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <link name="tool"/><joint name="j" type="{kind}"><parent link="base"/><child link="arm"/><axis xyz="{axis}"/>

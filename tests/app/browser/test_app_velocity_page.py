@@ -32,6 +32,8 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:

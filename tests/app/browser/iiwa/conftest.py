@@ -4,11 +4,14 @@ ten seconds to open."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.link.choice import SceneChoice
+from app.link.forkserver import ForkServer
+from app.link.spares import Spares
 from app.server.server import PageServer
 from browsing.another import show_scene
 from browsing.hands import eventually, open_page, press, tab, wait_for_scene
@@ -18,8 +21,10 @@ CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
 
 
 @pytest.fixture(scope="package")
-def server() -> Iterator[PageServer]:
-    running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0)
+def server(fork_server: ForkServer | None) -> Iterator[PageServer]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("app.server.sessions.Spares", partial(Spares, lent=fork_server))
+        running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0)
     yield running
     running.close()
 
