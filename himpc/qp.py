@@ -132,13 +132,14 @@ def _daqp(
     scaled: bool = True,
     **options: float,
 ) -> tuple[Array, Array, str]:
-    size, stretch = 1.0, np.ones(len(A))
     if scaled:
         # DAQP takes rows that are small against √H for zero and drops them without a word: bring H to
         # size one and rows to length one. Rows that are rounding noise must not be blown up to constraints.
-        size = float(np.trace(H)) / len(H)
+        size = float(H.trace()) / len(H)
         length = np.sqrt(np.einsum("ij,ij->i", A, A))
         stretch = np.where(length > _NOISE, 1.0 / np.maximum(length, _NOISE), 1.0)
+    else:
+        size, stretch = 1.0, np.ones(len(A))
     sense = np.where(lower == upper, _DAQP_EQUALITY, 0).astype(np.int32)
     x, _, flag, info = daqp.solve(
         H / size,

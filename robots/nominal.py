@@ -60,11 +60,12 @@ class NominalModel:
         self._model = true_model(robot, plant)
         self._data = self._model.createData()
         self._damping = plant.per_joint("damping", robot.n)
+        self._above = np.triu(np.ones((robot.n, robot.n), bool))
 
     def mass_matrix(self, q: Array) -> Array:
         """M(q) with armature, (n, n) symmetric, kg·m²."""
         M = pin.crba(self._model, self._data, q)
-        return np.triu(M) + np.triu(M, 1).T
+        return np.where(self._above, M, M.T)
 
     def bias(self, q: Array, v: Array) -> Array:
         """The torque that keeps q̈ = 0, (n,) N·m."""

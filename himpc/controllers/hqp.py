@@ -77,7 +77,8 @@ class HQP(OneStepController):
                 rung = "inherit" if i else "damping"
                 found = Found(y if i else braking, status=found.status, qp_us=found.qp_us)
             y = found.y
-            free = free @ split(B @ free, float(np.linalg.norm(B)))[3]
+            if i + 1 < len(demands):
+                free = free @ split(B @ free, float(np.linalg.norm(B)))[3]
             accelerations.append(inverse @ y)
             error = demand.residual(B @ y)
             increment = bias + y - self._tau_0
@@ -108,7 +109,15 @@ class HQP(OneStepController):
         if not solution.solved:
             return Found(y, status=solution.status, qp_us=solution.time_us, usable=False)
         step = free @ solution.x
-        slack = np.where(solution.multipliers > 0, upper - step, step - lower)
-        joint = np.flatnonzero((np.abs(solution.multipliers) > _BINDING) & (slack < 1e3 * _BINDING))
-        active = ActiveRows(np.zeros_like(joint), joint, solution.multipliers[joint], slack[joint])
+        active = _binding(solution.multipliers, step, lower, upper)
         return Found(y + step, active, solution.kkt_residual, solution.status, solution.time_us)
+
+
+def _binding(multipliers: Array, step: Array, lower: Array, upper: Array) -> ActiveRows:
+    """Of the rows lower ≤ step ≤ upper those that are met and press, (n,) each."""
+    pressed = np.abs(multipliers) > _BINDING
+    if not pressed.any():
+        return NO_ROWS
+    slack = np.where(multipliers > 0, upper - step, step - lower)
+    joint = np.flatnonzero(pressed & (slack < 1e3 * _BINDING))
+    return ActiveRows(np.zeros_like(joint), joint, multipliers[joint], slack[joint])

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.level import NO_ROWS, LevelSolution
 from himpc.configuration import Configuration
+from himpc.controllers.answers import no_rows
 from himpc.controllers.base import TorqueController
 from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.controllers.settings import Settings
@@ -95,6 +96,7 @@ class OneStepController(TorqueController):
         self._goal = in_force(self.robot, settings.limits)
         most = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._reach = most if self.clips else np.full(self.robot.n, np.inf)
+        self._boundless = no_rows(self.robot.n)
         known = all(is_built_in(task) for task in (*self._form.tasks, *self._off))
         self._kinematics = Kinematics(self.robot, self._form, self._off) if known else None
         self._settings = settings
@@ -219,7 +221,8 @@ class OneStepController(TorqueController):
         values: dict[str, Array],
         started: int,
     ) -> Plan:
-        evidence = Evidence(tuple(levels), q, errors, values, self._rows(self._limits, self._tau_0))
+        rows = self._rows(self._limits, self._tau_0) if self.clips else self._boundless
+        evidence = Evidence(tuple(levels), q, errors, values, rows)
         return Plan(
             tau=tau,
             tau_0=self._tau_0,
@@ -230,9 +233,8 @@ class OneStepController(TorqueController):
         )
 
     def _rows(self, limits: LimitsInForce, origin: Array) -> Rows:
-        """The bounds of this tick on torques counted from `origin`; infinite if none are imposed."""
-        bound = limits.tau_upper - origin, limits.tau_lower - origin
-        upper, lower = bound if self.clips else (np.full_like(origin, np.inf), np.full_like(origin, -np.inf))
+        """The bounds of this tick on torques counted from `origin`."""
+        lower, upper = limits.tau_lower - origin, limits.tau_upper - origin
         return Rows(np.ones((1, 1)), lower[None], upper[None], ("torque",))
 
 
