@@ -7,7 +7,7 @@ import pytest
 from benchmarks.every_task import CONTROLLERS, measured
 from himpc.tasks import KINDS
 
-ROBOTS = {"planar3": 2.0, "iiwa14": 1.5, "panda": 1.5, "baxter": 1.5, "ridgeback-ur10": 1.5}
+ROBOTS = {"planar3": 2.0, "iiwa14": 1.3, "panda": 1.5, "baxter": 1.5, "ridgeback-ur10": 1.1}
 """s after which a target that was dragged is reached. HQP does not know the motors of the planar arm."""
 
 

@@ -107,11 +107,11 @@ def test_failed_runs_do_not_stop_a_report(name: str, quick: bool, tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ITEMS)
-def test_quick_runs_are_no_longer_than_the_others(name: str) -> None:
+def test_quick_runs_are_no_longer_than_the_others(name: str, prepared: dict[RunSpec, Scene]) -> None:
     """--quick is never more work."""
 
     def seconds(quick: bool) -> float:
-        return sum(job.spec.duration or job.spec.prepared().duration for job in set(ITEMS[name].jobs(quick)))
+        return sum(prepared[job.spec].duration for job in set(ITEMS[name].jobs(quick)))
 
     assert seconds(True) <= seconds(False)
 
@@ -224,9 +224,8 @@ def test_an_exact_nominal_model_has_no_error() -> None:
     bare = ("plant.friction=0", "plant.damping=0")
     job = Job(RunSpec("planar3-circle", controller="himpc", set=(*exact, *bare), duration=1.2))
     wrong = Job(RunSpec("planar3-circle", controller="himpc", set=bare, duration=1.2))
-    found = perform_all([job, wrong])
     # What is left is the change of M and C within a tick.
-    assert model_errors(found[job]).gamma < 0.01 * model_errors(found[wrong]).gamma
+    assert model_errors(job.do()).gamma < 0.01 * model_errors(wrong.do()).gamma
 
 
 def test_smoothness_is_the_rms_distance() -> None:
