@@ -166,6 +166,7 @@ class _Copy:
 def _be_a_copy(request: bytes, within: Allowance, parent: int, out: int) -> NoReturn:
     code = 1
     try:
+        signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         _restrict(within, parent)
         _let_go(out)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -223,7 +224,7 @@ def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path
     assert thirty.shares[-1] == 1.0
 
     def one_process(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
-        yield from ((place, marked(function, item)) for place, item in enumerate(items))
+        yield from one_by_one(partial(marked, function), items)
 
     few = ["right_time_delay", "wrong_kills", "wrong_leaves", "wrong_sign", "wrong_weighted"]
     beside = tmp_path / "again.csv"
@@ -232,16 +233,16 @@ def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path
     assert set(beside.read_text().splitlines()) < set(thirty.table.splitlines())
 
 
-def test_grades_of_a_folder_are_carried_on(tmp_path: Path) -> None:
+def test_grades_of_a_folder_are_carried_on(tmp_path: Path, marked) -> None:
     """Stopped after its first file, and one is changed: what is done is not done again."""
     graded: list[str] = []
 
     def counted(function, items) -> Generator:
         graded[:] = [Path(each.source.path).name for each in items]
-        yield from one_by_one(function, items)
+        yield from one_by_one(partial(marked, function), items)
 
     def stopped(function, items) -> Generator:
-        with closing(one_by_one(function, items)) as outcomes:
+        with closing(one_by_one(partial(marked, function), items)) as outcomes:
             yield next(outcomes)
         raise KeyboardInterrupt
 
