@@ -62,11 +62,11 @@ def main() -> int:
     return 0 if sound else 1
 
 
-def treat(kills: int, stops: int) -> dict[str, object]:
-    """Everything in a row; see the module."""
+def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, object]:
+    """Everything in a row; see the module. scene: which the pages show."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
     before, there = _memory_left(), set(psutil.Process().children(recursive=True))
-    server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=3)
+    server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=3)
     counts: dict[str, str] = {}
     treated = recovered = 0
     try:

@@ -33,6 +33,8 @@ from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 PROTOCOL: Any = [f"viser-v{__version__}"]
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
 LONG = 60.0
 
 
