@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
-from quoted import CourseRuns
-from quoted import course_runs as made
 
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
+
+if TYPE_CHECKING:
+    from quoted import CourseRuns
 
 
 @pytest.fixture(scope="module")
@@ -23,4 +26,6 @@ def session(scene: TorqueScene) -> TorqueSession:
 
 @pytest.fixture(scope="session")
 def course_runs() -> CourseRuns:
+    from quoted import course_runs as made
+
     return made()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from himpc.htmpc.clearance import CollisionModel
 from lessons.events import MoveTarget
 from lessons.recording.run import run
 from lessons.scenes.catalog import load_scene
+from lessons.scenes.scene import Scene
 from robots.collision import Ball
 from robots.reach import ReachJudge
 
@@ -23,10 +25,16 @@ ONE_JOINT = """<robot name="one"><link name="base"/><link name="arm"><inertial><
 KINDS = ("revolute", "prismatic")
 
 
+@cache
+def scene_of(kind: str) -> Scene:
+    """The robot is imported once: that takes a process of its own."""
+    return load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_one_joint_holds_under_every_controller(controller: str, kind: str) -> None:
-    scene = load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind))
+    scene = scene_of(kind)
     recording = run(replace(scene, settings=scene.settings.changed("controller", controller)), 0.3)
     assert np.isfinite(recording["tau"]).all()
     assert np.abs(recording["q"] - scene.robot.home).max() < 1e-3
@@ -35,7 +43,7 @@ def test_one_joint_holds_under_every_controller(controller: str, kind: str) -> N
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_joint_follows_a_dragged_target(kind: str) -> None:
     """A target on the joint's path is reached; one beside it breaks nothing."""
-    scene = load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind))
+    scene = scene_of(kind)
     there = (0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0.0) if kind == "revolute" else (0.3, 0.0, 0.4)
     moves = ((0.01, MoveTarget("position", there)),)
     reached = run(replace(scene, events=moves), 3.0)
@@ -47,7 +55,7 @@ def test_one_joint_follows_a_dragged_target(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_joint_is_judged_and_kept_clear(kind: str) -> None:
-    robot = load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind)).robot
+    robot = scene_of(kind).robot
     there = np.array([0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0.0] if kind == "revolute" else [0.3, 0.0, 0.4])
     assert ReachJudge(robot).solve(there).reachable
     clear = CollisionModel(robot, (Ball("ball", (0.5, 0.0, 0.0), 0.1),)).clearances(robot.home[None], 1.0)
