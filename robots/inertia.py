@@ -34,8 +34,13 @@ def sample_configurations(
 
 def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
     """M(q), kg·m², symmetric (Pinocchio's `crba` fills the upper triangle only)."""
-    upper = np.triu(pin.crba(model, data, q))
-    return upper + np.triu(upper, 1).T
+    return _symmetric(pin.crba(model, data, q))
+
+
+def _symmetric(M: np.ndarray) -> np.ndarray:
+    """The matrices (…, n, n) whose upper triangles these have."""
+    upper = np.triu(M)
+    return upper + np.triu(upper, 1).swapaxes(-1, -2)
 
 
 def suggest_M_bar(
@@ -55,11 +60,8 @@ def suggest_M_bar(
     Larger M̄ estimates better and amplifies noise (Remark 4).
     """
     data = model.createData()
-    inverses = [
-        np.linalg.inv(mass_matrix(model, data, q))
-        for q in sample_configurations(q_lower, q_upper, samples, seed)
-    ]
-    stack = np.array(inverses)
+    configurations = sample_configurations(q_lower, q_upper, samples, seed)
+    stack = np.linalg.inv(_symmetric(np.array([pin.crba(model, data, q).copy() for q in configurations])))
     shape = 1.0 / np.diagonal(stack, axis1=1, axis2=2).max(axis=0)
     root = np.sqrt(shape)
     largest = np.linalg.eigvalsh(root[:, None] * stack * root[None, :])[:, -1].max()
