@@ -24,6 +24,7 @@ myst_all_links_external = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+autodoc_use_type_comments = False  # there are none
 napoleon_use_ivar = True
 napoleon_use_rtype = False
 # A name in a signature, or of an attribute, that several classes have: no page depends on it.
