@@ -71,6 +71,13 @@ assert "mujoco" in sys.modules and "glfw" not in sys.modules
     assert done.returncode == 0, done.stderr
 
 
+def test_the_papers_jobs_load_no_statistics() -> None:
+    """Every process that computes them would, for the outline of one figure."""
+    code = "import sys, lessons.papers; assert 'scipy.stats' not in sys.modules"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_help_names_every_command() -> None:
     printed = _watched(["--help"]).stdout
     assert all(f"  {name} " in printed and line in printed for name, line in COMMANDS.items())

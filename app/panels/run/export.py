@@ -13,7 +13,6 @@ from app.client.learner import Learner
 from app.client.rows import RATE
 from app.client.simulation import Simulation
 from app.html.text import block
-from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
 from lessons.recording.arrays import named
 from lessons.recording.table import as_csv, as_npz
@@ -85,6 +84,8 @@ class ExportPanel:
         run = self._rows(self._learner)
         if run is None:
             return None
+        from lessons.plots.draw import draw  # here: few pages ever draw, and all would load Matplotlib
+
         ghost = self._learner.ghost
         beside = None if ghost is None else self._rows(ghost)
         name = self._name("png")

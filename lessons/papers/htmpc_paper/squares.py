@@ -6,7 +6,6 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import gaussian_kde
 
 from lessons.experiments.jobs import Job, Results, Run, Work
 from lessons.papers.htmpc_paper.runs import (
@@ -216,6 +215,8 @@ def _strip(title: str, values: dict[str, Array]) -> Panel:
 
 def _violin(place: int, values: Array) -> Curve:
     """The outline of the fitted density, from the smallest to the largest value."""
+    from scipy.stats import gaussian_kde  # here: it takes longer than all that the papers' jobs load
+
     y = np.linspace(values.min(), values.max(), 60)
     density = gaussian_kde(values)(y)
     half = 0.4 * density / density.max()
