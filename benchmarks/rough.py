@@ -70,10 +70,12 @@ def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, objec
     counts: dict[str, str] = {}
     treated = recovered = 0
     try:
-        with Wire(server.url) as witness, Wire(server.url) as one, Wire(server.url) as two:
-            learners = [_learner(server, place) for place in range(3)]
+        with contextlib.ExitStack() as opened:
+            # One after the other: each must be known to whom it belongs.
+            pairs = [(opened.enter_context(Wire(server.url)), _learner(server, place)) for place in range(3)]
+            (witness, *wires), learners = zip(*pairs, strict=True)
             assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
-            pages = list(zip(learners[1:], (one, two), strict=True))
+            pages = list(zip(learners[1:], wires, strict=True))
             with _watch(server.url, witness) as watched:
                 for name, times, harm in (
                     ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),

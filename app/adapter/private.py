@@ -54,6 +54,7 @@ _OF_A_SERVER = (
     "_websock_server._incoming_handlers",
     "_websock_server._client_state_from_id",
     "_websock_server._broadcast_buffer.message_event",
+    "_websock_server._broadcast_buffer.window_duration_sec",
     "gui._current_file_upload_states",
     "gui._gui_input_handle_from_uuid",
     "gui._thread_executor",
@@ -133,12 +134,14 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
 
 
 def _keep_awake(server: viser.ViserServer) -> None:
-    """Before a sender first sleeps; viser makes one for all clients and one for each."""
+    """Before a sender first sleeps; viser makes one for all clients and one for each, which then waits for
+    nothing after what woke it: a picture comes in one piece."""
     websockets, loop = server._websock_server, server.get_event_loop()
     websockets._broadcast_buffer.message_event = WakeUp(loop)
 
     async def keep(connection: infra.WebsockClientConnection) -> None:
-        connection.get_message_buffer().message_event = WakeUp(loop)
+        buffer = connection.get_message_buffer()
+        buffer.message_event, buffer.window_duration_sec = WakeUp(loop), 0.0
 
     websockets.on_client_connect(keep)
 
@@ -259,7 +262,7 @@ def kind_of(message: Any) -> Kind:
             return "other"
 
 
-# ---------------------------------------------------------------- one control
+# ---------------------------------------------------------------- one control, one node of the scene
 
 
 def control_of(client: viser.ClientHandle, uuid: object) -> viser.GuiInputHandle[Any] | None:
@@ -283,9 +286,6 @@ def send_again(handle: viser.GuiInputHandle[Any]) -> None:
 def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> None:
     """New curves for a chart, abscissas first, as they are; assigning them would send double precision."""
     chart._queue_update("data", tuple(np.ascontiguousarray(each) for each in arrays))
-
-
-# ---------------------------------------------------------------- one node of the scene
 
 
 def shift(node: viser.SceneNodeHandle, at: np.ndarray) -> None:

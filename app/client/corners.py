@@ -23,8 +23,7 @@ def corners(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
         Numbers of the points to keep, ascending; the first and the last are among them.
     """
     count = curves.shape[1]
-    chord = curves[:, :1] + (curves[:, -1:] - curves[:, :1]) * np.linspace(0.0, 1.0, count)
-    if (np.abs(curves - chord) <= tolerance).all():
+    if _straight(curves[:, :: max(1, count // 3)], tolerance) and _straight(curves, tolerance):
         return np.array([0, count - 1])
     keep = np.ones(count, bool)
     first, bent = 0, np.zeros((len(curves), count - 1))
@@ -42,3 +41,9 @@ def corners(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
         keep[start:end].reshape(blocks, size)[(bent <= tolerance).all(axis=0), 1:] = False
         first = start
     return np.flatnonzero(keep)
+
+
+def _straight(curves: np.ndarray, tolerance: float) -> bool:
+    """Whether all of them are as good as their chords."""
+    first, share = curves[:, :1], np.arange(curves.shape[1]) / max(1, curves.shape[1] - 1)
+    return bool((np.abs(curves - first - (curves[:, -1:] - first) * share) <= tolerance).all())

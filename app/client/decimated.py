@@ -18,6 +18,7 @@ WINDOW = 8.0  # s of simulated time in the plots
 BUCKETS = 160  # in a window
 KEPT = 60.0  # s of simulated time that one can look back
 _SPAN = WINDOW / BUCKETS
+_AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
 _SLOTS = round((KEPT + WINDOW) / _SPAN)
 _HELD = round(
     1.0 / _SPAN
@@ -190,4 +191,4 @@ class Window:
     @staticmethod
     def ages() -> np.ndarray:
         """(2 · BUCKETS,) seconds before the window's end, ≤ 0."""
-        return np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
+        return _AGES.copy()

@@ -22,6 +22,10 @@ POSE_PERIOD = 1 / 60  # s
 STATUS_PERIOD = 0.1  # s
 SCRIPT_PERIOD = 0.02  # s
 _CHUNK = 0.01  # s: the longest run before commands are looked at again
+_BEAT = 0.004
+"""s between two looks at what is due. To wake up for each tick of a millisecond costs a third of what it
+costs, and each finds cold caches. A command wakes at once."""
+_IDLE = 0.02  # s: the same where nothing moves
 
 
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
@@ -113,10 +117,10 @@ def _simulate(wire: Wire, body: Body) -> None:
                 pacer.rest(time.perf_counter())
         pacer.speed = body.pace
         now = time.perf_counter()
-        ran = 0
+        behind = False
         if body.running:
             due = pacer.due(now, body.session.step_s)
-            ran = _run(body, pacer, due, until=now + _CHUNK)
+            behind = 0 < _run(body, pacer, due, until=now + _CHUNK) < due
         else:
             pacer.rest(now)
             body.settle()
@@ -138,8 +142,8 @@ def _simulate(wire: Wire, body: Body) -> None:
             if script is not None:
                 wire.send(script)
             next_script = now + SCRIPT_PERIOD
-        if ran == 0:
-            wire.poll(0.001 if body.busy else 0.02)
+        if not behind:
+            wire.poll(_BEAT if body.busy else _IDLE)
 
 
 def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:
