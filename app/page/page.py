@@ -215,7 +215,10 @@ class Page:
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # a restart leaves the learner's view as it was
-                aim(self._client.camera, ready.robot, self._phone, ready.room)
+                ways = [
+                    task.path for task in ready.tasks if task.kind == "position" and task.path is not None
+                ]
+                aim(self._client.camera, ready.robot, self._phone, ready.room, ways)
                 self._seen = seen
         for sentence in ready.left_out:
             self._client.add_notification("Opened without a task of yours", sentence, color="orange")

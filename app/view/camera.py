@@ -13,7 +13,7 @@ _NARROW = 0.75
 """Width over height of a desktop's scene once the panels are docked beside it, as a rule."""
 _THICK = 0.07
 """How far links reach around their joints, as a share of the robot's size."""
-_SHEET = 0.5
+_SHEET = 0.6
 """Of a phone's height that viser's sheet covers, from below."""
 
 
@@ -27,7 +27,7 @@ def fit(
         direction: (3,) from what is looked at to the camera; not straight up or down.
         fov: vertical opening, rad.
         aspect: width over height.
-        phone: whether a sheet covers the lower half.
+        phone: whether a sheet covers the lower part.
     """
     back = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 0.0, 1.0], back)

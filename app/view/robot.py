@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 import viser
@@ -98,12 +100,15 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     return np.vstack([points, ends, arrows]), direction, reach
 
 
-def aim(camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray) -> None:
-    """Turns the camera to a robot and the points (k, 3) it will go to, m. phone: viser's sheet covers the
-    lower half of the scene, so the robot goes, smaller, into the upper one."""
+def aim(
+    camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray, ways: Sequence[np.ndarray] = ()
+) -> None:
+    """Turns the camera to a robot and the points (k, 3) it will go to, m; ways: (k, 3) each, m, that its hand
+    follows where it stands. phone: viser's sheet covers the lower part of the scene, so the robot goes,
+    smaller, into the upper one."""
     if not len(room):
         points, direction, _ = _home(robot)
-        look(camera, points, phone, direction)
+        look(camera, np.vstack([points, *ways]), phone, direction)
         return
     _, at, reach = camera_for(robot)
     points = np.vstack([at, room])

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from app.link.choice import SceneChoice
 from app.view.camera import fit
+from app.view.robot import aim
+from app.worker.simulation import Body
+from lessons.scenes.run_spec import RunSpec
+from robots import load_robot
+
+SHEET = 0.2
+"""Where viser's sheet ends on a phone, of a picture from −1 to 1: it covers three fifths."""
 
 
 def on_picture(points: np.ndarray, eye: np.ndarray, at: np.ndarray, fov: float, aspect: float) -> np.ndarray:
@@ -35,4 +45,16 @@ def test_all_of_it_is_seen_and_in_the_middle(aspect: float, size: float) -> None
 def test_on_a_phone_it_is_above_the_sheet() -> None:
     points = np.random.default_rng(2).uniform(-0.5, 0.5, (9, 3))
     seen = on_picture(points, *fit(points, np.array([0.9, -0.9, 0.5]), 0.9, 0.46, True), 0.9, 0.46)
-    assert seen[:, 1].min() > 0.0 and seen[:, 1].max() < 1.0 and np.abs(seen[:, 0]).max() < 1.0
+    assert seen[:, 1].min() > SHEET and seen[:, 1].max() < 1.0 and np.abs(seen[:, 0]).max() < 1.0
+
+
+@pytest.mark.parametrize("phone", [False, True])
+def test_what_the_hand_will_follow_is_in_the_picture(phone: bool) -> None:
+    body = Body(SceneChoice(RunSpec("iiwa14-circle")))
+    (way,) = [task.path for task in body.ready().tasks if task.kind == "position"]
+    body.close()
+    assert way is not None
+    camera: Any = SimpleNamespace(position=np.ones(3), look_at=np.zeros(3), fov=0.9, aspect=0.46)
+    aim(camera, load_robot("iiwa14"), phone, np.zeros((0, 3)), [way])
+    seen = on_picture(way, camera.position, camera.look_at, camera.fov, camera.aspect)
+    assert np.abs(seen).max() < 1.0 and (seen[:, 1].min() > SHEET or not phone)
