@@ -227,8 +227,10 @@ def often(page: Page) -> Iterator[None]:
     before: Any = page.evaluate(
         "(rest) => { const before = window.picturesRest; window.picturesRest = rest; return before; }", OFTEN
     )
-    yield
-    page.evaluate("(rest) => { window.picturesRest = rest; }", before)
+    try:
+        yield
+    finally:
+        page.evaluate("(rest) => { window.picturesRest = rest; }", before)
 
 
 def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm: float = 0.18) -> None:

@@ -39,8 +39,7 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
 
 def _symmetric(M: np.ndarray) -> np.ndarray:
     """The matrices (…, n, n) whose upper triangles these have."""
-    upper = np.triu(M)
-    return upper + np.triu(upper, 1).swapaxes(-1, -2)
+    return np.where(np.tri(M.shape[-1], k=-1, dtype=bool), M.swapaxes(-1, -2), M)
 
 
 def suggest_M_bar(

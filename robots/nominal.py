@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from robots.inertia import mass_matrix
 from robots.ranges import Range, check_fields
 from robots.robot import Robot
 from robots.settings import PerJoint, PlantSettings
@@ -60,12 +61,10 @@ class NominalModel:
         self._model = true_model(robot, plant)
         self._data = self._model.createData()
         self._damping = plant.per_joint("damping", robot.n)
-        self._above = np.triu(np.ones((robot.n, robot.n), bool))
 
     def mass_matrix(self, q: Array) -> Array:
         """M(q) with armature, (n, n) symmetric, kg·m²."""
-        M = pin.crba(self._model, self._data, q)
-        return np.where(self._above, M, M.T)
+        return mass_matrix(self._model, self._data, q)
 
     def bias(self, q: Array, v: Array) -> Array:
         """The torque that keeps q̈ = 0, (n,) N·m."""

@@ -132,8 +132,8 @@ class TaskView:
 
     kind: the word of himpc.tasks.KINDS; frame: a link's name (tasks on frames only); axes: the axes under
     control; raw: where the hand put a draggable target, None for other references; path: (k, 3) closed curve
-    of the reference, m; speed_cap: of the filtered target, m/s or rad/s; root: the link that sees the frame,
-    of relative tasks; normal, offset: of the plane, for a distance to one.
+    in space that a position goes round, m; speed_cap: of the filtered target, m/s or rad/s; root: the link
+    that sees the frame, of relative tasks; normal, offset: of the plane, for a distance to one.
     """
 
     name: str

@@ -215,9 +215,7 @@ class Page:
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # a restart leaves the learner's view as it was
-                ways = [
-                    task.path for task in ready.tasks if task.kind == "position" and task.path is not None
-                ]
+                ways = [task.path for task in ready.tasks if task.path is not None]
                 aim(self._client.camera, ready.robot, self._phone, ready.room, ways)
                 self._seen = seen
         for sentence in ready.left_out:

@@ -122,11 +122,7 @@ class TorqueFace:
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
         self._pull = Pull(scene, robot, ready.robot, context.post)
-        curves = [
-            (task.path, context.colours[task.level])
-            for task in ready.tasks
-            if task.kind == "position" and task.path is not None
-        ]
+        curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]
         position = draggable(ready.tasks)[0]
         self._trails = Trails(
             scene, curves, LEVELS[0] if position is None else context.colours[position.level]

@@ -1,4 +1,5 @@
-"""One fork server for pages of which something else is tested: each takes a second of a core to get ready."""
+"""Learners and what they hold, and one fork server for pages of which something else is tested: each takes a
+second of a core to get ready."""
 
 from __future__ import annotations
 
@@ -6,10 +7,14 @@ from collections.abc import Iterator
 from functools import partial
 
 import pytest
+from children import Start
 
+from app.client.learner import Learner
+from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.spares import Spares
 from app.server.sessions import WORKER
+from lessons.scenes.run_spec import RunSpec
 
 
 @pytest.fixture(scope="session")
@@ -31,3 +36,29 @@ def one_fork_server(fork_server: ForkServer | None) -> Iterator[None]:
         for place in ("sessions", "classroom"):
             patch.setattr(f"app.server.{place}.Spares", partial(Spares, lent=fork_server))
         yield
+
+
+@pytest.fixture(scope="module")
+def lent(fork_server: ForkServer | None) -> dict[str, ForkServer | None]:
+    """By worker, the fork servers of tests that leave them as they are."""
+    return {WORKER: fork_server}
+
+
+@pytest.fixture
+def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
+    """Learners of one worker, and what it holds."""
+    made: list[Spares] = []
+    started: list[Learner] = []
+
+    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> Learner:
+        if not made:
+            made.append(Spares(worker, None if own_server else lent.get(worker)))
+        learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
+        started.append(learner)
+        return learner
+
+    yield run
+    for learner in started:
+        learner.close()
+    for spares in made:
+        spares.close()

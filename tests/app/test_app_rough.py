@@ -8,155 +8,39 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
 import pytest
+from children import LONG, Start, born, gone, running
 
 from app.client import trouble
 from app.client.learner import Learner
-from app.link import forkserver
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.messages import Load, Play, Post, Told
 from app.link.outbox import MOST
 from app.link.process import wait_until
 from app.link.ring import MAX_ROWS, MIN_ROWS, Block
-from app.link.spares import Spares
 from app.server.sessions import WORKER
 from benchmarks.rough import treat
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 
-LONG = 60.0  # s
 HERE = Path(__file__).parent
-Start = Callable[..., Learner]
 
 
 @pytest.fixture(scope="module")
-def lent(fork_server: ForkServer | None) -> Iterator[dict[str, ForkServer | None]]:
-    """By worker, the fork servers of tests that leave them as they are."""
-    stubborn = None if fork_server is None else ForkServer("stubborn")
-    yield {WORKER: fork_server, "stubborn": stubborn}
-    if stubborn is not None:
-        stubborn.close()
-
-
-@pytest.fixture
-def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
-    """Learners of one worker, and what it holds."""
-    made: list[Spares] = []
-    started: list[Learner] = []
-
-    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> Learner:
-        if not made:
-            made.append(Spares(worker, None if own_server else lent.get(worker)))
-        learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
-        started.append(learner)
-        return learner
-
-    yield run
-    for learner in started:
-        learner.close()
-    for spares in made:
-        spares.close()
-
-
-def running(learner: Learner) -> bool:
-    status = learner.status
-    return learner.trouble() is None and status is not None and status.ticks > 20
-
-
-def gone(pid: int) -> bool:
-    try:
-        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return True
-
-
-def server_of(learner: Learner) -> ForkServer:
-    server = learner._spares.server
-    assert server is not None
-    return server
-
-
-def born(learner: Learner) -> int:
-    assert wait_until(lambda: learner.pid is not None, LONG)
-    assert learner.pid is not None
-    return learner.pid
-
-
-# ---------------------------------------------------------------- the fork server
-
-
-def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
-    """What a second thread holds at that moment would stay locked in the child for ever."""
-    learner = start("iiwa14-hold", own_server=True)
-    assert wait_until(lambda: running(learner), LONG)
-    server = psutil.Process(server_of(learner).pid)
-    assert psutil.Process(born(learner)).ppid() == server.pid
-    assert server.num_threads() == 1
-    assert psutil.Process(born(learner)).memory_full_info().uss < 25e6  # its own memory, bytes
-
-
-@pytest.mark.parametrize("worker", ["broken", "threaded"])
-def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -> None:
-    learner = start("planar3-hold", worker)
-    assert wait_until(lambda: running(learner), LONG)
-    assert psutil.Process(born(learner)).ppid() == os.getpid()
-    another = start("planar3-hold")
-    assert wait_until(lambda: running(another), LONG)
-
-
-def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
-    learner = start("planar3-hold", own_server=True)
-    assert wait_until(lambda: running(learner), LONG)
-    server = server_of(learner)
-    os.kill(server.pid, signal.SIGKILL)
-    assert wait_until(lambda: not server.alive, LONG)
-    another = start("planar3-hold")
-    assert wait_until(lambda: running(another), LONG)
-    assert server_of(another) is not server and running(learner)
-    os.kill(born(learner), signal.SIGKILL)
-    assert wait_until(lambda: learner.failure is not None, LONG)
-    learner.reset_all()
-    assert wait_until(lambda: running(learner), LONG)
-
-
-def test_a_fork_server_that_hangs_is_replaced(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    learner = start("planar3-hold", own_server=True)
-    assert wait_until(lambda: running(learner), LONG)
-    monkeypatch.setattr(forkserver, "PATIENCE", 0.2)
-    before = server_of(learner).pid
-    os.kill(before, signal.SIGSTOP)
-    another = start("planar3-hold")
-    assert wait_until(lambda: server_of(another).stuck, LONG)
-    monkeypatch.setattr(trouble, "SILENCE", 0.0)
-    another.restart()
-    monkeypatch.undo()
-    assert wait_until(lambda: running(another), LONG)
-    assert gone(before) and running(learner)
-
-
-def test_a_fork_server_that_says_what_it_does_is_not_stuck(
-    start: Start, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A slow machine may take minutes to compile."""
-    learner = start("idle", "slow")
-    server = server_of(learner)
-    assert wait_until(lambda: bool(server.doing), LONG)
-    monkeypatch.setattr(forkserver, "FIRST_PATIENCE", 3.0)
-    seen: set[str] = set()
-
-    def gets_ready() -> bool:
-        seen.add(server.doing)
-        return server.ready or not server.alive or server.stuck
-
-    assert wait_until(gets_ready, LONG)
-    assert server.ready and len(seen) > 2
-    assert psutil.Process(born(learner)).ppid() == server.pid
+def lent(lent: dict[str, ForkServer | None]) -> Iterator[dict[str, ForkServer | None]]:
+    """One of the stubborn, too."""
+    if lent[WORKER] is None:
+        yield lent
+        return
+    stubborn = ForkServer("stubborn")
+    yield {**lent, "stubborn": stubborn}
+    stubborn.close()
 
 
 # ---------------------------------------------------------------- silence

@@ -1,0 +1,31 @@
+"""What tests about a page's simulations ask of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import psutil
+
+from app.client.learner import Learner
+from app.link.process import wait_until
+
+LONG = 60.0  # s
+Start = Callable[..., Learner]
+
+
+def running(learner: Learner) -> bool:
+    status = learner.status
+    return learner.trouble() is None and status is not None and status.ticks > 20
+
+
+def gone(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
+def born(learner: Learner) -> int:
+    assert wait_until(lambda: learner.pid is not None, LONG)
+    assert learner.pid is not None
+    return learner.pid
