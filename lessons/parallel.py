@@ -1,4 +1,4 @@
-"""Independent work on all local cores, or on a Dask cluster: the same function, items in, outcomes out.
+"""Independent work on all local cores: a function, items in, outcomes out; `cluster` does it elsewhere.
 
 A piece of work that fails is an outcome, not the end of the others. Outcomes come as they are ready; each
 carries the place of its item, so that what is made of them does not depend on who was faster.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import multiprocessing as mp
 import os
 import signal
-import socket
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -19,7 +18,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Protocol, TypeVar
-from urllib.parse import urlsplit
 
 from robots import InputError
 from robots.orphans import end_with_parent
@@ -83,7 +81,7 @@ def _until_one_dies(
             with _born_deaf():
                 # No more than there are processes: who dies takes no more along.
                 while waiting and len(under_way) < workers:
-                    future = pool.submit(_guarded, function, items[waiting[0]])
+                    future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()
             for future in wait(under_way, return_when=FIRST_COMPLETED).done:
                 place = under_way.pop(future)
@@ -99,73 +97,19 @@ def one_by_one(
 ) -> Generator[tuple[int, U | Failed], None, None]:
     """The same in this process, in order: for measuring times, and for tests."""
     for place, item in enumerate(items):
-        yield place, _guarded(function, item)
+        yield place, guarded(function, item)
 
 
-@contextmanager
-def on_cluster(address: str) -> Iterator[Spread]:
-    """A way to spread work over the workers of an existing Dask scheduler; they need himpc-lab installed.
-
-    Raises:
-        InputError: dask.distributed is not installed, or nobody answers at the address.
-    """
-    try:
-        from distributed import Client
-        from distributed import as_completed as as_they_end
-        from distributed.scheduler import KilledWorker
-    except ImportError:
-        raise InputError(
-            '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
-            "to use this machine's cores"
-        ) from None
-    # Asked first by plain socket: a Client that finds nobody goes on trying in the background.
-    try:
-        parts = urlsplit(address)
-        socket.create_connection((parts.hostname or "", parts.port or 0), timeout=10).close()
-        client = Client(address, timeout=10)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"--scheduler {address}: no Dask scheduler answers there ({type(error).__name__}); "
-            "give its address as dask prints it, e.g. tcp://10.0.0.1:8786"
-        ) from None
-
-    def spread(
-        function: Callable[[T], U], items: Sequence[T]
-    ) -> Generator[tuple[int, U | Failed], None, None]:
-        # pure=False: two equal items are two pieces of work. A lost worker is no failure: the scheduler gives
-        # its work to another one, up to its `allowed-failures` (3) times.
-        orphans: list[int] = []
-        futures = [client.submit(_guarded, function, item, pure=False) for item in items]
-        places = {future.key: place for place, future in enumerate(futures)}
-        try:
-            for future in as_they_end(futures):
-                error = future.exception()
-                if isinstance(error, KilledWorker):
-                    orphans.append(places[future.key])
-                else:
-                    yield places[future.key], future.result() if error is None else Failed(_sentence(error))
-            # A dying worker takes along what waited there: one at a time, the culprit shows.
-            for place in sorted(orphans):
-                alone = client.submit(_guarded, function, items[place], pure=False)
-                futures.append(alone)
-                for future in as_they_end([alone]):
-                    error = future.exception()
-                    yield place, future.result() if error is None else Failed(_sentence(error))
-        finally:
-            client.cancel(futures)
-
-    with client:
-        yield spread
-
-
-def _guarded(function: Callable[[T], U], item: T) -> U | Failed:
+def guarded(function: Callable[[T], U], item: T) -> U | Failed:
+    """What the function returns, or why it raised."""
     try:
         return function(item)
     except Exception as error:
-        return Failed(_sentence(error))
+        return Failed(sentence(error))
 
 
-def _sentence(error: BaseException) -> str:
+def sentence(error: BaseException) -> str:
+    """An error in one line, with its class unless it is written for people."""
     text = " ".join(str(error).split()) or "no reason given"
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
 
@@ -173,7 +117,7 @@ def _sentence(error: BaseException) -> str:
 def _alone(function: Callable[[T], U], item: T) -> U | Failed:
     with _pool(1) as pool:
         with _born_deaf():
-            future = pool.submit(_guarded, function, item)
+            future = pool.submit(guarded, function, item)
         try:
             return future.result()
         except BrokenProcessPool:

@@ -28,7 +28,7 @@ DOORS = {
     "tyro": ("app/",),
     "rich": ("app/",),
     "matplotlib": ("lessons/plots/",),
-    "distributed": ("lessons/parallel.py",),
+    "distributed": ("lessons/cluster.py",),
 }
 
 
@@ -149,6 +149,7 @@ LESSONS = {
     "papers": ("replay", "experiments", "scenes", "settings", "plots"),
     "plots": (),
     "parallel": (),
+    "cluster": ("parallel",),
 }
 """What each part of lessons/ may import beside itself and `own`: files of a learner's own stand in for
 settings, scenes, sessions and lessons alike, so that folder is on nobody's side."""

@@ -132,8 +132,9 @@ def _list(exercise: str | None, hints: int, json: str | None) -> int:
 def _folder(
     folder: Path, exercise: str | None, seed: int, out: Path, scheduler: str | None, json: str | None
 ) -> int:
+    from lessons.cluster import on_cluster
     from lessons.exercises.folder import grade_folder
-    from lessons.parallel import on_cluster, on_cores
+    from lessons.parallel import on_cores
 
     way = nullcontext(on_cores) if scheduler is None else on_cluster(scheduler)
     with way as spread, progress_bar(f"grading {folder} …", json is None) as advance:

@@ -43,9 +43,10 @@ def sweep(
         metric: what the map shows; by default the RMSE of level 1 after the first second.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
+    from lessons.cluster import on_cluster
     from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
     from lessons.own.resolve import tasks_named
-    from lessons.parallel import on_cluster, on_cores
+    from lessons.parallel import on_cores
     from lessons.scenes.run_spec import RunSpec
 
     own = tasks_named(set)

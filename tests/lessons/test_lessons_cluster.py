@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,7 +16,9 @@ from typing import Any
 import pytest
 from submissions import SUBMISSIONS
 
-from lessons.parallel import Failed, on_cluster
+from lessons.cluster import on_cluster
+from lessons.parallel import Failed
+from robots import InputError
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
 
@@ -25,11 +28,17 @@ CELLS = 8
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """A scheduler with two worker processes; work that kills one is given up after the second."""
+    """A scheduler with two worker processes; work that kills one is given up after the second. Who is missing
+    15 s after a death would not be started again, though it may only have died once more."""
     from dask.config import set as configured
 
     with (
-        configured({"distributed.scheduler.allowed-failures": 1}),
+        configured(
+            {
+                "distributed.scheduler.allowed-failures": 1,
+                "distributed.deploy.lost-worker-timeout": "1h",
+            }
+        ),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, protocol="tcp"
         ) as found,
@@ -115,6 +124,35 @@ def _dies_at_one(value: int) -> int:
     if value == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return value
+
+
+@pytest.fixture
+def deserted() -> Iterator[Any]:
+    """A scheduler that nobody works for."""
+    with distributed.LocalCluster(
+        n_workers=0, processes=False, dashboard_address=None, protocol="tcp"
+    ) as found:
+        yield found
+
+
+def test_a_cluster_without_workers_is_not_waited_for(deserted: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lessons.cluster.PATIENCE", 1.0)
+    with (
+        pytest.raises(InputError, match=f"no worker for 1 s.*dask worker {deserted.scheduler_address}"),
+        on_cluster(deserted.scheduler_address) as spread,
+    ):
+        list(spread(abs, [-1, -2]))
+
+
+def test_a_scheduler_that_goes_away_is_one_sentence(deserted: Any) -> None:
+    going = threading.Timer(0.5, deserted.close)
+    with (
+        pytest.raises(InputError, match="the scheduler is gone"),
+        on_cluster(deserted.scheduler_address) as spread,
+    ):
+        going.start()
+        list(spread(abs, [-1, -2]))
+    going.join()
 
 
 def test_a_folder_of_submissions_is_graded_on_the_cluster(cluster: Any, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lessons.cluster import on_cluster
 from lessons.experiments.sweep import (
     Cell,
     best_cell,
@@ -23,7 +24,7 @@ from lessons.experiments.sweep import (
     make_sweep,
     metrics,
 )
-from lessons.parallel import Failed, cores, on_cluster, on_cores, one_by_one
+from lessons.parallel import Failed, cores, on_cores, one_by_one
 from lessons.plots.heat import draw_map
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError

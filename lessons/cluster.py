@@ -1,0 +1,114 @@
+"""Independent work on the workers of a Dask scheduler that is there, as `parallel` does it on local cores."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+from lessons.parallel import Failed, Spread, guarded, sentence
+from robots import InputError
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+PATIENCE = 60.0
+"""s that a scheduler may be without workers before work is given up: one that died is replaced sooner."""
+_ASK = 1.0  # s between two questions whether there are workers
+
+
+@contextmanager
+def on_cluster(address: str) -> Iterator[Spread]:
+    """A way to spread work over the workers of an existing Dask scheduler; they need himpc-lab installed.
+
+    Raises:
+        InputError: dask.distributed is not installed, or nobody answers at the address; while work is spread:
+            the scheduler went away, or had no worker for `PATIENCE` s.
+    """
+    try:
+        from distributed import Client
+        from distributed import as_completed as as_they_end
+        from distributed.scheduler import KilledWorker
+    except ImportError:
+        raise InputError(
+            '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
+            "to use this machine's cores"
+        ) from None
+    # Asked first by plain socket: a Client that finds nobody goes on trying in the background.
+    try:
+        parts = urlsplit(address)
+        socket.create_connection((parts.hostname or "", parts.port or 0), timeout=10).close()
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--scheduler {address}: no Dask scheduler answers there ({type(error).__name__}); "
+            "give its address as dask prints it, e.g. tcp://10.0.0.1:8786"
+        ) from None
+
+    def ended(futures: list[Any]) -> Iterator[Any]:
+        coming = as_they_end(futures)
+        asked = worked = time.monotonic()
+        while not coming.is_empty():
+            if coming.has_ready():
+                yield next(coming)
+                continue
+            time.sleep(0.05)
+            if time.monotonic() - asked < _ASK:
+                continue
+            asked = time.monotonic()
+            if client.nthreads():
+                worked = asked
+            elif asked - worked >= PATIENCE:
+                raise InputError(
+                    f"--scheduler {address}: it has had no worker for {PATIENCE:.0f} s. Start one with "
+                    f'"dask worker {address}", then give the same command again'
+                )
+
+    def spread(
+        function: Callable[[T], U], items: Sequence[T]
+    ) -> Generator[tuple[int, U | Failed], None, None]:
+        # pure=False: two equal items are two pieces of work. A lost worker is no failure: the scheduler gives
+        # its work to another one, up to its `allowed-failures` (3) times.
+        orphans: list[int] = []
+        futures = [client.submit(guarded, function, item, pure=False) for item in items]
+        places = {future.key: place for place, future in enumerate(futures)}
+        try:
+            for future in ended(futures):
+                error = future.exception()
+                if isinstance(error, KilledWorker):
+                    orphans.append(places[future.key])
+                else:
+                    yield places[future.key], future.result() if error is None else Failed(sentence(error))
+            # A dying worker takes along what waited there: one at a time, the culprit shows.
+            for place in sorted(orphans):
+                alone = client.submit(guarded, function, items[place], pure=False)
+                futures.append(alone)
+                for future in ended([alone]):
+                    error = future.exception()
+                    yield place, future.result() if error is None else Failed(sentence(error))
+        except (OSError, CancelledError):
+            raise InputError(
+                f"--scheduler {address}: the scheduler is gone. Give the same command again once it answers"
+            ) from None
+        finally:
+            client.cancel(futures)
+
+    with _quiet(), client:
+        yield spread
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """A client that loses its scheduler logs tracebacks; people are told in a sentence."""
+    log = logging.getLogger("distributed.client")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
