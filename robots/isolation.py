@@ -214,6 +214,14 @@ def waited(pid: int) -> float:
         return 0.0
 
 
+def is_stopped(pid: int) -> bool:
+    """Whether somebody has stopped a process (SIGSTOP, a debugger), as far as the system tells (Linux)."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][:1] in ("T", "t")
+    except OSError:
+        return False
+
+
 def serve() -> None:
     """The child: one request from standard input, one answer to standard output."""
     within = Allowance(float(sys.argv[2]), int(sys.argv[3]))

@@ -24,13 +24,15 @@ from typing import NoReturn
 
 from app.link.children import Forked, one_thread_each
 from app.link.wire import Handle, Wire, packed
-from robots.isolation import threads
+from robots.isolation import is_stopped, threads, waited
 from robots.orphans import end_with
 
-PATIENCE = 10.0
-"""s after which a server that is ready but does not fork counts as stuck."""
+PATIENCE = 3.0
+"""s after which a server that is ready but does not fork counts as stuck, and any that somebody has stopped;
+what it waits for a core on a busy machine does not count."""
 FIRST_PATIENCE = 120.0
 """s it may say nothing while it gets ready, compiling included, before it counts as stuck."""
+_LOOK = 0.25  # s between two looks whether it is stuck
 
 
 @dataclass(frozen=True)
@@ -83,10 +85,12 @@ class ForkServer:
             theirs.close()
             os.close(life)
         self.ready = False
+        self.stopped = False
+        """Whether it was given up because somebody had stopped it (SIGSTOP)."""
         self.doing = ""
         self._heard_at = time.monotonic()
         self._ended = False
-        self._asked: list[tuple[float, Forked]] = []
+        self._asked: list[tuple[float, float, Forked]] = []  # when, what it had waited for a core, for what
         self._wire = Wire(ours)
         self._lock = threading.Lock()
         self._listening = threading.Thread(target=self._hear, daemon=True)
@@ -103,6 +107,9 @@ class ForkServer:
     def _hear(self) -> None:
         with contextlib.suppress(EOFError, OSError):
             while True:
+                if not self._wire.poll(_LOOK):
+                    self._end_if_stuck()
+                    continue
                 word = self._wire.recv()
                 self._heard_at = time.monotonic()
                 match word:
@@ -116,11 +123,23 @@ class ForkServer:
     @property
     def stuck(self) -> bool:
         """Whether it was asked for a child and gave none for too long."""
-        now = time.monotonic()
         with self._lock:
-            self._asked = [each for each in self._asked if each[1].unborn]
-            patience = PATIENCE if self.ready else FIRST_PATIENCE
-            return any(now - max(since, self._heard_at) > patience for since, _ in self._asked)
+            self._asked = [each for each in self._asked if each[2].unborn]
+            if not self._asked:
+                return False
+            now, starved = time.monotonic(), waited(self.pid)
+            # A server that was stopped while it got ready says nothing, and never will.
+            patience = PATIENCE if self.ready or is_stopped(self.pid) else FIRST_PATIENCE
+            return any(
+                now - max(since, self._heard_at) - (starved - before) > patience
+                for since, before, _ in self._asked
+            )
+
+    def _end_if_stuck(self) -> None:
+        """Who waits for a child then hears at once that this one gives none."""
+        if self.stuck:
+            self.stopped = is_stopped(self.pid)
+            self.give_up()
 
     def fork(self, theirs: socket.socket) -> Forked:
         """A child with this end of its socket. Raises OSError if the server is gone or does not read."""
@@ -129,7 +148,7 @@ class ForkServer:
         try:
             with self._lock:
                 self._wire.post(packed(Fork(Handle(theirs.fileno()), Handle(other.fileno()))), wait=False)
-                self._asked.append((time.monotonic(), child))
+                self._asked.append((time.monotonic(), waited(self.pid), child))
         except OSError:
             child.close()
             raise
@@ -139,6 +158,7 @@ class ForkServer:
 
     def give_up(self) -> None:
         """Ends the server alone: its children go on."""
+        self._ended = True
         self._process.kill()
 
     def close(self) -> None:

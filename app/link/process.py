@@ -22,11 +22,11 @@ Start = Callable[[socket.socket], Child]
 class Process:
     """A child. Reports arrive on a thread of this handle and go to the `listen`er."""
 
-    def __init__(self, start: Start, instead: Start) -> None:
-        """instead: another way, for a child of the first that was never born."""
+    def __init__(self, start: Start, *instead: Start) -> None:
+        """instead: other ways, one after the other, for a child that was never born."""
         ours, self._theirs = socket.socketpair()
         self._wire = Wire(ours)
-        self._instead: Start | None = instead
+        self._instead = list(instead)
         self._child = start(self._theirs)
         self._outbox = Outbox(self._wire)
         self._lock = threading.Lock()
@@ -130,10 +130,9 @@ class Process:
         ended = self._child.look()
         if self._child.pid is not None:
             self._theirs.close()  # from now on the child's death is the end of what it says
-        elif ended and self._instead is not None and not self._closed:
-            instead, self._instead = self._instead, None
+        elif ended and self._instead and not self._closed:
             self._child.close()
-            self._child = instead(self._theirs)
+            self._child = self._instead.pop(0)(self._theirs)
             ended = False
         self.heard_at = time.monotonic()
         return ended

@@ -44,15 +44,15 @@ class Spares:
         """The spare, or a new child."""
         with self._lock:
             spare, self._spare = self._spare, None
-            if spare is not None and spare.alive and not (self._server is not None and self._server.stuck):
-                return spare
-            made = self._make()
-        if spare is not None:
-            spare.kill()
-        return made
+            return spare if spare is not None and spare.alive else self._make()
 
     def _make(self) -> Process:
-        return Process(self._start, self._spawn)
+        return Process(self._start, self._start_again, self._spawn)
+
+    def _start_again(self, theirs: socket.socket) -> Child:
+        """For a child whose fork server ended before it was born."""
+        with self._lock:
+            return self._start(theirs)
 
     def _start(self, theirs: socket.socket) -> Child:
         self._mind_the_server()
@@ -65,7 +65,7 @@ class Spares:
         """A server that has died or hangs is replaced; one that never came to be ready is not tried again."""
         server = self._server
         if server is not None and (not server.alive or server.stuck):
-            self._forks = server.ready
+            self._forks = server.ready or server.stopped
             server.give_up()
             self._given_up.append(server)
             self._server = None

@@ -9,7 +9,6 @@ import psutil
 import pytest
 from children import LONG, Start, born, gone, running
 
-from app.client import trouble
 from app.client.learner import Learner
 from app.link import forkserver
 from app.link.forkserver import ForkServer
@@ -56,19 +55,26 @@ def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
     assert wait_until(lambda: running(learner), LONG)
 
 
-def test_a_fork_server_that_hangs_is_replaced(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
+    """Who waits for it gets a simulation from another one, unasked; it is ended, its children go on."""
     learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
-    monkeypatch.setattr(forkserver, "PATIENCE", 0.2)
-    before = server_of(learner).pid
-    os.kill(before, signal.SIGSTOP)
-    another = start("planar3-hold")
-    assert wait_until(lambda: server_of(another).stuck, LONG)
-    monkeypatch.setattr(trouble, "SILENCE", 0.0)
-    another.restart()
-    monkeypatch.undo()
-    assert wait_until(lambda: running(another), LONG)
-    assert gone(before) and running(learner)
+    before = server_of(learner)
+    os.kill(before.pid, signal.SIGSTOP)
+    waiting = start("planar3-hold")
+    assert wait_until(lambda: gone(before.pid), LONG)
+    assert wait_until(lambda: running(waiting), LONG)
+    assert waiting.failure is None and running(learner)
+    assert psutil.Process(born(waiting)).ppid() == server_of(waiting).pid != before.pid
+
+
+def test_a_fork_server_that_is_stopped_while_it_gets_ready_is_replaced(start: Start) -> None:
+    learner = start("idle", "slow")
+    before = server_of(learner)
+    assert wait_until(lambda: bool(before.doing), LONG)
+    os.kill(before.pid, signal.SIGSTOP)
+    assert wait_until(lambda: gone(before.pid) and learner.pid is not None, LONG)
+    assert psutil.Process(born(learner)).ppid() == server_of(learner).pid != before.pid
 
 
 def test_a_fork_server_that_says_what_it_does_is_not_stuck(
