@@ -58,7 +58,7 @@ class Viewer:
     """One browser. What it stores outlives its connections."""
 
     def __init__(self, url: str, tab: str | None = _TAB, delay: float = 0.0) -> None:
-        self._url = url.replace("http", "ws")
+        self._url = url.replace("http", "ws", 1)
         self._tab, self._delay = tab, delay
         self._stored: dict[str, str] = {}
         self.second = Second()
@@ -219,7 +219,9 @@ def main() -> None:
     options = parser.parse_args()
     queues = [SimpleQueue[int]() for _ in range(options.clients)]
     threads = [
-        threading.Thread(target=Viewer(options.url, options.tab, options.delay).watch, args=each, daemon=True)
+        threading.Thread(
+            target=Viewer(options.link, options.tab, options.delay).watch, args=each, daemon=True
+        )
         for each in enumerate(queues)
     ]
     for thread in threads:

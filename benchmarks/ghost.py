@@ -55,7 +55,7 @@ def main() -> int:
 def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[str, float]:
     """Simulated over real time while a client watches, what it got, and how busy each process was."""
     client = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.client", server.url],
+        [sys.executable, "-m", "benchmarks.client", server.link],
         stdout=subprocess.PIPE,
         text=True,
     )

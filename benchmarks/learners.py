@@ -96,7 +96,7 @@ def _came(said: list[dict[str, Any]]) -> list[int]:
 
 def measured(server: PageServer, clients: int, tab: str, seconds: float) -> dict[str, Any]:
     """The server's share and bytes per learner, and each learner's own figures."""
-    with Viewers(server.url, "--clients", str(clients), "--tab", tab) as viewers:
+    with Viewers(server.link, "--clients", str(clients), "--tab", tab) as viewers:
         assert wait_until(lambda: len(server.sessions.learners) == clients, LONG), "not all were let in"
         learners = server.sessions.learners
         assert wait_until(lambda: all(simulated(each) > 0.5 for each in learners), LONG), "nothing runs"

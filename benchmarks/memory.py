@@ -41,7 +41,7 @@ def main() -> int:
     expect.set_options(timeout=SLOW)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
-        page = open_page(browser, server.url, 1200, 700, rest=SELDOM)
+        page = open_page(browser, server.link, 1200, 700, rest=SELDOM)
         try:
             for count in range(2 * len(COURSE)):
                 switch(page, count)

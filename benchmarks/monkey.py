@@ -191,7 +191,7 @@ class Monkey:
             card.click()
 
     def _reload(self) -> None:
-        load(self.page, self.server.url)
+        load(self.page, self.server.link)
 
     # ---------------------------------------------------------------- eyes
 
@@ -269,7 +269,7 @@ def walk(
 ) -> Findings:
     """A random walk of so many minutes; it ends early when something broke."""
     # With less, viser's panel of statistics has no canvas to draw on, and a user finds it sooner or later.
-    page = open_page(browser, server.url, scale=0.5, rest=SELDOM)
+    page = open_page(browser, server.link, scale=0.5, rest=SELDOM)
     page.set_default_timeout(_PATIENCE)
     page.set_default_navigation_timeout(SLOW)
     monkey = Monkey(page, server, seed, complaints)

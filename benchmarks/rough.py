@@ -33,7 +33,7 @@ from websockets.exceptions import ConnectionClosed
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
-from browsing.wire import Wire, eventually
+from browsing.wire import Wire, eventually, let_in
 from lessons.scenes.run_spec import RunSpec
 
 LONG = 60.0  # s
@@ -72,11 +72,11 @@ def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, objec
     try:
         with contextlib.ExitStack() as opened:
             # One after the other: each must be known to whom it belongs.
-            pairs = [(opened.enter_context(Wire(server.url)), _learner(server, place)) for place in range(3)]
+            pairs = [(opened.enter_context(Wire(server.link)), _learner(server, place)) for place in range(3)]
             (witness, *wires), learners = zip(*pairs, strict=True)
             assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
             pages = list(zip(learners[1:], wires, strict=True))
-            with _watch(server.url, witness) as watched:
+            with _watch(server.link, witness) as watched:
                 for name, times, harm in (
                     ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),
                     ("stopped", stops, lambda each: _hurt(each, signal.SIGSTOP)),
@@ -201,9 +201,10 @@ def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
             worst[0] = max(worst[0], time.monotonic() - changed)
 
     def get() -> None:
+        page = urllib.request.Request(url.partition("?")[0], headers={"Cookie": let_in(url)})
         while not over.wait(0.5):
             began = time.monotonic()
-            urllib.request.urlopen(url, timeout=LONG).close()
+            urllib.request.urlopen(page, timeout=LONG).close()
             worst[1] = max(worst[1], time.monotonic() - began)
 
     threads = [threading.Thread(target=each, daemon=True) for each in (look, get)]

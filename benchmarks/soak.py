@@ -70,7 +70,7 @@ def main() -> int:
     options = parser.parse_args()
     server = PageServer(SceneChoice(RunSpec(options.scene)), port=0, max_sessions=options.clients)
     try:
-        with Viewers(server.url, "--clients", str(options.clients)) as viewers:
+        with Viewers(server.link, "--clients", str(options.clients)) as viewers:
             assert wait_until(lambda: len(server.sessions.learners) == options.clients, LONG), "not let in"
             learners = server.sessions.learners
             assert wait_until(lambda: all(simulated(each) > 0.5 for each in learners), LONG), "nothing runs"

@@ -41,7 +41,7 @@ def main() -> int:
     options = parser.parse_args()
     server = PageServer(SceneChoice(RunSpec(SCENES[-1])), port=0, max_sessions=1)
     client = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.client", server.url], stdout=subprocess.DEVNULL
+        [sys.executable, "-m", "benchmarks.client", server.link], stdout=subprocess.DEVNULL
     )
     try:
         assert wait_until(lambda: bool(server.sessions.learners), LONG), "the client was not let in"

@@ -33,7 +33,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
 from browsing.hands import CHROMIUM_ARGS, find_chromium
-from browsing.wire import camera, messages_of, nothing_kept, pack
+from browsing.wire import camera, let_in, messages_of, nothing_kept, pack
 from lessons.scenes.run_spec import RunSpec
 
 PROTOCOL: Any = [f"viser-v{__version__}"]
@@ -55,7 +55,7 @@ _FOREIGN = """async ([url, protocol]) => {
 def serve(pipe: Any) -> None:
     """The server's process: answers what it has seen until it is told to end."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=3, grace=600.0)
-    pipe.send(server.url)
+    pipe.send(server.link)
     while pipe.recv() == "seen":
         pipe.send(
             {
@@ -74,7 +74,7 @@ class Watched:
 
     def __init__(self, url: str) -> None:
         self.packets = 0
-        self._socket = connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None)
+        self._socket = connect(url.replace("http", "ws", 1), subprotocols=PROTOCOL, max_size=None)
         self._socket.send(pack(camera()))
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -104,7 +104,7 @@ def shake(url: str, host: str, origin: str) -> int:
     """A handshake with a frame sent along; the status of the answer."""
     parts = urlsplit(url)
     lines = [
-        "GET / HTTP/1.1",
+        f"GET /?{parts.query} HTTP/1.1",
         f"Host: {host}",
         f"Origin: {origin}",
         "Upgrade: websocket",
@@ -152,7 +152,7 @@ def from_chromium(url: str) -> int:
             page = browser.new_page()
             page.goto(f"http://127.0.0.1:{site.server_address[1]}/")
             script = _FOREIGN.replace("CAMERA", json.dumps(list(pack(camera()))))
-            opened: int = page.evaluate(script, [url.replace("http", "ws"), PROTOCOL[0]])
+            opened: int = page.evaluate(script, [url.replace("http", "ws", 1), PROTOCOL[0]])
             browser.close()
     finally:
         site.shutdown()
@@ -171,7 +171,7 @@ def besieged(url: str, silent: int) -> Iterator[subprocess.Popen[bytes]]:
         mute = []
         for _ in range(silent - silent // 2):
             with contextlib.suppress(InvalidHandshake, OSError):
-                mute.append(connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None))
+                mute.append(connect(url.replace("http", "ws", 1), subprotocols=PROTOCOL, max_size=None))
         flood = subprocess.Popen([sys.executable, "-m", "benchmarks.visitors", "--flood", url])
         try:
             yield flood
@@ -189,7 +189,7 @@ def flood(url: str) -> None:
     while True:
         with (
             contextlib.suppress(ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError),
-            connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None) as socket_,
+            connect(url.replace("http", "ws", 1), subprotocols=PROTOCOL, max_size=None) as socket_,
         ):
             threading.Thread(target=_drain, args=(socket_,), daemon=True).start()
             while True:
@@ -204,13 +204,16 @@ def _drain(connection: Any) -> None:
 
 def newcomer(url: str) -> float:
     """s until a new page is answered: the document, the socket, the first packet after its first word."""
-    parts = urlsplit(url)
+    parts, cookie = urlsplit(url), let_in(url)
     began = time.monotonic()
     with socket.create_connection((parts.hostname or "", parts.port or 0), timeout=LONG) as plain:
-        plain.sendall(f"GET / HTTP/1.1\r\nHost: {parts.netloc}\r\nAccept-Encoding: gzip\r\n\r\n".encode())
+        lines = ["GET / HTTP/1.1", f"Host: {parts.netloc}", f"Cookie: {cookie}", "Accept-Encoding: gzip"]
+        plain.sendall("\r\n".join([*lines, "", ""]).encode())
         while plain.recv(65536):
             pass
-    with connect(url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None, open_timeout=LONG) as page:
+    with connect(
+        url.replace("http", "ws", 1), subprotocols=PROTOCOL, max_size=None, open_timeout=LONG
+    ) as page:
         page.send(pack(camera()))
         while True:
             raw = page.recv(timeout=LONG)

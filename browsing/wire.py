@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import http.client
 import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
+from urllib.parse import urlsplit
 
 import msgspec
 import zstandard
@@ -26,6 +28,16 @@ def messages_of(raw: bytes) -> list[dict[str, Any]]:
 def pack(message: _messages.Message) -> bytes:
     """As the server reads it."""
     return msgspec.msgpack.encode(message.as_serializable_dict())
+
+
+def let_in(link: str) -> str:
+    """The cookie, as a browser sends it, that who opens a link of `PageServer` gets; "" if none is given."""
+    parts = urlsplit(link)
+    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=30)
+    connection.request("GET", f"/?{parts.query}")
+    answer = connection.getresponse()
+    connection.close()
+    return (answer.headers["Set-Cookie"] or "").partition(";")[0]
 
 
 def nothing_kept(request: str) -> _messages.LocalStorageGetItemResponseMessage:
@@ -55,7 +67,7 @@ class Wire:
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
         self.eye: tuple[float, ...] = ()
-        self._socket = connect(url.replace("http", "ws"), subprotocols=protocol, max_size=None)
+        self._socket = connect(url.replace("http", "ws", 1), subprotocols=protocol, max_size=None)
         self.say(camera())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -94,6 +106,10 @@ class Wire:
         """The control with a label."""
         shown = list(self.controls.items())
         return next((uuid for uuid, each in shown if each["props"].get("label") == label), None)
+
+    def folders(self, words: str) -> int:
+        """How many there ever were whose label begins with some words."""
+        return sum(str(each["props"].get("label", "")).startswith(words) for each in list(self.made))
 
     def shows(self, text: str) -> bool:
         """Whether a piece of text is among what the page shows."""

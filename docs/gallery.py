@@ -79,7 +79,7 @@ def main() -> None:
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
-            page = open_page(browser, server.url, WIDTH, HEIGHT, scale=1.0, rest=SELDOM)
+            page = open_page(browser, server.link, WIDTH, HEIGHT, scale=1.0, rest=SELDOM)
             for name in options.names:
                 lesson = load_lesson(name)
                 sheet(walk(page, lesson)).save(options.out / f"{name}.webp", quality=QUALITY, method=6)

@@ -31,7 +31,7 @@ def main() -> None:
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
-            page = open_page(browser, server.url, 1440, 900, scale=1.0, rest=SELDOM)
+            page = open_page(browser, server.link, 1440, 900, scale=1.0, rest=SELDOM)
             part = EXERCISE.part
             expect_part(page, EXERCISE.whole, part)
             if isinstance(part, Step) and part.prediction is not None:

@@ -36,7 +36,13 @@ class Import:
         raise InputError(f"{source} cannot be used: {where}{refused[0].text}{more}.")
 
 
-def import_robot(data: bytes, source: str, folder: Path | None = None, tip: str | None = None) -> Import:
+def import_robot(
+    data: bytes,
+    source: str,
+    folder: Path | None = None,
+    tip: str | None = None,
+    within: Path | None = None,
+) -> Import:
     """The robot of a URDF document, after a first few milliseconds in the plant.
 
     Args:
@@ -44,11 +50,12 @@ def import_robot(data: bytes, source: str, folder: Path | None = None, tip: str 
         source: how messages name it.
         folder: where its mesh paths start from; None: it may see the meshes of installed packages only.
         tip: its default end-effector frame; None takes the end of the longest chain.
+        within: outside of which no other mesh is looked at; None: no such limit.
 
     Raises:
         InputError: the tip is no frame of it. What else is wrong is in the report.
     """
-    canonical, report = canonicalise(data, source, folder)
+    canonical, report = canonicalise(data, source, folder, within)
     if canonical is None:
         return Import(report)
     robot = _robot(canonical, tip)

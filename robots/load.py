@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
-from robots.errors import shortened, unknown_name
+from robots.errors import InputError, shortened, unknown_name
 from robots.importing import Import, bounds, import_robot
 from robots.isolation import Fault, isolated
 from robots.report import Finding, ImportReport
@@ -16,10 +16,12 @@ from robots.robot import Robot
 from robots.urdf import canonicalise, load_bytes
 
 
-def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
+def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
     """The robot with this catalog name, or the one described by a URDF file.
 
     tip: its default end-effector frame; None takes the catalog's, or the end of the longest chain.
+    within: a folder, without symbolic links, outside of which neither a URDF file nor a mesh is looked at,
+    installed meshes excepted; None: they may lie anywhere.
     Raises InputError, one sentence that says what to do, for an unknown name, a missing file, a
     description that cannot be used, or an unknown tip.
     """
@@ -30,7 +32,9 @@ def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
     path = Path(text)
     if "/" not in text and not path.suffix and not _exists(path):
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
-    return _import_file(path, tip).used()
+    if within is not None and not path.resolve().is_relative_to(within):
+        raise InputError(f"The URDF '{shortened(text, 100)}' is not in the folder whose files may be opened.")
+    return _import_file(path, tip, within).used()
 
 
 def load_urdf_text(text: str, tip: str | None = None) -> Robot:
@@ -50,13 +54,15 @@ def check_urdf(path: str | Path) -> ImportReport:
     return _import_file(Path(path), None).report
 
 
-def _import_file(path: Path, tip: str | None) -> Import:
-    return _import(load_bytes(path), shortened(str(path), 100), path.resolve().parent, tip)
+def _import_file(path: Path, tip: str | None, within: Path | None = None) -> Import:
+    return _import(load_bytes(path), shortened(str(path), 100), path.resolve().parent, tip, within)
 
 
-def _import(data: bytes, source: str, folder: Path | None, tip: str | None) -> Import:
+def _import(
+    data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
+) -> Import:
     try:
-        return isolated(import_robot, data, source, folder, tip)
+        return isolated(import_robot, data, source, folder, tip, within)
     except Fault as fault:
         return Import(ImportReport(source, (Finding("refused", source, str(fault)),)))
 

@@ -19,10 +19,11 @@ from robots.report import Finding
 _RENAMED = {"kuka_lbr_iiwa_support": "kuka_description/kuka_lbr_iiwa"}
 
 
-def localise(root: Element, folder: Path | None) -> Iterator[Finding]:
+def localise(root: Element, folder: Path | None, within: Path | None = None) -> Iterator[Finding]:
     """Removes every shape whose mesh is not found; the link is then drawn as capsules. Yields a note on it.
 
-    A mesh of an installed package keeps its `package://` name, any other gets its absolute path.
+    A mesh of an installed package keeps its `package://` name, any other gets its absolute path. within: a
+    folder outside of which no other mesh is looked at; None: they may lie anywhere.
     """
     missing: dict[str, int] = {}
     for link in root.findall("link"):
@@ -34,7 +35,7 @@ def localise(root: Element, folder: Path | None) -> Iterator[Finding]:
             if installed_mesh(uri) is not None:
                 continue
             path = None if folder is None else find_mesh(uri, folder)
-            if path is not None:
+            if path is not None and (within is None or path.is_relative_to(within)):
                 mesh.set("filename", str(path))
                 continue
             link.remove(shape)

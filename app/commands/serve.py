@@ -27,6 +27,8 @@ def serve(
         tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")
     ] = (),
     no_token: bool = False,
+    own_files: Annotated[str | None, tyro.conf.arg(metavar="DIR")] = None,
+    no_own_files: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     key: str | None = None,
 ) -> int:
     """Open the page: a robot under HIMPC whose target you can drag.
@@ -41,20 +43,26 @@ def serve(
         state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
         max_sessions: how many people may use it at once, each with a robot of their own.
         classroom: one robot for all pages; who has the printed token steers it.
-        host: address to listen on; only this machine can reach the default. Beyond it the page asks for
-            the token of the address that is printed.
+        host: address to listen on; only this machine can reach the default. The page asks for the token of
+            the address that is printed.
         port: port to listen on.
         no_browser: do not open a browser.
         trusted_origin: where a reverse proxy shows the page, e.g. https://lab.example.org; docs/serving.md
             has one with TLS.
-        no_token: let everybody in who reaches the page.
+        no_token: let everybody in who reaches the page, every user of this machine at least.
+        own_files: folder of the Python and URDF files that you can open from the page, by default the one
+            himpc-lab is started in. Only the page of the first address that is printed opens any.
+        no_own_files: no page opens files of this machine.
         key: file with a key of yours, 16 signs or more: what learners hand in is signed with it.
     """
     from app.link.choice import SceneChoice
     from app.server.server import FIRST
     from app.server.server import serve as serve_page
+    from lessons.own.folder import Folder
     from lessons.replay.progress import read_key
 
+    if no_own_files and own_files is not None:
+        raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
@@ -79,5 +87,6 @@ def serve(
         open_browser=not no_browser,
         trusted_origins=trusted_origin,
         ask_token=not no_token,
+        own_files=None if no_own_files else Folder.at(own_files or "."),
         key=None if key is None else read_key(key),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, final
 
 from app.link.exercise import Exercise
@@ -10,6 +11,7 @@ from lessons.course import COURSE
 from lessons.own.files import is_file, read
 from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
+from robots.catalog import CATALOG
 from robots.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ class SceneChoice:
         mine: what the learner had changed of that step, as assignments; made anew once when it is loaded.
         scenes: Python files that may be the scene. These and the run's `files` and `tasks` are what whoever
             started the program named: no others are run.
+        within: the folder below which the URDF and its meshes have to lie, if the URDF was named on the page.
     """
 
     run: RunSpec
@@ -37,6 +40,7 @@ class SceneChoice:
     exercise: Exercise | None = None
     mine: tuple[str, ...] = ()
     scenes: tuple[str, ...] = ()
+    within: Path | None = None
 
     @classmethod
     def starting(
@@ -131,6 +135,29 @@ class SceneChoice:
         return replace(self, run=run, exercise=None, mine=())
 
     @property
+    def paths(self) -> frozenset[str]:
+        """Every file of the machine that it names."""
+        run, lesson = self.run, None if self.exercise is None else self.exercise.lesson
+        set_to = (each.partition("=") for each in run.set)
+        told = (value.strip().strip('"') for path, _, value in set_to if path == "controller")
+        named = (*run.files, *run.tasks, *self.scenes, run.scene, run.controller or "", lesson or "", *told)
+        urdf = () if run.urdf is None or run.urdf in CATALOG else (run.urdf,)
+        return frozenset((*filter(is_file, named), *urdf))
+
+    @property
+    def asked(self) -> frozenset[str]:
+        """The files that whoever chose it asks for: of a step the lesson's own, which may name others."""
+        if self.exercise is None:
+            return self.paths
+        return frozenset(filter(is_file, (self.exercise.lesson,)))
+
+    def without_places(self, sentence: str) -> str:
+        """The sentence with its files by name alone: where they lie is their owner's business."""
+        for path in sorted(self.paths, key=len, reverse=True):
+            sentence = sentence.replace(path, Path(path).name)
+        return sentence
+
+    @property
     def known(self) -> bool:
         """Whether names alone tell that it can be loaded: no file, frame or setting of somebody's own."""
         scene, seed = self.run.scene, self.run.seed
@@ -173,6 +200,10 @@ class SceneChoice:
         from lessons.scenes.catalog import load_scene
 
         run = self.run
+        if self.within is not None:
+            from lessons.scenes.hold import hold
+
+            return hold(run.urdf, run.tip, within=self.within)
         load = scene_named if self.exercise is not None or run.scene in self.scenes else load_scene
         return load(run.scene, run.urdf, run.tip, self.urdf_text)
 

@@ -40,6 +40,7 @@ from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
 from lessons.events import Event
+from lessons.own.folder import Folder
 from lessons.settings.settings import Settings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
@@ -57,7 +58,7 @@ class Stage:
         dark: bool,
         choose: Callable[[SceneChoice], None],
         theme: Callable[[bool], None],
-        by_path: bool,
+        own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
         phone: bool,
@@ -84,7 +85,7 @@ class Stage:
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: Ghost | None = None
-        self._build_panels(client.gui, scenes, choose, by_path, loop, notebook, phone)
+        self._build_panels(client.gui, scenes, choose, own_files, loop, notebook, phone)
         self._build_scene(client.scene, dark)
 
     # ---------------------------------------------------------------- building
@@ -94,7 +95,7 @@ class Stage:
         gui: viser.GuiApi,
         scenes: Mapping[str, str],
         choose: Callable[[SceneChoice], None],
-        by_path: bool,
+        own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
         phone: bool,
@@ -118,7 +119,7 @@ class Stage:
             SharePanel(gui, self._learner, choose)
             add_hand_in(gui, self._learner, notebook)
         with tabs.add_tab("Robot"):
-            self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, by_path)
+            self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
         with tabs.add_tab("Help"):
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # a stack may grow

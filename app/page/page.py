@@ -8,6 +8,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,10 +19,12 @@ from app.client.learner import Learner
 from app.client.progress import Notebook
 from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
+from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.fault import FaultNotice
 from app.page.inlet import Inlet
 from app.panels.widgets.command import add_command
+from lessons.own.folder import Folder
 from lessons.scenes.names import ALL_SCENES
 
 if TYPE_CHECKING:
@@ -35,6 +38,8 @@ _BROKEN = (
     "and choose another scene."
 )
 
+_NOT_ITS_FILE = "This page may not open files of the machine that himpc-lab runs on."
+
 
 class Page:
     """A thread that looks at the learner. It builds a `Stage` whenever the learner has another scene."""
@@ -44,14 +49,14 @@ class Page:
         client: viser.ClientHandle,
         learner: Learner,
         dark: bool,
-        by_path: bool,
+        own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
         on_dark: Callable[[bool], None],
         greet: Callable[[viser.GuiApi], None],
     ) -> None:
-        """by_path: whether this page may name files of the machine; loop: viser's event loop; on_dark: hears
-        which theme is shown; greet: writes at the panel's top whenever it is built."""
+        """own_files: where files may lie that this page names; None: it may name none; loop: viser's event
+        loop; on_dark: hears which theme is shown; greet: writes at the panel's top whenever it is built."""
         self.learner = learner
         self._on_dark = on_dark
         self._greet = greet
@@ -59,7 +64,7 @@ class Page:
         self._inlet = Inlet(client)
         self._fault = FaultNotice(client)
         self._dark = dark
-        self._by_path = by_path
+        self._own_files = own_files
         self._event_loop = loop
         self._notebook = notebook
         self._phone = False
@@ -145,19 +150,20 @@ class Page:
         """What is wrong with the learner's own code; says also when a saved text took over."""
         status = self.learner.status
         own = None if status is None else status.own
-        self._fault.show(None if own is None else own.fault)
+        fault = None if own is None or own.fault is None else self.learner.choice.without_places(own.fault)
+        self._fault.show(fault)
         if own is None:
             return None
         if own.saves > self._saves:
             self._client.add_notification(
                 "Saved is running",
-                f"{own.file} took over at t = {own.at:.2f} s. It is read from the disk of the machine that "
-                "runs the lab.",
+                f"{Path(own.file).name} took over at t = {own.at:.2f} s. It is read from the disk of the "
+                "machine that runs the lab.",
                 color="green",
                 auto_close_seconds=4.0,
             )
         self._saves = own.saves
-        return None if own.fault is None else Trouble("YOUR CODE", own.fault, None)
+        return None if fault is None else Trouble("YOUR CODE", fault, None)
 
     def _plots_due(self) -> bool:
         now = time.perf_counter()
@@ -183,6 +189,14 @@ class Page:
             self._again.on_click(self._restart)
         self._again.visible = trouble is not None and trouble.offer is not None
 
+    def _load(self, choice: SceneChoice) -> None:
+        """Another scene. Whatever panel asks for it: no file that this page may not name."""
+        asked = choice.asked - self.learner.choice.paths
+        if asked and (self._own_files is None or not all(map(self._own_files.holds, asked))):
+            self._client.add_notification("Not loaded", _NOT_ITS_FILE, color="red")
+            return
+        self.learner.load(choice)
+
     def _restart(self, _: object) -> None:
         self.learner.restart()
 
@@ -204,9 +218,9 @@ class Page:
                 ready,
                 ALL_SCENES,
                 self._dark,
-                self.learner.load,
+                self._load,
                 self._theme,
-                self._by_path,
+                self._own_files,
                 self._event_loop,
                 self._notebook,
                 self._phone,
@@ -252,10 +266,10 @@ class Page:
     def _pass_on(self) -> None:
         """Sentences of the session go where they belong."""
         refusals, notices = self.learner.take_messages()
-        for sentence in refusals:
+        for sentence in map(self.learner.choice.without_places, refusals):
             if self._stage is None or not self._stage.refuse(sentence):
                 self._client.add_notification("Not loaded", sentence, color="red")
-        for sentence in notices[-3:]:
+        for sentence in map(self.learner.choice.without_places, notices[-3:]):
             self._client.add_notification("Not changed", sentence, color="orange", auto_close_seconds=8.0)
 
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import ipaddress
 import re
-import secrets
 import socket
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
 
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
+from app.server.passes import QUERY, Passes, Role
+from app.server.peers import came_through_a_proxy
 from robots import InputError
 
 _HOST = re.compile(r"(?P<name>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::(?P<port>\d{1,5}))?")
+_ELSEWHERE = frozenset({"websocket", "playbackPath"})
 _ON_EVERY_ANSWER = {
     "Content-Security-Policy": "frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
@@ -41,20 +42,18 @@ class Door:
     """Attributes:
     local: whether only this machine can connect.
     trusted: origins beside our own, as a browser writes them: a reverse proxy's.
-    token: what a visitor must bring, in the URL or in the cookie; None: nothing.
+    passes: what a visitor must bring, in the URL or in the cookie.
     names: what this machine is called by others.
-    cookie: the cookie's name; cookies of one host are shared by all its ports.
     """
 
     local: bool = True
     trusted: frozenset[str] = frozenset()
-    token: str | None = field(default=None, repr=False)
+    passes: Passes = field(default_factory=Passes)
     names: frozenset[str] = frozenset()
-    cookie: str = "himpc-lab"
 
-    def judge(self, request: Request) -> Answer | None:
+    def judge(self, request: Request, who: str = "") -> Answer | None:
         """None: may come in. A request is one of ours if it names us as its host and, where a browser says
-        which page it comes from, that page is ours too."""
+        which page it comes from, that page is ours too. who: sends it, see `app.server.peers`."""
         headers = request.headers
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
@@ -68,7 +67,16 @@ class Door:
             return _foreign("It comes from a page of another site.")
         if not is_upgrade(request) and _is_embedded(headers):
             return _foreign("A page of another site asks for it.")
-        return self._ask_token(request, hosts[0])
+        if _leads_away(request):
+            return _foreign("Its address would connect the page to another server.")
+        return self._ask_token(request, hosts[0], who)
+
+    def is_owner(self, request: Request, who: str = "") -> bool:
+        """Whether an upgrade that may come in was sent by who started the server."""
+        passes = self.passes
+        return "owner" in (passes.in_address(request.path), passes.in_cookies(request.headers, who)) and not (
+            came_through_a_proxy(request.headers)
+        )
 
     def _is_ours(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
@@ -89,60 +97,42 @@ class Door:
 
     # ---------------------------------------------------------------- token
 
-    def _ask_token(self, request: Request, host: str) -> Answer | None:
-        if self.token is None:
+    def _ask_token(self, request: Request, host: str, who: str) -> Answer | None:
+        role = self.passes.in_address(request.path)
+        if role is not None:
+            return None if is_upgrade(request) else self._keep(request, host, role, who)
+        if self.passes.token is None or self.passes.in_cookies(request.headers, who) is not None:
             return None
-        given = parse_qs(urlsplit(request.path).query).get("token", [])
-        if any(map(self._is_right, given)):
-            return None if is_upgrade(request) else self._keep(request, host)
-        if any(map(self._is_right, self._cookies(request.headers))):
-            return None
-        return Answer(HTTPStatus.FORBIDDEN, "A token is needed", _WRONG if given else _NEEDED, _NOT_KEPT)
+        text = _WRONG if QUERY in _query(request) else _NEEDED
+        return Answer(HTTPStatus.FORBIDDEN, "A token is needed", text, _NOT_KEPT)
 
-    def _is_right(self, given: str) -> bool:
-        return self.token is not None and secrets.compare_digest(
-            given.encode(errors="replace"), self.token.encode()
-        )
-
-    def _cookies(self, headers: Headers) -> Iterable[str]:
-        # By hand: the library gives up the whole line where another server's cookie of this host is odd.
-        for part in ";".join(headers.get_all("Cookie")).split(";"):
-            name, _, value = part.strip().partition("=")
-            if name == self.cookie:
-                yield value
-
-    def _keep(self, request: Request, host: str) -> Answer:
-        """The token goes into the cookie, and out of the address."""
+    def _keep(self, request: Request, host: str, role: Role, who: str) -> Answer:
+        """The secret goes out of the address, and what proves it into the cookie."""
         secure = "; Secure" if f"https://{host.lower()}" in self.trusted else ""
-        kept = (
-            ("Set-Cookie", f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/{secure}"),
-            *_NOT_KEPT,
-        )
+        cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict; Path=/{secure}"
+        kept = (("Set-Cookie", cookie), *_NOT_KEPT)
+        rest = urlencode({name: values for name, values in _query(request).items() if name != QUERY}, True)
+        page = f"./?{rest}" if rest else "./"
         if request.headers.get("Referer") or request.headers.get("Sec-Fetch-Site") == "cross-site":
             # The browser would leave a strict cookie out of a redirect that a link elsewhere began.
-            return Answer(HTTPStatus.OK, "himpc-lab", "Opening …", (*kept, ("Refresh", "0; url=/")))
-        return Answer(HTTPStatus.SEE_OTHER, "himpc-lab", "Opening …", (*kept, ("Location", "/")))
+            return Answer(HTTPStatus.OK, "himpc-lab", "Opening …", (*kept, ("Refresh", f"0; url={page}")))
+        return Answer(HTTPStatus.SEE_OTHER, "himpc-lab", "Opening …", (*kept, ("Location", page)))
 
 
 _NOT_KEPT = (("Cache-Control", "no-store"),)
 _FIELD = (
-    '<form action="/" method="get"><input name="token" size="30" autocomplete="off" autofocus> '
+    f'<form action="./" method="get"><input name="{QUERY}" size="30" autocomplete="off" autofocus> '
     "<button>Open the page</button></form>"
 )
 _NEEDED = (
     "<p>Open the whole address that himpc-lab printed where it was started; it ends in "
-    f"<code>?token=…</code>. Or give the token here:</p>{_FIELD}"
-    '<p>Have you been here before? <a href="/">Open the page</a>.</p>'
+    f"<code>?{QUERY}=…</code>. Or give the token here:</p>{_FIELD}"
+    '<p>Have you been here before? <a href="./">Open the page</a>.</p>'
 )
 _WRONG = (
     "<p>This is not the token of the himpc-lab that runs now; each start has a new one. It is printed where "
     f"himpc-lab was started:</p>{_FIELD}"
 )
-
-
-def new_token() -> str:
-    """128 bits, as text that fits into an address."""
-    return secrets.token_urlsafe(16)
 
 
 def names_of_this_machine() -> frozenset[str]:
@@ -180,6 +170,16 @@ def secured(headers: Headers) -> None:
     for name, value in _ON_EVERY_ANSWER.items():
         if name not in headers:
             headers[name] = value
+
+
+def _query(request: Request) -> dict[str, list[str]]:
+    return parse_qs(urlsplit(request.path).query, keep_blank_values=True)
+
+
+def _leads_away(request: Request) -> bool:
+    """viser's page takes from its address which server it speaks with, or whose recording it plays: what
+    they say, scripts included, would run as a part of our page."""
+    return not _ELSEWHERE.isdisjoint(_query(request))
 
 
 def _is_embedded(headers: Headers) -> bool:

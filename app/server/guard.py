@@ -20,6 +20,7 @@ from app.server import budget
 from app.server.budget import Budget
 from app.server.crowd import Crowd
 from app.server.door import Answer, Door, is_upgrade, secured
+from app.server.peers import ends_of
 from app.server.uploads import TRANSFER, Uploads
 
 HANDSHAKE = 5.0
@@ -63,6 +64,7 @@ class Guard:
                 return _response(answer)
             if is_upgrade(request):
                 if isinstance(connection, GuardedConnection):
+                    connection.is_owners = self._is_owners(connection, request)
                     connection.expect_word(FIRST_WORD)
                 return None
             return files(connection, request)
@@ -84,12 +86,17 @@ class Guard:
     def _judge(self, connection: ServerConnection, request: Request) -> Answer | None:
         if not self._open:
             return Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting", "<p>Try again in a moment.</p>")
-        answer = self._door.judge(request)
+        answer = self._door.judge(request, _user(connection))
         if answer is None and not self.crowd.comes_from(connection, self.address(connection, request)):
             return Answer(
                 HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some of them and try again.</p>"
             )
         return answer
+
+    def _is_owners(self, connection: ServerConnection, request: Request) -> bool:
+        """Whether who started the server opens this page, on the machine where it runs."""
+        ends = ends_of(connection.transport)
+        return ends is not None and ends.near and self._door.is_owner(request, ends.user)
 
     def address(self, connection: ServerConnection, request: Request | None) -> str | None:
         """Who connects. None if a proxy on this machine does not say for whom."""
@@ -102,11 +109,13 @@ class Guard:
 
 
 class GuardedConnection(ServerConnection):
-    """Counts before it decodes. `uploads` are those of the page it serves."""
+    """Counts before it decodes. `uploads` are those of the page it serves; `is_owners` says whether who
+    started the server opened it."""
 
     def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
         super().__init__(*of, **more)
         self.uploads: Uploads | None = None
+        self.is_owners = False
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0
@@ -174,6 +183,11 @@ class GuardedConnection(ServerConnection):
     async def _end(self, code: CloseCode, reason: str) -> NoReturn:
         await self.close(code, reason)
         raise ConnectionClosedError(None, None)  # what viser takes for an end
+
+
+def _user(connection: ServerConnection) -> str:
+    ends = ends_of(connection.transport)
+    return "" if ends is None else ends.user
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:

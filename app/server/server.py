@@ -10,10 +10,8 @@ import socket
 import sys
 import threading
 import warnings
-import webbrowser
 from collections.abc import Iterator, Sequence
 from importlib import import_module
-from urllib.parse import urlsplit
 
 import viser
 
@@ -21,10 +19,14 @@ from app.adapter import private
 from app.link.choice import SceneChoice
 from app.server.arenas import few_arenas
 from app.server.classroom import Classroom
-from app.server.door import Door, as_origin, names_of_this_machine, new_token
+from app.server.door import Door, as_origin, names_of_this_machine
+from app.server.greeting import greeting
 from app.server.guard import Guard
+from app.server.opening import opened_in_a_browser
+from app.server.passes import Passes, new_token
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
+from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -43,13 +45,15 @@ def serve(
     open_browser: bool = True,
     trusted_origins: Sequence[str] = (),
     ask_token: bool = True,
+    own_files: Folder | None = None,
     key: bytes | None = None,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
 
     With `classroom` all pages show one session; who types the printed token into the page steers it.
-    Where others than this machine's users can come, the page asks for a token unless `ask_token` is False.
+    The page asks for a token unless `ask_token` is False. Files below `own_files` are opened by path, and
+    run, from the page whose address carries the owner's secret; with None from no page.
     `key` signs what learners hand in.
     """
     server = PageServer(
@@ -60,17 +64,16 @@ def serve(
         classroom=classroom,
         trusted_origins=trusted_origins,
         ask_token=ask_token,
+        own_files=own_files,
         key=key,
     )
     stop = threading.Event()
     try:
-        with _ended_by_signals(stop):
-            link = server.with_token(server.url)
-            print(f"himpc-lab ready at {link}", flush=True)
-            for line in _more(server, host, trusted_origins):
+        with _ended_by_signals(stop), contextlib.ExitStack() as until_the_end:
+            for line in greeting(server, host, tuple(map(as_origin, trusted_origins))):
                 print(line, flush=True)
             if open_browser:
-                threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()
+                until_the_end.enter_context(opened_in_a_browser(server.link))
             while not stop.wait(0.5):
                 pass
     finally:
@@ -80,22 +83,6 @@ def serve(
         sys.stdout.flush()
         os._exit(0)
     return 0
-
-
-def _more(server: PageServer, host: str, trusted_origins: Sequence[str]) -> Iterator[str]:
-    """What else its user should know."""
-    if host in ("0.0.0.0", "::"):
-        here = f"http://{socket.gethostname()}:{urlsplit(server.url).port}"
-        yield f"from other machines: {server.with_token(here)}"
-    for origin in trusted_origins:
-        yield f"through the proxy: {server.with_token(as_origin(origin))}"
-    if server.public and server.token is None:
-        yield (
-            "--no-token: everybody who reaches this address can open the page, run simulations on this "
-            "machine and upload robots."
-        )
-    if isinstance(server.sessions, Classroom):
-        yield f"instructor's token: {server.sessions.token}"
 
 
 @contextlib.contextmanager
@@ -126,8 +113,10 @@ class PageServer:
         classroom: bool = False,
         trusted_origins: Sequence[str] = (),
         ask_token: bool = True,
+        own_files: Folder | None = None,
         key: bytes | None = None,
     ) -> None:
+        """As of `serve`; grace: s that a session outlives its tab."""
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         trusted = frozenset(map(as_origin, trusted_origins))
@@ -139,10 +128,9 @@ class PageServer:
         local = host in _LOOPBACK
         self.public = not local or bool(trusted)
         """Whether others than this machine's users can come to the page."""
-        self.token = new_token() if self.public and ask_token else None
         self.guard = Guard(Door())
         self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
-        self._key = key
+        self._own_files, self._key = own_files, key
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()
         try:
@@ -159,8 +147,12 @@ class PageServer:
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
-        door = Door(local, trusted, self.token, names_of_this_machine(), f"himpc-lab-{found}")
-        self.guard.open(door)
+        self.passes = Passes(
+            new_token() if ask_token else None,
+            None if own_files is None else new_token(),
+            f"himpc-lab-{found}",
+        )
+        self.guard.open(Door(local, trusted, self.passes, names_of_this_machine()))
         self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
         self._loading.start()
 
@@ -169,14 +161,20 @@ class PageServer:
         """Whether what pages are built with is still being loaded."""
         return self._loading.is_alive()
 
-    def with_token(self, address: str) -> str:
-        """An address of this page as it is handed on."""
-        return address if self.token is None else f"{address}/?token={self.token}"
+    @property
+    def link(self) -> str:
+        """The address for who started the server: with the owner's secret, or else as `guest_link`."""
+        return self.passes.link(self.url, "owner")
+
+    @property
+    def guest_link(self) -> str:
+        """The address for everybody else: with the token, if one is needed."""
+        return self.passes.link(self.url, "guest")
 
     # ---------------------------------------------------------------- clients, on viser's loop
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        visit = Visit(self._viser, client, self.sessions, by_path=not self.public, key=self._key)
+        visit = Visit(self._viser, client, self.sessions, self._own_files, self._key)
         with self._lock:
             self._visits[client.client_id] = visit
         await visit.arrive()

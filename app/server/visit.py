@@ -21,6 +21,7 @@ from app.server.guard import GuardedConnection
 from app.server.sessions import Sessions
 from app.server.uploads import Uploads
 from app.server.workers import Workers, told
+from lessons.own.folder import Folder
 from lessons.replay.progress import Progress
 from lessons.replay.progress import found as found_progress
 
@@ -41,14 +42,14 @@ class Visit:
         server: viser.ViserServer,
         client: viser.ClientHandle,
         sessions: Sessions | Classroom,
-        by_path: bool,
+        own_files: Folder | None,
         key: bytes | None = None,
     ) -> None:
-        """by_path: whether this page may name files of the machine; key: signs what learners did."""
+        """own_files: where files may lie that the owner's page names; key: signs what learners did."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._by_path, self._key = by_path, key
+        self._own_files, self._key = own_files, key
         self._page: Page | None = None
         self._left = False
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
@@ -59,6 +60,8 @@ class Visit:
         private.give_workers(client, self._workers)
         private.keep_short(server, client)
         connection = private.connection_of(server, client)
+        if not (isinstance(connection, GuardedConnection) and connection.is_owners):
+            self._own_files = None
         if isinstance(connection, GuardedConnection):
             connection.uploads = Uploads(
                 partial(private.unfinished_uploads, client),
@@ -118,7 +121,7 @@ class Visit:
             self._client,
             learner,
             self._dark,
-            self._by_path,
+            None if isinstance(learner, Watcher) else self._own_files,
             self._server.get_event_loop(),
             self._notebook,
             on_dark=self._remember_dark,

@@ -73,6 +73,11 @@ def fingerprint(path: str) -> str:
     return f"{Path(path).name}@{read(path).digest[:12]}"
 
 
+def by_name(words: Iterable[str]) -> list[str]:
+    """Words to choose from, of files the name alone: who sends a code is not told where they lie."""
+    return [Path(word).name if is_file(word) else word for word in words]
+
+
 def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
     """The file among several that a fingerprint is of; kind: what it is, and the option that names it. Raises
     InputError if it is none of them."""
@@ -83,8 +88,8 @@ def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
             return each
     if alike:
         raise InputError(
-            f"{alike[0]} is not the {name} that this was made with: its content is another "
-            f"({fingerprint(alike[0])}, not {shortened(mark, 100)})"
+            f"{Path(alike[0]).name} is not the {shortened(name, 60)} that this was made with: its content is "
+            f"another ({fingerprint(alike[0])}, not {shortened(mark, 100)})"
         )
     raise InputError(
         f"this was made with a {kind} of somebody's own, {shortened(mark, 100)}: get that file and add "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -30,13 +31,15 @@ def hold_of(name: str) -> TorqueScene:
     return replace(_hold(robot, plant), name=f"{name}-hold", sources={})
 
 
-def hold(urdf: str | None, tip: str | None, urdf_text: str | None = None) -> TorqueScene:
-    """The hold scene of any robot: a URDF path, a catalog name or a URDF's text.
+def hold(
+    urdf: str | None, tip: str | None, urdf_text: str | None = None, within: Path | None = None
+) -> TorqueScene:
+    """The hold scene of any robot: a URDF path, a catalog name or a URDF's text; within: as of `load_robot`.
 
     Raises:
         InputError: the URDF cannot be used, or the tip is no frame of it.
     """
-    robot = load_urdf_text(urdf_text, tip) if urdf_text is not None else load_robot(str(urdf), tip)
+    robot = load_urdf_text(urdf_text, tip) if urdf_text is not None else load_robot(str(urdf), tip, within)
     plant = PLANAR3_PLANT if robot.name == "planar3" else PlantSettings()
     return _hold(robot, plant)
 

@@ -11,7 +11,7 @@ from typing import Any
 from himpc.stack import DAMPING_LEVEL, Level, Stack, check_names, essence
 from himpc.tasks import KINDS, Task
 from himpc.tasks.kinds import OWN, word_of
-from lessons.own.files import is_file, with_fingerprint
+from lessons.own.files import by_name, is_file, with_fingerprint
 from lessons.settings.values import form_of
 from robots import InputError
 from robots.errors import shortened, unknown_name
@@ -110,7 +110,7 @@ def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
         return [replace(template, name=name, **changes)]
     if word not in KINDS:
         classes = (type(task).__name__ for task in own.values())
-        raise unknown_name("kind of task", shortened(str(word)), (*KINDS, *own, *classes))
+        raise unknown_name("kind of task", shortened(str(word)), (*KINDS, *by_name(own), *classes))
     kind = KINDS[word]
     name = name_of(given.pop("name", None), _free(word, kind.suffixes, taken))
     made = []

@@ -17,7 +17,7 @@ from himpc.references import Reference
 from himpc.stack import Level, Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
-from lessons.own.files import is_file, with_fingerprint
+from lessons.own.files import by_name, is_file, with_fingerprint
 from lessons.settings.entry import Entry
 from lessons.settings.levels import moved, ordered
 from lessons.settings.settings import (
@@ -103,7 +103,7 @@ class TorqueSettings(Settings):
     def for_controller(self) -> ControllerSettings:
         """The controller's part. Raises InputError for values that cannot be."""
         if self.controller not in self.controllers:
-            raise unknown_name("controller", self.controller, self.controllers)
+            raise unknown_name("controller", self.controller, by_name(self.controllers))
         check_fields(self)
         return ControllerSettings(
             stack=self.levels,

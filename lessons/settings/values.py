@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 from numpy.typing import NDArray
 
+from lessons.own.files import by_name
 from robots import InputError
 from robots.errors import unknown_name
 from robots.ranges import ANY, Range, alternatives, plain
@@ -73,7 +74,7 @@ class Form:
                 found: Any = bool(value) if fits else None
             case "word":
                 if isinstance(value, str) and self.words and value not in self.words:
-                    raise unknown_name(path, value, self.words)
+                    raise unknown_name(path, value, by_name(self.words))
                 fits, found = isinstance(value, str), value
             case _:
                 fits = _is_number(value) and self.range.holds(float(value))

@@ -36,12 +36,13 @@ class Canonical:
 
 
 def canonicalise(
-    data: bytes, source: str, folder: Path | None = None
+    data: bytes, source: str, folder: Path | None = None, within: Path | None = None
 ) -> tuple[Canonical | None, ImportReport]:
     """The canonical form of a URDF document, None when it cannot be used, and the report of the import.
 
     source: how messages name it; folder: where relative and `package://` mesh paths start from, None for a
-    description that may see installed packages only.
+    description that may see installed packages only; within: outside of which no mesh beside the installed
+    ones is looked at, None for no such limit.
     """
     try:
         root = parse(data, source)
@@ -59,7 +60,7 @@ def canonicalise(
         findings.extend(each(root))
         if any(finding.kind == "refused" for finding in findings):
             return None, _report(source, findings)
-    findings.extend(localise(root, folder))
+    findings.extend(localise(root, folder, within))
     try:
         model = _model(root)
         findings.extend(fill_efforts(root, model))

@@ -45,7 +45,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
     monkeypatch.setattr(Stage, "_write", slow)
     server = PageServer(SceneChoice.of_lesson(Exercise("one-task")), port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             pages.append(page)
             assert eventually(lambda: page.shows(load_lesson("one-task").steps[0].title))
             learner = server.sessions.learners[0]
@@ -71,7 +71,7 @@ def answers(page: Wire) -> list[str]:
 def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.find("Playback") is not None)
             before = page.find("Playback")
             assert before is not None
@@ -102,7 +102,7 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
     monkeypatch.setattr(owner, name, fails)
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.shows("no &lt;place&gt; for it"))
             again = page.find("Start again")
             assert again is not None and page.find("Playback") is None

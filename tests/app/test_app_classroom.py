@@ -16,7 +16,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Play
 from app.panels.run.classroom import Guesses
 from app.server.classroom import STEERING, Classroom, Watcher
-from app.server.door import new_token
+from app.server.passes import new_token
 from lessons.scenes.run_spec import RunSpec
 
 ROOT = Path(__file__).parents[2] / "app"

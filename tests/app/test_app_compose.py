@@ -62,7 +62,7 @@ def press(wire: Wire, label: str) -> None:
 
 def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServer) -> None:
     """The panel follows every change; the stack's code is the same stack elsewhere; the robot goes on."""
-    with Wire(server.url) as wire:
+    with Wire(server.link) as wire:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
         learner = server.sessions.learners[0]
 
@@ -107,7 +107,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
 def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) -> None:
     """Each joint has one, in degrees and within its limits; those moved at once build on each other, and a
     reset puts them back."""
-    with Wire(server.url) as wire:
+    with Wire(server.link) as wire:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
         learner = server.sessions.learners[0]
 
@@ -138,7 +138,7 @@ def test_where_a_posture_wants_what_slides_is_set_in_metres() -> None:
     run = RunSpec("ridgeback-ur10-hold", set=('stack.add={"task": "posture"}',))
     server = PageServer(SceneChoice(run), port=0, max_sessions=1, grace=2.0)
     try:
-        with Wire(server.url) as wire:
+        with Wire(server.link) as wire:
             slider = shown(wire, "base_x, m")
             assert [wire.controls[slider]["props"][end] for end in ("min", "max")] == [-2.0, 2.0]
             learner = server.sessions.learners[0]
@@ -173,7 +173,7 @@ def test_a_control_may_be_written_after_its_panel_was_rebuilt(
             show(panel)
 
     monkeypatch.setattr(AddTask, "_show", slowly)
-    with Wire(server.url) as wire:
+    with Wire(server.link) as wire:
         choose(wire, "Kind", "com")
         assert begun.wait(LONG)
         press(wire, "Add")

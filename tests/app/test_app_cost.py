@@ -46,7 +46,7 @@ def hear_until(viewer: Viewer, page: Connection, condition: Callable[[], bool]) 
 
 
 def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
-    viewer = Viewer(alone.url, tab="Joints")
+    viewer = Viewer(alone.link, tab="Joints")
     with viewer.connect() as page:
         hear_until(viewer, page, lambda: TORQUE in viewer.drawn and bool(viewer.second.links))
         for tab, seen, unseen in (("Errors", STEP, TORQUE), ("Joints", TORQUE, STEP)):
@@ -59,7 +59,7 @@ def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
 
 
 def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
-    viewer = Viewer(alone.url)
+    viewer = Viewer(alone.link)
     with viewer.connect() as page:
         hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
         viewer.show(None)
@@ -74,7 +74,7 @@ def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
 
 
 def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
-    viewer = Viewer(alone.url)
+    viewer = Viewer(alone.link)
     with viewer.connect(slow=True) as page:
         hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
         (client,) = alone._viser.get_clients().values()

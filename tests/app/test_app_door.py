@@ -8,23 +8,31 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from app.server.door import Answer, Door, as_origin, new_token
+from app.server.door import Answer, Door, as_origin
+from app.server.passes import QUERY, Passes, new_token
 from robots import InputError
 
 OURS = "127.0.0.1:8080"
 TOKEN = new_token()
 LOCAL = Door()
-TOKENED = Door(local=False, token=TOKEN, names=frozenset({"lab", "lab.local"}), cookie="himpc-lab-8080")
+OWNER = new_token()
+PASSES = Passes(TOKEN, OWNER, cookie="himpc-lab-8080")
+TOKENED = Door(local=False, passes=PASSES, names=frozenset({"lab", "lab.local"}))
+COOKIE = PASSES.keep("guest", "")
 PROXIED = Door(trusted=frozenset({"https://lab.example.org"}))
 
 
-def judged(door: Door, path: str = "/", **headers: str | list[str]) -> Answer | None:
+def asked(path: str = "/", **headers: str | list[str]) -> Request:
     """Keywords are headers, with _ for -."""
     given = Headers()
     for name, values in {"Host": OURS, **headers}.items():
         for value in values if isinstance(values, list) else [values]:
             given[name.replace("_", "-")] = value
-    return door.judge(Request(path, given))
+    return Request(path, given)
+
+
+def judged(door: Door, path: str = "/", **headers: str | list[str]) -> Answer | None:
+    return door.judge(asked(path, **headers))
 
 
 @pytest.mark.parametrize("upgrade", [{}, {"Upgrade": "websocket"}])
@@ -78,16 +86,31 @@ def test_links_from_elsewhere_work_and_parts_of_other_pages_do_not() -> None:
     ("path", "cookie"),
     [
         ("/", ""),
-        ("/?token=", ""),
-        ("/?token=%ED%A0%80", ""),
-        (f"/?token={TOKEN[:-1]}", ""),
-        ("/", f"himpc-lab-8080={TOKEN}x"),
-        ("/", f"himpc-lab-9090={TOKEN}"),  # of another himpc-lab
+        (f"/?{QUERY}=", ""),
+        (f"/?{QUERY}=%ED%A0%80", ""),
+        (f"/?{QUERY}={TOKEN[:-1]}", ""),
+        (f"/?token={TOKEN}", ""),
+        ("/", f"{COOKIE}x"),
+        ("/", COOKIE.replace("8080", "9090")),  # of another himpc-lab
+        ("/", f"himpc-lab-8080={TOKEN}"),
+        ("/", PASSES.keep("guest", "1000")),
         ("/", "himpc-lab-8080=\xe4"),
         ("/", "=;=;,;"),
     ],
     # The token is another one in each process, and tests go by their names.
-    ids=["none", "empty", "no text", "too short", "too long", "of another lab", "foreign letters", "rubbish"],
+    ids=[
+        "none",
+        "empty",
+        "no text",
+        "too short",
+        "by Jupyter's name",
+        "too long",
+        "of another lab",
+        "the token itself",
+        "of another user",
+        "foreign letters",
+        "rubbish",
+    ],
 )
 def test_without_the_token_nothing(path: str, cookie: str, upgrade: dict[str, str]) -> None:
     answer = judged(TOKENED, path, Cookie=cookie, **upgrade)
@@ -95,11 +118,13 @@ def test_without_the_token_nothing(path: str, cookie: str, upgrade: dict[str, st
     assert "token" in answer.title and TOKEN not in answer.text
 
 
-def test_the_token_moves_from_the_address_into_a_cookie() -> None:
-    answer = judged(TOKENED, f"/?token={TOKEN}")
+@pytest.mark.parametrize("secret", [TOKEN, OWNER], ids=["token", "owner's secret"])
+def test_the_token_moves_from_the_address_into_a_cookie(secret: str) -> None:
+    answer = judged(TOKENED, f"/?fixedDpr=1&{QUERY}={secret}")
     assert answer is not None and answer.status is HTTPStatus.SEE_OTHER
     headers = dict(answer.headers)
-    assert headers["Location"] == "/" and headers["Cache-Control"] == "no-store"
+    assert headers["Location"] == "./?fixedDpr=1" and headers["Cache-Control"] == "no-store"
+    assert secret not in str(answer)
     cookie, *attributes = headers["Set-Cookie"].split("; ")
     assert {"HttpOnly", "SameSite=Strict", "Path=/"} == set(attributes)
     assert judged(TOKENED, Cookie=f'odd={{"a": [1, "é"]}}; {cookie}') is None
@@ -107,9 +132,31 @@ def test_the_token_moves_from_the_address_into_a_cookie() -> None:
     assert judged(TOKENED, Cookie=cookie, **own) is None
     assert judged(TOKENED, Cookie=cookie, **{**own, "Origin": "https://evil.example"}) is not None
     # A page of ours that a link elsewhere led to goes on by itself: only so the browser sends the cookie.
-    answer = judged(TOKENED, f"/?token={TOKEN}", Referer="https://mail.example/")
+    answer = judged(TOKENED, f"/?{QUERY}={secret}", Referer="https://mail.example/")
     assert answer is not None and answer.status is HTTPStatus.OK
-    assert dict(answer.headers)["Refresh"] == "0; url=/"
+    assert dict(answer.headers)["Refresh"] == "0; url=./"
+
+
+def test_the_owner_is_who_brings_the_owners_secret_and_through_no_proxy() -> None:
+    upgrade = {"Upgrade": "websocket"}
+    mine, theirs = PASSES.keep("owner", "1000"), PASSES.keep("guest", "1000")
+    assert TOKENED.is_owner(asked(f"/?{QUERY}={OWNER}", **upgrade))
+    assert TOKENED.is_owner(asked(Cookie=mine, **upgrade), "1000")
+    assert not TOKENED.is_owner(asked(Cookie=mine, **upgrade), "1001")
+    assert not TOKENED.is_owner(asked(f"/?{QUERY}={TOKEN}", Cookie=theirs, **upgrade), "1000")
+    assert not TOKENED.is_owner(asked(**upgrade)) and not Door().is_owner(asked(**upgrade))
+    assert not Door().is_owner(asked(f"/?{QUERY}=", Cookie="himpc-lab=", **upgrade))
+    for name in ("X_Forwarded_For", "x_forwarded_proto", "Forwarded", "Via", "X_Real_IP"):
+        assert judged(TOKENED, f"/?{QUERY}={OWNER}", **upgrade, **{name: ""}) is None
+        assert not TOKENED.is_owner(asked(f"/?{QUERY}={OWNER}", **upgrade, **{name: ""}))
+
+
+@pytest.mark.parametrize("name", ["websocket", "playbackPath", "web%73ocket"])
+def test_an_address_that_leads_the_page_to_another_server_is_refused(name: str) -> None:
+    """viser's page would run what that one says, as a part of ours, whose cookie opens our sockets."""
+    for door in (LOCAL, TOKENED):
+        answer = judged(door, f"/?fixedDpr=1&{name}=ws://127.0.0.1:9999", Cookie=COOKIE)
+        assert answer is not None and "another server" in answer.text
 
 
 def test_beyond_this_machine_addresses_and_our_own_names_are_ours() -> None:
@@ -118,7 +165,7 @@ def test_beyond_this_machine_addresses_and_our_own_names_are_ours() -> None:
         refused = judged(door, Host="evil.example:8080", Origin="http://evil.example:8080")
         assert refused is not None and "--trusted-origin" in refused.text
         for host in ("192.168.0.7:8080", "lab:8080", "lab.local:8080", "[fe80::1]:8080"):
-            answer = judged(door, Host=host, Cookie=f"himpc-lab-8080={TOKEN}")
+            answer = judged(door, Host=host, Cookie=COOKIE)
             assert answer is None
 
 
@@ -131,8 +178,8 @@ def test_a_trusted_proxy() -> None:
     assert judged(PROXIED, Host="lab.example.org", Origin="https://evil.example") is not None
     assert judged(PROXIED, Host="lab.example.org", Origin="https://lab.example.org.evil.example") is not None
     assert judged(PROXIED, Host="evil.example", **origin) is not None
-    secure = Door(trusted=PROXIED.trusted, token=TOKEN)
-    answer = judged(secure, f"/?token={TOKEN}", Host="lab.example.org")
+    secure = Door(trusted=PROXIED.trusted, passes=PASSES)
+    answer = judged(secure, f"/?{QUERY}={TOKEN}", Host="lab.example.org")
     assert answer is not None and "; Secure" in dict(answer.headers)["Set-Cookie"]
 
 

@@ -11,6 +11,7 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.own.folder import Folder
 from lessons.own.new import text_of
 from lessons.replay.progress import read_handed_in
 from lessons.replay.state import State, decode, encode
@@ -25,8 +26,14 @@ LONG = 120.0
 
 
 @pytest.fixture
-def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, key=KEY)
+def server(tmp_path: Path) -> Iterator[PageServer]:
+    running = PageServer(
+        SceneChoice(RunSpec("planar3-hold")),
+        port=0,
+        max_sessions=1,
+        own_files=Folder.at(str(tmp_path)),
+        key=KEY,
+    )
     yield running
     running.close()
 
@@ -53,7 +60,7 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
     law.write_text("def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n")
     task.write_text(text_of("task", None, "task.py"))
     wrong.write_text("def torque(now)\n    return 0\n")
-    with Wire(server.url) as wire:
+    with Wire(server.link) as wire:
         assert eventually(lambda: wire.shows("never uploaded"), LONG)
         learner = server.sessions.learners[0]
         open_file(wire, wrong)
@@ -100,24 +107,8 @@ def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:
         here.with_file(str(tmp_path / "no.py"))
 
 
-def test_a_page_that_others_reach_opens_no_files(tmp_path: Path) -> None:
-    server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")),
-        port=0,
-        max_sessions=1,
-        trusted_origins=("https://lab.example.org",),
-        ask_token=False,
-    )
-    try:
-        with Wire(server.url) as wire:
-            assert eventually(lambda: wire.find("Upload a URDF") is not None, LONG)
-            assert wire.find("Python file") is None
-    finally:
-        server.close()
-
-
 def test_what_was_done_is_handed_in_with_the_labs_signature(server: PageServer) -> None:
-    with Wire(server.url) as wire:
+    with Wire(server.link) as wire:
         assert eventually(lambda: wire.find("Your name") is not None, LONG)
         wire.write(str(wire.find("Your name")), value="Zoë")
         press(wire, "Write the text")
@@ -135,7 +126,7 @@ def test_a_code_that_does_not_fit_is_answered_though_nobody_looks_at_the_robot_t
     server: PageServer,
 ) -> None:
     code = encode(State(RunSpec("planar3-hold", set=("horizn=3",))))
-    with Wire(server.url) as wire:
+    with Wire(server.link) as wire:
         assert eventually(lambda: wire.find("Somebody's code") is not None, LONG)
         wire.write(str(wire.find("Somebody's code")), value=code)
         press(wire, "Open it")

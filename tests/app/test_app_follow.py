@@ -69,7 +69,7 @@ def test_what_is_looked_at_can_be_moved_between_two_drives() -> None:
 def test_the_page_of_a_mobile_robot_goes_along_once_it_is_asked() -> None:
     server = PageServer(SceneChoice(RunSpec("ridgeback-ur10-drag")), port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.find("Camera follows the base") is not None and page.eye != ())
             learner = server.sessions.learners[0]
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import gc
 import http.client
+import os
 import socket
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -27,8 +30,10 @@ from app.server.budget import Bucket, Budget
 from app.server.crowd import Crowd
 from app.server.door import Door
 from app.server.guard import FIRST_WORD, Guard, GuardedConnection
+from app.server.passes import QUERY
 from app.server.server import PageServer
-from browsing.wire import camera, pack
+from browsing.wire import camera, let_in, pack
+from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -58,7 +63,7 @@ def tokened() -> Iterator[PageServer]:
 
 
 def dial(server: PageServer, **more: Any) -> ClientConnection:
-    return connect(server.url.replace("http", "ws"), subprotocols=PROTOCOL, max_size=None, **more)
+    return connect(server.link.replace("http", "ws", 1), subprotocols=PROTOCOL, max_size=None, **more)
 
 
 def get(server: PageServer, path: str = "/", **headers: str) -> http.client.HTTPResponse:
@@ -67,6 +72,11 @@ def get(server: PageServer, path: str = "/", **headers: str) -> http.client.HTTP
     connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=30)
     connection.request("GET", path, headers={name.replace("_", "-"): text for name, text in headers.items()})
     return connection.getresponse()
+
+
+def path_of(server: PageServer) -> str:
+    """With the token."""
+    return f"/?{urlsplit(server.link).query}"
 
 
 def closed_with(page: Connection) -> int | None:
@@ -94,7 +104,7 @@ def test_who_is_not_admitted_reaches_nothing(plain: PageServer, headers: dict[st
     host = headers.get("Host", urlsplit(plain.url).netloc)
     with socket.create_connection((urlsplit(plain.url).hostname, urlsplit(plain.url).port)) as stranger:
         lines = [
-            "GET / HTTP/1.1",
+            f"GET {path_of(plain)} HTTP/1.1",
             f"Host: {host}",
             f"Origin: {headers['Origin']}",
             "Upgrade: websocket",
@@ -107,12 +117,17 @@ def test_who_is_not_admitted_reaches_nothing(plain: PageServer, headers: dict[st
         stranger.sendall("\r\n".join([*lines, "", ""]).encode() + b"\x82\x80\x00\x00\x00\x00")
         answer = stranger.recv(100)
         assert answer.startswith(b"HTTP/1.1 403 ")
-    assert get(plain, **headers).status == 403
+    assert get(plain, path_of(plain), **headers).status == 403
     assert plain.sessions.learners == learners and plain.guard.taken == taken
 
 
 def test_every_answer_forbids_frames_and_guesses(plain: PageServer) -> None:
-    for answer in (get(plain), get(plain, "/nowhere"), get(plain, Origin="null")):
+    for answer in (
+        get(plain),
+        get(plain, Cookie=let_in(plain.link)),
+        get(plain, "/nowhere", Cookie=let_in(plain.link)),
+        get(plain, path_of(plain), Origin="null"),
+    ):
         assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
         assert "Server" not in answer.headers
@@ -140,24 +155,96 @@ def test_a_place_is_kept_for_who_reloads(plain: PageServer) -> None:
     plain.sessions.leave(mine[0])
 
 
-def test_the_token_opens_page_and_socket(tokened: PageServer) -> None:
-    assert tokened.token is not None and tokened.token in tokened.with_token(tokened.url)
-    refused = get(tokened)
+@pytest.mark.parametrize("kind", ["plain", "tokened"])
+def test_without_the_token_nothing_opens(kind: str, request: pytest.FixtureRequest) -> None:
+    """On this machine, too: it has other users. With it page and socket open, from address or cookie."""
+    server: PageServer = request.getfixturevalue(kind)
+    learners, taken = server.sessions.learners, server.guard.taken
+    refused = get(server)
     assert refused.status == 403
-    assert b"?token=" in refused.read()
+    assert f"?{QUERY}=".encode() in refused.read()
     with pytest.raises(InvalidStatus) as error:
-        dial(tokened)
+        connect(server.url.replace("http", "ws"), subprotocols=PROTOCOL)
     assert error.value.response.status_code == 403
-    answer = get(tokened, f"/?token={tokened.token}")
-    assert (answer.status, answer.headers["Location"]) == (303, "/")
+    assert server.sessions.learners == learners and server.guard.taken == taken
+    answer = get(server, path_of(server))
+    assert (answer.status, answer.headers["Location"]) == (303, "./")
     cookie = answer.headers["Set-Cookie"].partition(";")[0]
-    assert get(tokened, Cookie=cookie).status == 200
-    with dial(tokened, additional_headers={"Cookie": cookie}, origin=tokened.url) as page:
-        assert page.recv(timeout=LONG)
+    assert str(server.passes.token) not in cookie
+    assert get(server, Cookie=cookie).status == 200
     with connect(
-        f"{tokened.url.replace('http', 'ws')}/?token={tokened.token}", subprotocols=PROTOCOL
+        server.url.replace("http", "ws"),
+        subprotocols=PROTOCOL,
+        max_size=None,
+        additional_headers={"Cookie": cookie},
+        origin=server.url,  # pyright: ignore[reportArgumentType]
     ) as page:
         assert page.recv(timeout=LONG)
+    with dial(server) as page:
+        assert page.recv(timeout=LONG)
+
+
+def test_no_token_lets_everybody_in() -> None:
+    """But nobody is its owner."""
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")), port=0, ask_token=False, own_files=Folder.at(".")
+    )
+    try:
+        assert server.guest_link == server.url != server.link
+        assert get(server).status == 200
+        with connect(server.url.replace("http", "ws"), subprotocols=PROTOCOL) as page:
+            page.send(pack(camera()))
+            assert wait_until(lambda: bool(server._viser.get_clients()), LONG)
+            (client,) = server._viser.get_clients().values()
+            line = private.connection_of(server._viser, client)
+            assert isinstance(line, GuardedConnection) and not line.is_owners
+    finally:
+        server.close()
+
+
+def test_cookies_of_two_servers_live_in_one_jar() -> None:
+    """A browser keeps both, sends each server both, and neither opens the other one."""
+    servers = [PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1) for _ in range(2)]
+    try:
+        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        for server in servers:
+            assert opener.open(server.link).url == f"{server.url}/"
+        for server in servers:
+            assert opener.open(server.url).status == 200
+        cookies = [let_in(server.link) for server in servers]
+        names, values = zip(*(each.split("=", 1) for each in cookies), strict=True)
+        assert names[0] != names[1] and values[0] != values[1]
+        exchanged = [f"{name}={value}" for name, value in zip(names, reversed(values), strict=True)]
+        for server, cookie in zip(servers, exchanged, strict=True):
+            assert get(server, Cookie=cookie).status == 403
+            with pytest.raises(InvalidStatus):
+                connect(
+                    server.url.replace("http", "ws"),
+                    subprotocols=PROTOCOL,
+                    additional_headers={"Cookie": cookie},
+                )
+    finally:
+        for server in servers:
+            server.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="needs another user: run it as root")
+def test_a_cookie_that_another_user_has_seen_opens_nothing(plain: PageServer) -> None:
+    """Cookies know no port: a browser shows them to the servers of all users of a machine."""
+    cookie = let_in(plain.link)
+    assert get(plain, Cookie=cookie).status == 200
+    code = (  # everything is imported before: the other user may not be able to read it
+        "import encodings.idna, os, socket, sys; os.setuid(65534); "
+        "line = socket.create_connection(('127.0.0.1', int(sys.argv[1]))); "
+        "line.sendall('\\r\\n'.join(['GET / HTTP/1.1', 'Host: 127.0.0.1', 'Cookie: ' + sys.argv[2], '', ''])"
+        ".encode()); "
+        "print(line.recv(100).split()[1].decode())"
+    )
+    port = str(urlsplit(plain.url).port)
+    done = subprocess.run(
+        [sys.executable, "-c", code, port, cookie], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "403"
 
 
 def test_a_message_has_a_size(plain: PageServer) -> None:

@@ -37,7 +37,7 @@ def test_the_cameras_keys_are_those_of_viser() -> None:
 def test_every_command_has_a_key_of_its_own(choice: SceneChoice) -> None:
     server = PageServer(choice, port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.shows("every command, searchable") and len(page.commands) >= 10)
             commands = [each for each in page.commands.values() if each["hotkey"] is not None]
             keys = [(each["hotkey"], each["modifier"]) for each in commands]

@@ -149,7 +149,7 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
     choice = SceneChoice.starting("planar3-hold", controller=str(file))
     server = PageServer(choice, port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.shows("a controller of your own"))
             learner = server.sessions.learners[0]
             assert eventually(lambda: learner.status is not None and learner.status.own is not None)

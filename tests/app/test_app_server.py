@@ -18,6 +18,7 @@ from viser import _messages
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer, serve
+from browsing.wire import let_in
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -32,7 +33,8 @@ def plain() -> Iterator[PageServer]:
 
 
 def test_it_answers_on_this_machine_only(plain: PageServer) -> None:
-    with urllib.request.urlopen(plain.url) as answer:
+    page = urllib.request.Request(plain.url, headers={"Cookie": let_in(plain.link)})
+    with urllib.request.urlopen(page) as answer:
         assert answer.status == 200
     assert plain.url.startswith("http://127.0.0.1:")
 

@@ -8,7 +8,10 @@ import shutil
 import socket
 import ssl
 import subprocess
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +23,10 @@ from websockets.sync.client import connect
 from app.__main__ import main
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
+from app.server.passes import QUERY
 from app.server.server import PageServer
-from browsing.wire import camera, pack
+from browsing.wire import Wire, camera, eventually, pack
+from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 
 PAGE = Path(__file__).parents[2] / "docs" / "serving.md"
@@ -60,7 +65,11 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
     )
     origin = f"https://{NAME}:{port}"
     server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, trusted_origins=[origin]
+        SceneChoice(RunSpec("planar3-hold")),
+        port=0,
+        max_sessions=1,
+        trusted_origins=[origin],
+        own_files=Folder.at(str(folder)),
     )
     printed = re.findall(r"```nginx\n(.*?)```", PAGE.read_text(), re.DOTALL)
     assert len(printed) == 1
@@ -73,6 +82,14 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
     ):
         assert site.count(text) == 1
         site = site.replace(text, here)
+    with nginx_with(nginx, folder, site, port):
+        yield server, port, certificate
+    server.close()
+
+
+@contextmanager
+def nginx_with(nginx: str, folder: Path, site: str, port: int) -> Iterator[None]:
+    """nginx, until the end, with a configuration that listens on a port."""
     folders = "".join(
         f"{kind}_temp_path {folder}/{kind};\n"
         for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
@@ -87,11 +104,10 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
     try:
         assert wait_until(lambda: answers(port) or process.poll() is not None, LONG)
         assert process.poll() is None, (folder / "error.log").read_text()
-        yield server, port, certificate
+        yield
     finally:
         process.terminate()
         process.wait(LONG)
-        server.close()
 
 
 def answers(port: int) -> bool:
@@ -132,7 +148,7 @@ def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path])
     server, port, certificate = proxied
     origin = f"https://{NAME}:{port}"
     assert " 403 " in get(port, certificate)
-    first = get(port, certificate, f"/?token={server.token}")
+    first = get(port, certificate, f"/?{QUERY}={server.passes.token}")
     assert " 303 " in first and "; Secure" in first
     found = re.search(r"Set-Cookie: ([^;]+)", first)
     assert found is not None
@@ -151,6 +167,54 @@ def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path])
         assert wait_until(lambda: len(server.sessions.learners) == 1, LONG)
 
 
+_BARE = """
+server {
+    listen 127.0.0.1:PORT;
+    location / {
+        proxy_pass URL;
+        proxy_http_version 1.1;
+        proxy_set_header Host HOST;
+        proxy_set_header Upgrade $http_upgrade;
+        proxy_set_header Connection "upgrade";
+        MORE
+    }
+}
+"""
+
+
+@pytest.mark.parametrize("host", ["$proxy_host", "127.0.0.1", "$http_host"])
+def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
+    host: str, nginx: str, tmp_path: Path
+) -> None:
+    """The lab behind it thinks that it is alone: whatever host the proxy names, strangers have no token; and
+    through one that says what it is not even the owner opens files."""
+    port = free_port()
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, own_files=Folder.at(str(tmp_path))
+    )
+    forwarded = "" if host == "$proxy_host" else "proxy_set_header X-Forwarded-For $remote_addr;"
+    site = _BARE
+    for word, here in (("PORT", str(port)), ("URL", server.url), ("HOST", host), ("MORE", forwarded)):
+        site = site.replace(word, here)
+    proxy = f"http://127.0.0.1:{port}"
+    try:
+        with nginx_with(nginx, tmp_path, site, port):
+            for forged in ({}, {"Host": "127.0.0.1"}, {"Host": "localhost:8080"}):
+                with pytest.raises(urllib.error.HTTPError) as refused:
+                    urllib.request.urlopen(urllib.request.Request(proxy, headers=forged))
+                assert refused.value.code == 403
+            with pytest.raises(InvalidStatus) as closed:
+                connect(proxy.replace("http", "ws"), subprotocols=PROTOCOL)
+            assert closed.value.response.status_code == 403
+            assert not server.sessions.learners
+            brought = (server.link if forwarded else server.guest_link).partition("?")[2]
+            with Wire(f"{proxy}/?{brought}") as page:
+                assert eventually(lambda: page.folders("Import report") > 0, LONG)
+                assert page.find("Python file") is None and page.find("File") is None
+    finally:
+        server.close()
+
+
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Several proxies too."""
     from app.server import server
@@ -160,8 +224,13 @@ def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) 
     first, second = "https://lab.example.org", "https://b.example.org"
     assert main(["--no-browser", "--trusted-origin", first, "--trusted-origin", second]) == 0
     assert tuple(asked["trusted_origins"]) == (first, second) and asked["ask_token"]
-    assert main(["--no-browser", "--no-token"]) == 0
-    assert not asked["ask_token"]
+    assert asked["own_files"] == Folder.at(".")
+    assert main(["--no-browser", "--no-token", "--no-own-files"]) == 0
+    assert not asked["ask_token"] and asked["own_files"] is None
+    assert main(["--no-browser", "--own-files", str(PAGE.parent)]) == 0
+    assert asked["own_files"] == Folder(PAGE.parent.resolve())
+    assert main(["--no-browser", "--own-files", "/nowhere"]) == 2
+    assert main(["--no-browser", "--own-files", ".", "--no-own-files"]) == 2
 
 
 def test_the_page_names_options_that_exist() -> None:

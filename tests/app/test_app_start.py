@@ -22,10 +22,12 @@ import sys, urllib.request
 from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
 from app.server import server
+from browsing.wire import let_in
 server._load = lambda choice: None  # what follows once it listens
 running = server.PageServer({{choice}}, port=0)
 try:
-    assert urllib.request.urlopen(running.url).status == 200
+    page = urllib.request.Request(running.url, headers={{"Cookie": let_in(running.link)}})
+    assert urllib.request.urlopen(page).status == 200
     print(*sorted(set({NUMERICS}) & set(sys.modules)))
 finally:
     running.close()
@@ -40,7 +42,7 @@ from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 running = PageServer(SceneChoice(RunSpec("{scene}")), port=0)
 try:
-    with Wire(running.url) as page:
+    with Wire(running.link) as page:
         assert eventually(lambda: page.shows("RUNNING"), 110.0)
     print(*sorted({"numba", "matplotlib"} & set(sys.modules)))
 finally:

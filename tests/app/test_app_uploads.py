@@ -57,7 +57,7 @@ def taken(page: Wire) -> bool:
 @pytest.mark.parametrize("said", [LARGE, 100], ids=["honest", "lying"])
 def test_each_page_is_told_once(server: PageServer, said: int) -> None:
     """Two at once, on pages whose robots were killed and started again."""
-    with Wire(server.url) as one, Wire(server.url) as two:
+    with Wire(server.link) as one, Wire(server.link) as two:
         before = {page: shown(page) for page in (one, two)}
         for learner in [each for each in server.sessions.learners if each.attached]:
             pid = learner.pid
@@ -78,7 +78,7 @@ def test_each_page_is_told_once(server: PageServer, said: int) -> None:
 
 
 def test_two_large_files_of_one_page_are_two_sentences(server: PageServer) -> None:
-    with Wire(server.url) as page:
+    with Wire(server.link) as page:
         for name in ("first", "second"):
             upload(page, name, bytes(PART), parts=2, size=LARGE)
         assert eventually(lambda: refusals(page) == 2, LONG)
@@ -86,7 +86,7 @@ def test_two_large_files_of_one_page_are_two_sentences(server: PageServer) -> No
 
 
 def test_a_file_for_what_was_replaced_is_told(server: PageServer) -> None:
-    with Wire(server.url) as page:
+    with Wire(server.link) as page:
         assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)
         page.say(_messages.FileTransferStartUpload("gone", "one", "robot.urdf", "text/xml", 1, 10))
         assert eventually(lambda: any("replaced" in body for _, body in page.notices), LONG)

@@ -42,7 +42,7 @@ def test_whatever_is_written_the_page_goes_on(choice: SceneChoice, capfd: pytest
     random = chance.Random(11)
     server = PageServer(choice, port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.shows("every command, searchable") and page.shows("t = "))
             learner = server.sessions.learners[0]
             inputs = {uuid: each for uuid, each in list(page.controls.items()) if "value" in each}
@@ -90,7 +90,7 @@ def test_a_press_whose_panel_goes_meanwhile_is_told_of(capfd: pytest.CaptureFixt
     """What its callback then writes is gone: a notice, and no traceback."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.shows("every command, searchable"))
             (client,) = server._viser.get_clients().values()
             folder = client.gui.add_folder("Goes")

@@ -200,7 +200,7 @@ def test_an_arm_turns_its_hand_as_it_is_told() -> None:
 def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
     server = PageServer(SceneChoice(RunSpec("panda-htmpc")), port=0, max_sessions=1)
     try:
-        with Wire(server.url) as page:
+        with Wire(server.link) as page:
             assert eventually(lambda: page.shows("turn it by its rings"))
             learner = server.sessions.learners[0]
             assert eventually(lambda: learner.status is not None and learner.status.ticks > 0)

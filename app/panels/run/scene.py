@@ -11,6 +11,7 @@ from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from lessons.own.files import is_file
+from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError
 
@@ -27,9 +28,9 @@ class RobotPanel:
         ready: Ready,
         scenes: Mapping[str, str],
         choose: Callable[[SceneChoice], None],
-        by_path: bool,
+        own_files: Folder | None,
     ) -> None:
-        """by_path: whether this page may name files of the machine it runs on."""
+        """own_files: where files may lie that this page names by path; None: it may name none."""
         robot = ready.robot
         self._choose = choose
         gui.add_html(
@@ -59,18 +60,18 @@ class RobotPanel:
         with gui.add_folder("Your own URDF"):
             tip = gui.add_text("Hand frame", "", hint="A link's name; empty: the end of the longest chain")
             of_urdf = _answer(gui)
-            if by_path:
+            if own_files is not None:
                 path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
                 load_path = gui.add_button("Load file")
 
                 @load_path.on_click
                 async def _(_: object) -> None:
-                    self._ask(of_urdf, RunSpec("hold", path.value.strip(), tip.value.strip() or None))
+                    self._ask_file(of_urdf, own_files, path.value.strip(), tip.value.strip() or None)
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
             gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
-        if by_path:
-            self._add_file(gui, ready.choice)
+        if own_files is not None:
+            self._add_file(gui, ready.choice, own_files)
         self._report(gui, ready)
 
         @scene.on_update
@@ -95,7 +96,7 @@ class RobotPanel:
         async def _(_: object) -> None:
             self._uploaded(of_urdf, upload.value.content, tip.value.strip() or None)
 
-    def _add_file(self, gui: viser.GuiApi, current: SceneChoice) -> None:
+    def _add_file(self, gui: viser.GuiApi, current: SceneChoice, own_files: Folder) -> None:
         with gui.add_folder("A file of your own"):
             gui.add_html(block(_FILES))
             path = gui.add_text("Python file", "", hint="Path on the machine that runs this page")
@@ -111,18 +112,27 @@ class RobotPanel:
                 self.refuse("No Python file was named: write its path, which ends with .py, first.")
                 return
             try:
-                choice = current.with_file(name)
+                choice = current.with_file(own_files.admits(name))
                 choice.resolved().scene()
             except InputError as error:
                 self.refuse(str(error))
             else:
                 self._choose(choice)
 
-    def _ask(self, answer: viser.GuiHtmlHandle, run: RunSpec, urdf_text: str | None = None) -> None:
+    def _ask_file(self, answer: viser.GuiHtmlHandle, own_files: Folder, path: str, tip: str | None) -> None:
         self._wait(answer)
-        if run.scene == "hold" and run.urdf == "":
+        if not path:
             self.refuse("No file was named: write the path of a URDF file first.")
             return
+        try:
+            run = RunSpec("hold", own_files.admits(path), tip)
+        except InputError as error:
+            self.refuse(str(error))
+        else:
+            self._choose(SceneChoice(run, within=own_files.path))
+
+    def _ask(self, answer: viser.GuiHtmlHandle, run: RunSpec, urdf_text: str | None = None) -> None:
+        self._wait(answer)
         self._choose(SceneChoice(run, urdf_text))
 
     def _uploaded(self, answer: viser.GuiHtmlHandle, content: bytes, tip: str | None) -> None:
@@ -173,7 +183,8 @@ def _answer(gui: viser.GuiApi) -> viser.GuiHtmlHandle:
 
 
 _FILES = (
-    "A controller, scene, lesson or task, by what the file defines. It is read from the disk of whoever "
-    "started himpc-lab, on this machine, and never uploaded; pages that others can reach do not offer this. "
+    "A controller, scene, lesson or task, by what the file defines. It is read on this machine, from "
+    "below the folder that himpc-lab was started in (or --own-files DIR), and never uploaded. Only the page "
+    "of the address that was printed for whoever started it offers this. "
     "<code>himpc-lab new</code> writes one to begin with."
 )

@@ -28,7 +28,7 @@ def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
     """A page without it sees the same robot and cannot stop it; with it the page can."""
     assert isinstance(classroom.sessions, Classroom)
     (learner,) = classroom.sessions.learners
-    page = open_page(browser, classroom.url, 1300, 700)
+    page = open_page(browser, classroom.link, 1300, 700)
     watching = page.get_by_text("you are watching")
     expect(watching).to_be_visible()
     press(page, "Pause")

@@ -9,6 +9,8 @@ import pytest
 from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.opening import opened_in_a_browser
 from app.server.server import PageServer
 from browsing.hands import SLOW, eventually, new_page
 from lessons.scenes.run_spec import RunSpec
@@ -17,12 +19,18 @@ from lessons.scenes.run_spec import RunSpec
 def test_the_page_opens_while_it_is_compiled(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And counts what is ready. (How the robot comes after that: every other test of the page.)"""
+    """The file that a browser begins with leads there, and the page counts what is ready. (How the robot
+    comes after that: every other test of the page.)"""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
     server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0)
     page = new_page(browser)
     try:
-        page.goto(server.url, wait_until="commit", timeout=SLOW)
+        with opened_in_a_browser(server.link):
+            assert wait_until(lambda: bool(opened), 10.0)
+            page.goto(opened[0], wait_until="commit", timeout=SLOW)
+            page.wait_for_url(f"{server.url}/", wait_until="commit", timeout=SLOW)
 
         def ready() -> int:
             found = re.search(r"(\d+) of \d+ functions", page.content())

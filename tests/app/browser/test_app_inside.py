@@ -38,7 +38,7 @@ def drawing() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def shared(browser: Browser, drawing: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, drawing.url, 1300, 700)
+    opened = open_page(browser, drawing.link, 1300, 700)
     yield opened
     opened.context.close()
 

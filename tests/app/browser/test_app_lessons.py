@@ -36,7 +36,7 @@ def school() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, school.url, 1000, 700)
+    opened = open_page(browser, school.link, 1000, 700)
     yield opened
     opened.context.close()
 
@@ -65,7 +65,7 @@ def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path
     file = tmp_path / "mine.py"
     file.write_text(text_of("lesson", None, "mine.py"))
     server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
-    page = open_page(browser, server.url, 1000, 700)
+    page = open_page(browser, server.link, 1000, 700)
     try:
         walk(page, server, lesson_named(str(file)))
     finally:

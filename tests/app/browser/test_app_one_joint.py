@@ -44,7 +44,7 @@ def server() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def page(browser: Browser, server: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, server.url)
+    opened = open_page(browser, server.link)
     yield opened
     opened.context.close()
 

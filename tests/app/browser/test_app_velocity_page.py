@@ -45,7 +45,7 @@ def server() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, server.url, width=1400, height=700)
+    opened = open_page(browser, server.link, width=1400, height=700)
     yield opened
     opened.context.close()
 

@@ -31,7 +31,7 @@ def server(fork_server: ForkServer | None) -> Iterator[PageServer]:
 
 @pytest.fixture(scope="package")
 def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, server.url)
+    opened = open_page(browser, server.link)
     yield opened
     opened.context.close()
 

@@ -121,7 +121,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     tab(page, "Export")
     press(page, "Write it down")
     code = row(page, "Code").locator("textarea").input_value()
-    with Wire(server.url) as elsewhere:
+    with Wire(server.link) as elsewhere:
         assert eventually(page, lambda: elsewhere.find("Somebody's code") is not None)
         elsewhere.write(str(elsewhere.find("Somebody's code")), value=code)
         elsewhere.write(str(elsewhere.find("Open it")), value=True)

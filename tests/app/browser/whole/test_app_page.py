@@ -250,7 +250,7 @@ def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> N
 def test_two_browsers_and_no_third(
     browser: Browser, server: PageServer, page: Page, learner: Learner
 ) -> None:
-    second = open_page(browser, server.url)
+    second = open_page(browser, server.link)
     other = server.sessions.learners[-1]
     assert other is not learner and other.pid != learner.pid
     still = position(second, "/actual")
@@ -258,7 +258,7 @@ def test_two_browsers_and_no_third(
     assert eventually(page, lambda: position(page, "/actual")[1] > still[1] + 0.08)
     assert np.allclose(position(second, "/actual"), still, atol=2e-3)
     third = new_page(browser)
-    third.goto(server.url, wait_until="commit")
+    third.goto(server.link, wait_until="commit")
     expect(third.get_by_text("All places are taken")).to_be_visible(timeout=60_000)
     pid = other.pid
     second.context.close()
@@ -315,7 +315,7 @@ def _upload(page: Page, path: Path) -> None:
 
 
 def test_other_scenes_and_the_phone(browser: Browser, server: PageServer) -> None:
-    phone = open_page(browser, server.url, 390, 844)
+    phone = open_page(browser, server.link, 390, 844)
     learner = server.sessions.learners[-1]
     expect(phone.get_by_text("Drag the target by its arrows")).to_be_visible()
     left, right = sheet(phone)

@@ -1,0 +1,82 @@
+"""What a visitor brings: the token or the owner's secret in the address, afterwards a cookie made of them."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+from websockets.datastructures import Headers
+
+QUERY = "himpc-token"
+"""In the address. Jupyter, behind which a lab may stand, takes `token` for itself."""
+Role = Literal["guest", "owner"]
+_ROLES: tuple[Role, ...] = ("owner", "guest")
+
+
+def new_token() -> str:
+    """128 bits, as text that fits into an address."""
+    return secrets.token_urlsafe(16)
+
+
+@dataclass(frozen=True)
+class Passes:
+    """Of one server, from its start to its end.
+
+    Attributes:
+        token: lets in; None: nobody needs one.
+        owner: lets in, too, and proves that who brings it started the server; None: nobody can prove it.
+        cookie: the cookie's name. Cookies of one host are sent to all its ports, so each server has a name of
+            its own for it.
+        key: what cookies are made with. They do not contain what is in the address.
+    """
+
+    token: str | None = field(default=None, repr=False)
+    owner: str | None = field(default=None, repr=False)
+    cookie: str = "himpc-lab"
+    key: bytes = field(default_factory=lambda: secrets.token_bytes(32), repr=False)
+
+    def link(self, address: str, role: Role) -> str:
+        """An address of the page as it is handed to somebody of that role."""
+        secret = (role == "owner" and self.owner) or self.token
+        return f"{address}/?{urlencode({QUERY: secret})}" if secret else address
+
+    def in_address(self, path: str) -> Role | None:
+        """Whose secret an address carries."""
+        given = parse_qs(urlsplit(path).query).get(QUERY, [])
+        known = (self.owner, self.token)
+        return _first(any(_same(each, right) for each in given) for right in known)
+
+    def in_cookies(self, headers: Headers, who: str) -> Role | None:
+        """Whose cookie a request carries that comes from `who`, see `app.server.peers`."""
+        given = list(self._cookies(headers))
+        return _first(any(_same(each, self._value(role, who)) for each in given) for role in _ROLES)
+
+    def keep(self, role: Role, who: str) -> str:
+        """The cookie of a visitor, name and value. From anybody but `who` it is worth nothing: browsers show
+        it to all servers of the same host, whoever they belong to."""
+        return f"{self.cookie}={self._value(role, who)}"
+
+    def _value(self, role: Role, who: str) -> str:
+        return hmac.new(self.key, f"{role} {who}".encode(), hashlib.sha256).hexdigest()
+
+    def _cookies(self, headers: Headers) -> Iterable[str]:
+        # By hand: the library gives up the whole line where another server's cookie of this host is odd.
+        for part in ";".join(headers.get_all("Cookie")).split(";"):
+            name, _, value = part.strip().partition("=")
+            if name == self.cookie:
+                yield value
+
+
+def _first(brought: Iterable[bool]) -> Role | None:
+    """The first role whose secret or cookie was brought; all are looked at, whichever it is."""
+    found: list[Role] = [role for role, there in zip(_ROLES, list(brought), strict=True) if there]
+    return found[0] if found else None
+
+
+def _same(given: str, right: str | None) -> bool:
+    return right is not None and secrets.compare_digest(given.encode(errors="replace"), right.encode())

@@ -1,0 +1,48 @@
+"""Where files of one's own may lie that are named while the program runs, instead of when it is started."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from robots import InputError
+from robots.errors import shortened
+
+
+@dataclass(frozen=True)
+class Folder:
+    """path: absolute, without symbolic links."""
+
+    path: Path
+
+    @classmethod
+    def at(cls, name: str) -> Folder:
+        """The folder of a name. Raises InputError if there is none."""
+        path = Path(os.path.realpath(name))
+        if not path.is_dir():
+            raise InputError(f"--own-files {shortened(name, 100)} is no folder: give one that exists")
+        return cls(path)
+
+    def holds(self, path: str) -> bool:
+        """Whether a path leads to below the folder, whatever links and dots it goes through."""
+        try:
+            return self.path in Path(os.path.realpath(path)).parents
+        except ValueError:  # e.g. a zero byte
+            return False
+
+    def admits(self, name: str) -> str:
+        """The path of a file below the folder, whatever links and dots its name goes through: relative to
+        where the program was started, if it lies there.
+
+        Raises:
+            InputError: it leads outside, whether or not there is a file. The sentence is the same for both.
+        """
+        given = str(self.path / name)
+        if not self.holds(given):
+            raise InputError(
+                f"{shortened(name, 100)}: only files below the folder that himpc-lab was started in are "
+                "opened from the page, or below another one that it was given by --own-files DIR"
+            )
+        path, here = Path(os.path.realpath(given)), Path(os.path.realpath(Path.cwd()))
+        return str(path.relative_to(here) if path.is_relative_to(here) else path)

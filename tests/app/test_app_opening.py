@@ -1,0 +1,133 @@
+"""How the page comes into the owner's browser, and what is printed for whom."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.link.choice import SceneChoice
+from app.link.process import wait_until
+from app.server.greeting import greeting
+from app.server.opening import opened_in_a_browser
+from app.server.server import PageServer
+from lessons.own.folder import Folder
+from lessons.scenes.run_spec import RunSpec
+
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
+ROOT = Path(__file__).parents[2]
+LONG = 60.0
+BROWSER = """#!{python}
+import sys, time, pathlib
+said = pathlib.Path({said!r})
+said.with_suffix(".part").write_text("\\n".join(sys.argv[1:]))
+said.with_suffix(".part").rename(said)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Path:
+    """A program that writes its arguments down beside it, and stays."""
+    path = tmp_path / "browser"
+    path.write_text(BROWSER.format(python=sys.executable, said=str(tmp_path / "said")))
+    path.chmod(0o755)
+    return path
+
+
+def test_no_argument_list_holds_what_the_browser_is_opened_with(browser: Path, tmp_path: Path) -> None:
+    """Every user of the machine can read argument lists. A file that nobody else can read leads to the page,
+    and is gone with the lab."""
+    places = tmp_path / "places"
+    places.mkdir()
+    with subprocess.Popen(
+        [sys.executable, "-m", "app", "--port", "0", "--scene", "planar3-hold"],
+        cwd=ROOT,
+        env={**os.environ, "BROWSER": str(browser), "TMPDIR": str(places)},
+        stdout=subprocess.PIPE,
+        text=True,
+        umask=0,
+    ) as lab:
+        try:
+            assert lab.stdout is not None
+            found = re.search(r"ready at (http\S+=(\S+))", lab.stdout.readline())
+            assert found is not None
+            link, secret = found.groups()
+            assert wait_until((tmp_path / "said").exists, LONG)
+            opened = (tmp_path / "said").read_text()
+            lists = [
+                " ".join(each.cmdline())
+                for each in (psutil.Process(lab.pid), *psutil.Process(lab.pid).children(recursive=True))
+            ]
+            assert any(str(browser) in each for each in lists)
+            assert not [each for each in (*lists, opened) if secret in each]
+            file = Path(opened.removeprefix("file://"))
+            assert link in file.read_text()
+            assert stat.S_IMODE(file.stat().st_mode) == 0o600
+            assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
+        finally:
+            browsers = psutil.Process(lab.pid).children(recursive=True)
+            lab.send_signal(signal.SIGTERM)
+            lab.wait(LONG)
+            for each in browsers:
+                if each.is_running():
+                    each.kill()
+    assert not file.exists() and not file.parent.exists()
+
+
+def test_the_file_leads_to_the_page_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    link = 'http://127.0.0.1:8080/?himpc-token=a&b="><script>'
+    with opened_in_a_browser(link):
+        assert wait_until(lambda: bool(opened), LONG)
+        text = Path(opened[0].removeprefix("file://")).read_text()
+        assert "<script>" not in text and "&amp;b=&quot;" in text
+
+
+@contextmanager
+def made(**more: object) -> Iterator[PageServer]:
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, **more)  # pyright: ignore
+    try:
+        yield server
+    finally:
+        server.close()
+
+
+def test_who_works_alone_reads_one_line() -> None:
+    with made(own_files=Folder.at(".")) as server:
+        assert [*greeting(server, "127.0.0.1", ())] == [f"himpc-lab ready at {server.link}"]
+        assert str(server.passes.owner) in server.link
+
+
+def test_who_serves_others_reads_which_address_is_for_whom() -> None:
+    """The first one is the owner's, and nothing to hand on contains the owner's secret."""
+    origin = "https://lab.example.org"
+    with made(own_files=Folder.at("."), trusted_origins=[origin], classroom=True) as server:
+        first, *others = greeting(server, "127.0.0.1", (origin,))
+        owner, token = server.passes.owner, server.passes.token
+        assert owner and token and owner != token
+        assert first == f"himpc-lab ready at {server.link}" and first.endswith(owner)
+        assert all(line.startswith("  ") for line in others)
+        assert owner not in "".join(others)
+        assert others[0] == f"  for others:           {server.url}/?himpc-token={token}"
+        assert others[1] == f"  through the proxy:    {origin}/?himpc-token={token}"
+        assert others[2].startswith("  instructor's token:   ")
+        assert "Keep the first address to yourself" in others[3] and "--no-own-files" in others[3]
+
+
+def test_no_token_says_what_it_gives_up() -> None:
+    with made(ask_token=False) as server:
+        first, told = greeting(server, "127.0.0.1", ())
+        assert first == f"himpc-lab ready at {server.url}"
+        assert "--no-token: every user of this machine" in told
