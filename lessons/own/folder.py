@@ -19,8 +19,11 @@ class Folder:
     @classmethod
     def at(cls, name: str) -> Folder:
         """The folder of a name. Raises InputError if there is none."""
-        path = Path(os.path.realpath(name))
-        if not path.is_dir():
+        try:
+            path = Path(os.path.realpath(name))
+        except (OSError, ValueError):  # "." is gone, or this is no path
+            path = None
+        if path is None or not path.is_dir():
             raise InputError(f"--own-files {shortened(name, 100)} is no folder: give one that exists")
         return cls(path)
 
