@@ -30,7 +30,7 @@ _ROOM = 200
 
 @cache
 def _filter() -> Callable[..., None]:
-    """It loads the compiler: only a target that moves needs it."""
+    """It loads the compiler: only who makes a target needs it."""
     from himpc.tick.kernel.target import roll
 
     return roll
@@ -56,6 +56,7 @@ class Target:
         self.raw = value
         self.caps = caps
         self._rotation = value.ndim == 2
+        self._filter = _filter()  # now: the tick in which a hand first moves the target must not wait for it
         self._axes = axes
         self._m = 3 if self._rotation else value.size
         self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
@@ -137,7 +138,7 @@ class Target:
             samples = np.zeros((count + 1 + _ROOM, self._samples.shape[1]))
             samples[: self._known] = self._samples[: self._known]
             self._samples = samples
-        _filter()(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
+        self._filter(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
         self._known = max(self._known, count)
 
     def _gathered(self, motion: Array) -> Preview:
