@@ -8,7 +8,8 @@ import numpy as np
 
 from himpc.configuration import Configuration
 from himpc.references import Preview
-from himpc.tasks import FrameOrientation, Task
+from himpc.tasks import FrameOrientation, OrientationTask, Task
+from himpc.tasks.axes import AXES
 from himpc.tick.configure import Span, is_built_in, write_motion
 from himpc.tick.kernel.arena import Arena, Array
 from robots import Robot
@@ -36,6 +37,16 @@ class GivenRows:
                 start = end
                 if task.value(home).ndim == 2:
                     self.turning.add(task.name)
+
+    def asked(self, task: Task, previews: Mapping[str, Preview]) -> Preview:
+        """A task's reference in the task's own coordinates, see `Task.asked`."""
+        preview = previews[task.name]
+        if not isinstance(task, OrientationTask) or len(task.axes) == len(AXES):
+            return preview
+        f = self._arena.f
+        knots = f["path"][2:] + (f["q"] - f["path"][1])
+        here = Configuration(self._robot, self._data, f["q"], f["v"], knots, previews)
+        return task.asked(here, preview)
 
     def write(self, previews: Mapping[str, Preview]) -> None:
         """J at the knots of the last prediction (30), value, error and reference of each task.
