@@ -218,7 +218,7 @@ class CompiledTick:
             else:
                 preview = previews[task.name]
                 if preview is not read:
-                    write_preview(self.arena, place, span, self._given.asked(task, previews), self._reach)
+                    write_preview(self.arena, place, span, self._given.at_first(task, preview), self._reach)
                 # A target at rest shows it again; of others nobody knows whether it has changed.
                 self._read[place] = preview if target else None
 
