@@ -55,9 +55,9 @@ class GivenRows:
         Args:
             previews: of every task. The arena holds the measured state and what is remembered.
         """
-        turned = [each for each in self.spans if self._turned.get(each[1].name)]
-        if not self._given and not turned:
+        if not self._given and True not in self._turned.values():
             return
+        turned = [each for each in self.spans if self._turned.get(each[1].name)]
         f, known = self._arena.f, bool(self._arena.i["known"][0])
         q, v, path = f["q"], f["v"], f["path"]
         with np.errstate(all="ignore"):
