@@ -116,14 +116,14 @@ class StackForm:
 
     def asked(self, configuration: Configuration, previews: Mapping[str, Preview]) -> Mapping[str, Preview]:
         """The references in the coordinates of the tasks, see `Task.asked`."""
-        if all(type(task).asked is Task.asked for task in self.tasks):
-            return previews
-        asked = {
-            task.name: task.asked(configuration, previews[task.name])
-            for task in self.tasks
-            if task.name in previews
-        }
-        return {**previews, **asked}
+        asked = {}
+        for task in self.tasks:
+            if type(task).asked is not Task.asked and task.name in previews:
+                preview = previews[task.name]
+                found = task.asked(configuration, preview)
+                if found is not preview:
+                    asked[task.name] = found
+        return {**previews, **asked} if asked else previews
 
     def free(
         self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int

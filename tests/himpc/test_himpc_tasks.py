@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -30,6 +31,7 @@ from himpc.tasks import (
     RelativePosition,
     Task,
 )
+from himpc.tasks.frame import FrameTask
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
@@ -226,3 +228,38 @@ def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: 
             np.testing.assert_allclose(compiled.plan.errors[name], printed.plan.errors[name], atol=1e-9)
     assert moved > 1e-4
     assert worst <= (1e-7 if controller == "weighted" else 1e-8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnTurn(FrameTask):
+    """A task of somebody's own whose value is a rotation and which controls some axes of it."""
+
+    first_row: ClassVar[int] = 3
+    unit: ClassVar[Literal["m", "rad"]] = "rad"
+
+    def value(self, configuration: Configuration) -> Array:
+        return configuration.placement(self.frame).rotation
+
+    def error(self, value: Array, desired: Array) -> Array:
+        return pin.log3(value @ desired.T)[self.components]
+
+
+@pytest.mark.parametrize(
+    ("controller", "route"), [("himpc", "compiled"), ("himpc", "explicit"), ("hqp", "compiled")]
+)
+def test_an_own_rotation_on_some_axes_is_told_of_these(controller: str, route: str) -> None:
+    """Its target turns about all axes; what it asks for has as many columns as the task has rows."""
+    scene = torque_scene("iiwa14-hold")
+    levels = (scene.settings.levels[0], Level((OwnTurn(name="x", axes="xy"),)), scene.settings.levels[2])
+    taken = replace(scene.settings, levels=levels, controller=controller, route=route)
+    session = TorqueSession(replace(scene, settings=taken))
+    target = session.target("x")
+    assert target is not None
+    session.tick()
+    session.post(MoveTarget("x", tuple(quaternion(exp3(np.array([0.1, 0.0, 0.0])) @ target.raw))))
+    for _ in range(200):
+        session.tick()
+    assert session.plan is not None
+    assert session.plan.values["x"].shape == (3, 3)
+    assert session.failure is None
+    assert 0.0 < np.linalg.norm(session.plan.errors["x"]) < 0.01
