@@ -16,6 +16,7 @@ from himpc.plan import Plan
 from himpc.references import Preview
 from himpc.rotation import quaternion
 from himpc.stack import DAMPING_LEVEL, Stack
+from himpc.tasks.axes import AXES
 from himpc.tick.kernel.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from robots import Robot
 
@@ -178,8 +179,16 @@ def _write_references(row: Array, layout: Layout, ahead: Mapping[str, Preview]) 
         preview = ahead[task.name]
         value = preview.value
         row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
-        row[fields[f"v_d/{task.name}"]] = preview.velocity[0]
-        row[fields[f"a_d/{task.name}"]] = preview.acceleration[0]
+        row[fields[f"v_d/{task.name}"]] = on_axes(task.coordinates, preview, preview.velocity)
+        row[fields[f"a_d/{task.name}"]] = on_axes(task.coordinates, preview, preview.acceleration)
+
+
+def on_axes(coordinates: Sequence[str], preview: Preview, motion: Array) -> Array:
+    """ẋ_d or ẍ_d now; of a rotation, which turns about all axes, along those of the task."""
+    now = motion[0]
+    if preview.value.ndim == 1 or now.size == len(coordinates):
+        return now
+    return now[[AXES.index(axis) for axis in coordinates]]
 
 
 def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:

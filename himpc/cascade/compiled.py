@@ -13,6 +13,7 @@ from pathlib import Path
 from types import CellType, FunctionType
 from typing import Any
 
+import numpy.ma  # noqa: F401  (Numba imports it at the first call with an array, which would be a robot's first tick)
 from numba import boolean, float64, int64, intp, njit, types
 from numba.core import config, event
 

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
 from himpc.configuration import Configuration
 from himpc.controllers.settings import Settings
 from himpc.prediction.task import ResidualModel, residual_model
-from himpc.references import Preview
+from himpc.references import Later, Preview
 from himpc.references.hold import still
 from himpc.stack import DAMPING_LEVEL, Level, active_levels, freedom_left
 from himpc.tasks import Damping, Task
@@ -98,16 +99,31 @@ class StackForm:
         blocks = [task.jacobian(configuration) for task in self.tasks]
         return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
 
+    def drift(
+        self, robot: Robot, data: pin.Data, q: Array, v: Array, previews: Mapping[str, Preview], h: float
+    ) -> Array:
+        """J̇ q̇ of all rows, (m,): how J changes along the motion of the robot and of the targets.
+
+        Args:
+            robot, data, q, v, previews: as for a `Configuration`.
+            h: s, how far robot and targets are moved to both sides.
+        """
+        on, back = (
+            self.jacobian(Configuration(robot, data, q + s * v, v, previews=Later(previews, s)))[0]
+            for s in (h, -h)
+        )
+        return (on - back) @ v / (2 * h)
+
     def asked(self, configuration: Configuration, previews: Mapping[str, Preview]) -> Mapping[str, Preview]:
         """The references in the coordinates of the tasks, see `Task.asked`."""
-        if all(type(task).asked is Task.asked for task in self.tasks):
-            return previews
-        asked = {
-            task.name: task.asked(configuration, previews[task.name])
-            for task in self.tasks
-            if task.name in previews
-        }
-        return {**previews, **asked}
+        asked = {}
+        for task in self.tasks:
+            if type(task).asked is not Task.asked and task.name in previews:
+                preview = previews[task.name]
+                found = task.asked(configuration, preview)
+                if found is not preview:
+                    asked[task.name] = found
+        return {**previews, **asked} if asked else previews
 
     def free(
         self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int

@@ -20,7 +20,7 @@ from himpc.controllers.settings import Settings
 from himpc.limits import LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
-from himpc.tasks import Damping
+from himpc.tasks import Damping, OrientationTask
 from himpc.tick.configure import is_built_in
 from himpc.tick.kinematics import Kinematics
 
@@ -99,6 +99,8 @@ class OneStepController(TorqueController):
         self._boundless = no_rows(self.robot.n)
         known = all(is_built_in(task) for task in (*self._form.tasks, *self._off))
         self._kinematics = Kinematics(self.robot, self._form, self._off) if known else None
+        orientations = [task for task in self._form.tasks if isinstance(task, OrientationTask)]
+        self._about_one_axis = [task.name for task in orientations if len(task.axes) == 1]
         self._settings = settings
 
     @abstractmethod
@@ -162,19 +164,20 @@ class OneStepController(TorqueController):
     ) -> list[Demand]:
         """The demands of a form's levels; x and x̃ of every task are written to `values` and `errors`."""
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
-        if self._kinematics is not None:
+        here = Configuration(self.robot, self._data, q, v, previews=previews)
+        # The kernel sees how J changes with q; of one axis it also changes with a target that turns.
+        if self._kinematics is not None and not any(
+            previews[name].velocity[0].any() for name in self._about_one_axis
+        ):
             J, drift, error, x, x_error = self._kinematics.at(q, v, h, previews)
             values.update(x)
             errors.update(x_error)
         else:
-            both = np.array((q + h * v, q - h * v))
-            configuration = Configuration(self.robot, self._data, q, v, both, previews)
-            J, ahead, behind = form.jacobian(configuration)
-            drift = (ahead - behind) @ v / (2 * h)
-            error = measure(form.tasks, configuration, previews, values, errors)
+            J, drift = form.jacobian(here)[0], form.drift(self.robot, self._data, q, v, previews, h)
+            error = measure(form.tasks, here, previews, values, errors)
             if self._off:
-                measure(self._off, configuration, previews, values, errors)
-            previews = form.asked(configuration, previews)
+                measure(self._off, here, previews, values, errors)
+        previews = form.asked(here, previews)
         wanted = np.zeros((2, error.size))
         start = 0
         for task, rows in zip(form.tasks, form.sizes, strict=True):

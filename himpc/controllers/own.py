@@ -127,19 +127,19 @@ class OwnController(TorqueController):
         settings, form = self._settings, self._form
         T_s, N = settings.T_s, settings.horizon
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
-        here = Configuration(self.robot, self._data, q, v, np.array((q + h * v, q - h * v)))
-        J, ahead, behind = form.jacobian(here)
+        here = Configuration(self.robot, self._data, q, v, previews=previews)
+        J = form.jacobian(here)[0]
         error = measure(form.tasks, here, previews, values, errors)
         if self._off:
             measure(self._off, here, previews, values, errors)
         q_before, v_before, period = self._before or (q, v, T_s)
         x_dot = J @ v
         if self._x_dot is None:
-            past = Configuration(self.robot, self._elsewhere, q_before, v_before)
+            past = Configuration(self.robot, self._elsewhere, q_before, v_before, previews=previews)
             self._x_dot = form.jacobian(past)[0] @ v_before
         x_ddot, self._x_dot = (x_dot - self._x_dot) / period, x_dot
-        drift = (ahead - behind) @ v / (2 * h)
-        displacement, velocity, acceleration = wanted(form, previews, N)
+        drift = form.drift(self.robot, self._elsewhere, q, v, previews, h)
+        displacement, velocity, acceleration = wanted(form, form.asked(here, previews), N)
         levels = []
         for level in () if self._idle else form.levels:
             rows = level.rows
@@ -160,7 +160,7 @@ class OwnController(TorqueController):
                     K_v=read_only(form.model.K_v[rows]),
                     Q=read_only(level.root_Q**2),
                     R=read_only(level.R),
-                    jacobian=lambda at, rows=rows: self._jacobian_at(form, at)[rows],
+                    jacobian=lambda at, rows=rows: self._jacobian_at(form, at, previews)[rows],
                 )
             )
         return View(
@@ -176,9 +176,10 @@ class OwnController(TorqueController):
             nominal=self._nominal,
         )
 
-    def _jacobian_at(self, form: StackForm, q: Array) -> Array:
+    def _jacobian_at(self, form: StackForm, q: Array, previews: Mapping[str, Preview]) -> Array:
         q = np.asarray(q, float).reshape(self.robot.n)
-        return form.jacobian(Configuration(self.robot, self._elsewhere, q, np.zeros_like(q)))[0]
+        at = Configuration(self.robot, self._elsewhere, q, np.zeros_like(q), previews=previews)
+        return form.jacobian(at)[0]
 
     def _bounds(self, q: Array) -> Bounds:
         force, limits = self._limits, self._settings.limits

@@ -22,7 +22,8 @@ class LevelView:
         name: the level's name; "damping" for the one that calms what no other level uses.
         tasks: names of its tasks.
         x: values of its tasks by name: coordinates (m,), or a rotation matrix (3, 3).
-        error: x̃ = x − x_d, (m,) m or rad; log₃(R R_dᵀ) for rotations.
+        error: x̃ = x − x_d, (m,) m or rad; log₃(R R_dᵀ) for rotations, on fewer than three axes
+            see `OrientationTask`.
         x_dot: ẋ = J q̇, (m,).
         x_ddot: ẍ, the backward difference of ẋ, (m,).
         J: J_i of (3) at the measured q, (m, n).

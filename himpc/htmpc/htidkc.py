@@ -85,7 +85,7 @@ class HTIDKC:
         last = self._last
         if last is None:
             last = commandable(v, None, self._bounds) if usable else np.zeros(self.robot.n)
-        here = Configuration(self.robot, self._data, q, last)
+        here = Configuration(self.robot, self._data, q, last, previews=previews)
         box = self._level_zero(q, last)
         command = np.clip(np.zeros(self.robot.n), box.lower, box.upper)
         above: list[tuple[Array, Array]] = []
@@ -121,7 +121,7 @@ class HTIDKC:
 
     def _wanted(self, task: Task, here: Configuration, previews: Mapping[str, Preview], gain: float) -> Array:
         preview = previews[task.name]
-        return preview.velocity[0] - gain * task.error(task.value(here), preview.value)
+        return task.asked(here, preview).velocity[0] - gain * task.error(task.value(here), preview.value)
 
     def _level_zero(self, q: Array, last: Array) -> _Box:
         """Velocities that this period allows: those inside all bounds, or the nearest reachable one."""

@@ -12,8 +12,7 @@ from himpc.configuration import Configuration
 from himpc.htmpc.geometry import Frames, Placed, frame_at, geometry, placed
 from himpc.references import Preview
 from himpc.rotation import exp3
-from himpc.tasks import FramePosition, Task
-from himpc.tasks.frame import FrameTask
+from himpc.tasks import FramePosition, OrientationTask, Task
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -47,10 +46,13 @@ class Knots:
             return self._frame(task.frame).p[0, task.components]
         return task.value(self._knots[0])
 
-    def jacobian(self, task: Task) -> Array:
-        """J of a task at every knot, (K, m, n)."""
+    def jacobian(self, task: Task, desired: Desired) -> Array:
+        """J of a task at every knot, (K, m, n), where r is `desired`."""
         if isinstance(task, FramePosition):
             return self._frame(task.frame).J[:, :3][:, task.components]
+        if isinstance(task, OrientationTask) and len(task.axes) == 1:
+            rotations = [task.value(knot) for knot in self._knots]
+            return task.slopes(rotations, list(desired)) @ task.angular_jacobian(self._path)
         return task.jacobian(self._path)
 
     def _frame(self, name: str) -> Frames:
@@ -90,6 +92,5 @@ def desired_values(task: Task, preview: Preview, N: int) -> Desired:
         )
     if preview.value.ndim == 1:
         return preview.value + preview.displacement
-    turn = np.zeros((N + 1, 3))
-    turn[:, task.components if isinstance(task, FrameTask) else slice(0, 3)] = preview.displacement
+    turn = task.spread(preview.displacement) if isinstance(task, OrientationTask) else preview.displacement
     return [exp3(each) @ preview.value for each in turn]

@@ -111,7 +111,7 @@ class Iterate:
     def jacobian(self, level: Tracking) -> Array:
         """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
         if level.name not in self._jacobians:
-            self._jacobians[level.name] = level.jacobian(self.knots)
+            self._jacobians[level.name] = level.jacobian(self.knots, self.tick.desired)
         return self._jacobians[level.name]
 
     def effort(self, absolute: bool) -> tuple[float, Array]:

@@ -36,9 +36,9 @@ class Tracking:
         parts = [knots.errors(task, desired[task.name][1:]) for task in self.tasks]
         return parts[0] if len(parts) == 1 else np.hstack(parts)
 
-    def jacobian(self, knots: Knots) -> Array:
+    def jacobian(self, knots: Knots, desired: dict[str, Desired]) -> Array:
         """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
-        parts = [knots.jacobian(task) for task in self.tasks]
+        parts = [knots.jacobian(task, desired[task.name][1:]) for task in self.tasks]
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def cost(self, e: Array) -> float:

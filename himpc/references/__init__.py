@@ -3,6 +3,7 @@
 from himpc.references.clocks import Started
 from himpc.references.curves import Circle, FigureEight, Sinusoid
 from himpc.references.hold import Hold
+from himpc.references.later import Later
 from himpc.references.outlook import Outlook
 from himpc.references.path import LAWS, Law, Path, segment
 from himpc.references.phase import Phase
@@ -20,6 +21,7 @@ __all__ = [
     "Circle",
     "FigureEight",
     "Hold",
+    "Later",
     "Law",
     "Outlook",
     "Path",

@@ -17,8 +17,9 @@ class Preview(NamedTuple):
 
     Attributes:
         value: x_d at k: (m,) or a rotation matrix (3, 3).
-        displacement: x_d(k+j) ⊖ x_d(k), j = 0 … N, (N+1, m); for rotations the vector log₃(R_d(k+j) R_d(k)ᵀ).
-        velocity: ẋ_d at k+j, (N+1, m).
+        displacement: x_d(k+j) ⊖ x_d(k), j = 0 … N, (N+1, m); for rotations the vector log₃(R_d(k+j) R_d(k)ᵀ),
+            (N+1, 3), or its components on the axes of a task that has fewer: the others then count as zero.
+        velocity: ẋ_d at k+j, (N+1, m); ω_d for rotations.
         acceleration: ẍ_d at k+j, (N+1, m).
     """
 

@@ -30,7 +30,7 @@ _ROOM = 200
 
 @cache
 def _filter() -> Callable[..., None]:
-    """It loads the compiler: only a target that moves needs it."""
+    """It loads the compiler: only who makes a target needs it."""
     from himpc.tick.kernel.target import roll
 
     return roll
@@ -48,15 +48,13 @@ class Target:
         caps: caps on speed, acceleration and jerk of the filtered motion.
     """
 
-    def __init__(
-        self, value: Array, caps: Caps = POSITION_CAPS, axes: list[int] | slice | None = None
-    ) -> None:
-        """Starts at rest at `value`. `axes` picks the components of a rotation's motion that a task sees."""
+    def __init__(self, value: Array, caps: Caps = POSITION_CAPS) -> None:
+        """Starts at rest at `value`."""
         value = np.array(value, float)
         self.raw = value
         self.caps = caps
         self._rotation = value.ndim == 2
-        self._axes = axes
+        self._filter = _filter()  # now: the tick in which a hand first moves the target must not wait for it
         self._m = 3 if self._rotation else value.size
         self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
         # See `tick.kernel.target.roll`; the first `_known` samples are there, the first of them is now.
@@ -79,7 +77,7 @@ class Target:
 
     def jump(self, value: Array) -> None:
         """Puts hand and reference to `value`, at rest (for resets)."""
-        self.__init__(value, self.caps, self._axes)
+        self.__init__(value, self.caps)
 
     def _forget_future(self) -> None:
         self._known, self._rest = 1, None
@@ -109,10 +107,10 @@ class Target:
             motion: takes displacement, velocity and acceleration, (3, N+1, m).
 
         Returns:
-            x_d, its numbers row by row. None, and nothing is written, if the target rests or is seen in some
-            of its axes only.
+            x_d, its numbers row by row. None, and nothing is written, if the target rests, or is a rotation
+            of which a task asks for less than all axes.
         """
-        if self._axes is not None or motion.shape[2] != self._m or self._rests_at(t, T_s):
+        if motion.shape[2] != self._m or self._rests_at(t, T_s):
             return None
         self._roll(motion)
         return self._samples[0, : self.raw.size]
@@ -137,9 +135,8 @@ class Target:
             samples = np.zeros((count + 1 + _ROOM, self._samples.shape[1]))
             samples[: self._known] = self._samples[: self._known]
             self._samples = samples
-        _filter()(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
+        self._filter(self._samples, self._known, self.raw.ravel(), self._caps, self._period, motion)
         self._known = max(self._known, count)
 
     def _gathered(self, motion: Array) -> Preview:
-        seen = motion if self._axes is None else motion[:, :, self._axes]
-        return Preview(self.value, seen[0], seen[1], seen[2])
+        return Preview(self.value, motion[0], motion[1], motion[2])

@@ -5,6 +5,7 @@ from himpc.tasks.frame_orientation import FrameOrientation
 from himpc.tasks.frame_position import FramePosition
 from himpc.tasks.joints import Damping, Joints, Posture
 from himpc.tasks.kinds import KINDS, Kind
+from himpc.tasks.orientation import OrientationTask
 from himpc.tasks.plane_distance import PlaneDistance
 from himpc.tasks.pointing import Pointing
 from himpc.tasks.relative import RelativeOrientation, RelativePosition
@@ -18,6 +19,7 @@ __all__ = [
     "FramePosition",
     "Joints",
     "Kind",
+    "OrientationTask",
     "PlaneDistance",
     "Pointing",
     "Posture",

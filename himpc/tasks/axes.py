@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from himpc.references.preview import Preview
 from himpc.tasks.task import Task
 from robots import InputError
 
 if TYPE_CHECKING:
+    from himpc.configuration import Configuration
     from robots import Robot
 
 AXES = "xyz"
@@ -42,3 +44,12 @@ class OnAxes(Task):
 
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
         return tuple(self.axes)
+
+    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+        """Of a rotation, which turns about all axes, the components on the task's own."""
+        if preview.value.ndim == 1 or preview.velocity.shape[1] == len(self.axes):
+            return preview
+        on = self.components
+        return Preview(
+            preview.value, preview.displacement[:, on], preview.velocity[:, on], preview.acceleration[:, on]
+        )

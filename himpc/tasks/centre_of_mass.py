@@ -14,9 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CentreOfMass(OnAxes):
-    """x = centre of mass of all links along the chosen world axes, m (Pink and Mink: ComTask).
+    """x = centre of mass of what the joints move, along the chosen world axes, m (Pink and Mink: ComTask).
 
-    The one task that reads masses, those of the robot's own description: a payload is not in it.
+    Links that are fixed to the world do not count, as Baxter's torso and head of 36.3 kg: with m_fixed there
+    and m that moves, the centre of mass of all goes only m/(m + m_fixed) as far. The one task that reads
+    masses, those of the robot's own description: a payload is not in it.
 
     Attributes:
         axes: world axes that are controlled, any non-empty subset of "xyz".

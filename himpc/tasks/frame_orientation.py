@@ -5,23 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from himpc.rotation import log3
 from himpc.tasks.frame import FrameTask
-from himpc.tasks.task import Array, Gain
+from himpc.tasks.orientation import OrientationTask
+from himpc.tasks.task import Array
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrameOrientation(FrameTask):
-    """x̃ = log₃(R R_dᵀ) in world axes, ẋ = ω (level 2 of Table IV).
-
-    The value is the rotation matrix R (3, 3); the error is in radians along the chosen world axes.
-    """
-
-    K_p: Gain = 50.0
-    K_v: Gain = 5.0
+class FrameOrientation(OrientationTask, FrameTask):
+    """x̃ = log₃(R R_dᵀ) in world axes, ẋ = ω (level 2 of Table IV); on fewer axes see `OrientationTask`."""
 
     first_row: ClassVar[int] = 3
     unit: ClassVar[Literal["m", "rad"]] = "rad"
@@ -29,5 +23,8 @@ class FrameOrientation(FrameTask):
     def value(self, configuration: Configuration) -> Array:
         return configuration.placement(self.frame).rotation
 
-    def error(self, value: Array, desired: Array) -> Array:
-        return log3(value @ desired.T)[self.components]
+    def rotations(self, configuration: Configuration) -> list[Array]:
+        return [each.rotation for each in configuration.placements(self.frame)]
+
+    def angular_jacobian(self, configuration: Configuration) -> Array:
+        return configuration.frame_jacobians(self.frame)[:, 3:]

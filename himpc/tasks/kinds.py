@@ -38,7 +38,7 @@ KINDS: dict[str, Kind] = {
     "joints": Kind("some joints", (Joints,)),
     "posture": Kind("all joints", (Posture,)),
     "damping": Kind("all joints come to rest, wherever they are", (Damping,)),
-    "com": Kind("the centre of mass", (CentreOfMass,)),
+    "com": Kind("the centre of mass of what moves", (CentreOfMass,)),
     "relative_position": Kind("where a frame is, seen from another frame", (RelativePosition,)),
     "relative_orientation": Kind("how a frame is turned, seen from another frame", (RelativeOrientation,)),
     "relative_pose": Kind("both, seen from another frame", (RelativePosition, RelativeOrientation), _BOTH),

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from himpc.references.preview import Preview
+from himpc.rotation import exp3
 from himpc.tasks.axes import AXES
+from himpc.tasks.seen import NUDGE, at_rest, rests, seen
 from himpc.tasks.task import Array, Gain, Task
 from robots.errors import unknown_name
 
@@ -21,8 +23,8 @@ AHEAD = 0.5
 """m from the frame's origin at which a target starts, on the axis."""
 _NEAREST = 0.02
 """m: a point nearer than this is taken to be this far; the direction to it could turn arbitrarily fast."""
-_ASIDE = 1e-3
-"""Sine of the angle to the opposite direction below which ‖J‖ grows no further."""
+_ASIDE = 1e-2
+"""Sine of the angle to the opposite direction below which ‖J‖ grows no further (0.6°)."""
 _STRAIGHT = 1e-9
 """Sine of the angle below which the axis counts as pointing at the point."""
 
@@ -32,7 +34,8 @@ class Pointing(Task):
     """x = φ ŝ⊥, rad: by what angle φ, and to which side, the axis a of the frame misses a point c.
 
     s = Rᵀ(c − p) is the point as the frame sees it, ŝ⊥ the direction of its part across a. x̃ = x, since the
-    coordinates count from the target: x_d is the point c, (3,) m in the world. φ = π is singular.
+    coordinates count from the target: x_d is the point c, (3,) m in the world. φ = π is singular: exactly
+    there ŝ⊥ is the first of the two axes across.
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
@@ -83,14 +86,15 @@ class Pointing(Task):
         across, ahead = point[self._across], float(point @ self._direction())
         aside = float(np.linalg.norm(across))
         angle = np.arctan2(aside, ahead)
-        steep = ahead < 0.0 or aside > _STRAIGHT * distance
-        ratio = angle / max(aside, _ASIDE * distance if ahead < 0.0 else 0.0) if steep else 1.0 / distance
-        side = across / aside if aside > 0.0 else np.zeros(2)
+        side = across / aside if aside > 0.0 else np.array([1.0, 0.0])
+        straight = ahead > 0.0 and aside <= _STRAIGHT * distance
+        x = across / distance if straight else angle * side
+        ratio = 1.0 / distance if straight else angle / max(aside, _ASIDE * distance if ahead < 0.0 else 0.0)
         slope = np.zeros((2, 3))
         slope[:, self._across] = ratio * np.eye(2)
         slope[:, self._across] += (ahead / distance**2 - ratio) * np.outer(side, side)
         slope -= np.outer(across / distance**2, self._direction())
-        return ratio * across, slope
+        return x, slope
 
     def value(self, configuration: Configuration) -> Array:
         place = configuration.placement(self.frame)
@@ -103,19 +107,32 @@ class Pointing(Task):
         point, rows = self._point(configuration), configuration.frame_jacobians(self.frame)
         found = np.empty((len(rows), 2, rows.shape[2]))
         for j, place in enumerate(configuration.placements(self.frame)):
-            seen, turn = place.actInv(point), place.rotation.T
+            s, turn = place.actInv(point), place.rotation.T
             # ṡ = −Rᵀṗ − Rᵀω × s
-            moved = np.cross(seen, turn @ rows[j, 3:], axisb=0).T - turn @ rows[j, :3]
-            found[j] = self._seen(seen)[1] @ moved
+            moved = np.cross(s, turn @ rows[j, 3:], axisb=0).T - turn @ rows[j, :3]
+            found[j] = self._seen(s)[1] @ moved
         return found
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """A point that moves by Δc changes x by ∂x/∂c Δc; that much is asked for back."""
-        place = configuration.placement(self.frame)
-        back = self._seen(place.actInv(preview.value))[1] @ -place.rotation.T
-        return Preview(
-            preview.value,
-            preview.displacement @ back.T,
-            preview.velocity @ back.T,
-            preview.acceleration @ back.T,
-        )
+        """A point that moves with ċ changes x by ∂x/∂c ċ; that much is asked for back."""
+        if rests(preview):
+            return at_rest(preview, 2)
+        moved, c_dot, _ = preview[1:]
+        rows, places = configuration.frame_jacobians(self.frame)[0], configuration.placements(self.frame)
+        p_dot, omega = rows[:3] @ configuration.v, rows[3:] @ configuration.v
+        on = exp3(NUDGE * omega)
+        G, change = np.zeros((2, len(moved), 2, 3))
+        for j, gone in enumerate(moved):
+            place = places[min(j, len(places) - 1)]
+            R, away, step = (
+                place.rotation,
+                preview.value + gone - place.translation,
+                NUDGE * (c_dot[j] - p_dot),
+            )
+            G[j] = self._back(R, away)
+            change[j] = (self._back(on @ R, away + step) - self._back(on.T @ R, away - step)) / (2 * NUDGE)
+        return seen(preview, (moved, c_dot, preview.acceleration), G, change)
+
+    def _back(self, R: Array, away: Array) -> Array:
+        """−∂x/∂c, (2, 3), of a frame turned by R; the point is at `away` from its origin, world axes."""
+        return self._seen(R.T @ away)[1] @ -R.T

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from himpc.rotation import log3
 from himpc.tasks.axes import OnAxes
-from himpc.tasks.task import Array, Gain
+from himpc.tasks.orientation import OrientationTask
+from himpc.tasks.task import Array
 
 if TYPE_CHECKING:
     from himpc.configuration import Configuration
@@ -51,14 +51,10 @@ class RelativePosition(RelativeTask):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RelativeOrientation(RelativeTask):
-    """x̃ = log₃(R R_dᵀ) with R = R_rootᵀ R_frame, in axes of the root; ẋ = R_rootᵀ (ω − ω_root).
-
-    The value is the rotation matrix R (3, 3); the error is in radians along the chosen axes.
+class RelativeOrientation(OrientationTask, RelativeTask):
+    """x̃ = log₃(R R_dᵀ) with R = R_rootᵀ R_frame, in axes of the root; ẋ = R_rootᵀ (ω − ω_root). On fewer axes
+    see `OrientationTask`.
     """
-
-    K_p: Gain = 50.0
-    K_v: Gain = 5.0
 
     first_row: ClassVar[int] = 3
     unit: ClassVar[Literal["m", "rad"]] = "rad"
@@ -66,5 +62,10 @@ class RelativeOrientation(RelativeTask):
     def value(self, configuration: Configuration) -> Array:
         return configuration.relative_placement(*self._frames(configuration)).rotation
 
-    def error(self, value: Array, desired: Array) -> Array:
-        return log3(value @ desired.T)[self.components]
+    def rotations(self, configuration: Configuration) -> list[Array]:
+        frame, root = self._frames(configuration)
+        pairs = zip(configuration.placements(frame), configuration.placements(root), strict=True)
+        return [sees.rotation.T @ seen.rotation for seen, sees in pairs]
+
+    def angular_jacobian(self, configuration: Configuration) -> Array:
+        return configuration.relative_jacobians(*self._frames(configuration))[:, 3:]

@@ -8,7 +8,9 @@ import numpy as np
 
 from himpc.configuration import Configuration
 from himpc.references import Preview
-from himpc.tasks import FrameOrientation, Task
+from himpc.tasks import FrameOrientation, OrientationTask, Task
+from himpc.tasks.axes import AXES
+from himpc.tasks.seen import at_rest, rests
 from himpc.tick.configure import Span, is_built_in, write_motion
 from himpc.tick.kernel.arena import Arena, Array
 from robots import Robot
@@ -28,6 +30,7 @@ class GivenRows:
         self._given: list[tuple[int, Task, slice, slice]] = []
         home = Configuration(robot, self._data, robot.home, np.zeros(robot.n))
         self.turning = {task.name for _, task, _ in spans if isinstance(task, FrameOrientation)}
+        self._turned: dict[str, bool] = {}
         start = 0
         for place, task, span in spans:
             if not is_built_in(task):
@@ -37,19 +40,31 @@ class GivenRows:
                 if task.value(home).ndim == 2:
                     self.turning.add(task.name)
 
+    def at_first(self, task: Task, preview: Preview) -> Preview:
+        """A preview as it comes. Of an orientation on fewer than three axes what it asks for depends on where
+        the robot is: `write` adds that."""
+        if not isinstance(task, OrientationTask) or len(task.axes) == len(AXES):
+            return preview
+        self._turned[task.name] = not rests(preview)
+        return at_rest(preview, len(task.axes))
+
     def write(self, previews: Mapping[str, Preview]) -> None:
-        """J at the knots of the last prediction (30), value, error and reference of each task.
+        """J at the knots of the last prediction (30), value, error and reference of each task; and the motion
+        of references that turn, of orientations on fewer than three axes.
 
         Args:
             previews: of every task. The arena holds the measured state and what is remembered.
         """
-        if not self._given:
+        if not self._given and True not in self._turned.values():
             return
+        turned = [each for each in self.spans if self._turned.get(each[1].name)]
         f, known = self._arena.f, bool(self._arena.i["known"][0])
         q, v, path = f["q"], f["v"], f["path"]
         with np.errstate(all="ignore"):
             knots = path[2:] + (q - path[1])
             here = Configuration(self._robot, self._data, q, v, knots, previews)
+            for _, task, span in turned:
+                self._ask(span, task.asked(here, previews[task.name]))
             past = Configuration(self._robot, self._data, f["q_was"], f["v_was"], previews=previews)
             for place, task, span, rows in self._given:
                 f["given"][: len(knots) + 1, rows] = task.jacobian(here)

@@ -71,7 +71,7 @@ class CompiledTick:
         self._led = [each for each in self._given.spans if not isinstance(each[1], Damping)]
         self._read: dict[int, Reference | Preview | None] = {}
         self._gathered: tuple[Layout, Array | None] | None = None
-        self._ticks, self._budget = 0, budget_of(self.arena)
+        self._ticks, self._budget, self._reach = 0, budget_of(self.arena), settings.horizon + 1
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
@@ -218,7 +218,7 @@ class CompiledTick:
             else:
                 preview = previews[task.name]
                 if preview is not read:
-                    write_preview(self.arena, place, span, preview, self._settings.horizon + 1)
+                    write_preview(self.arena, place, span, self._given.at_first(task, preview), self._reach)
                 # A target at rest shows it again; of others nobody knows whether it has changed.
                 self._read[place] = preview if target else None
 

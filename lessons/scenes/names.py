@@ -8,7 +8,7 @@ SCENES: dict[str, str] = {
     "planar3-hold": "planar 3-joint arm: the same, in its plane",
     "ridgeback-ur10-hold": "Ridgeback and UR10 at torque level: drag hand and base; the hand comes first",
     "baxter-hold": "Baxter, two arms: drag both hands; where they are comes before how they turn",
-    "baxter-tray": "Baxter carries a tray along a square: the grip first, then the tray, then the posture",
+    "baxter-tray": "Baxter's hands move along a square as if they carried a tray; the grip is level 1",
     "baxter-conflict": "Baxter's hands hold on to each other and are wanted in two places",
     "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
     "planar3-plane": "the same arm with a QP that can be drawn: the wrist's x before two joints, N = 1",

@@ -1,4 +1,4 @@
-"""The robot with two arms: both hands dragged, a tray carried between them, and hands that want apart."""
+"""The robot with two arms: hands that are dragged, that move as with a tray, and that want apart."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robots import NominalSettings, PlantSettings, Robot, load_robot
 
 RIGHT, LEFT = "right_gripper", "left_gripper"
 SIDE = 0.12
-"""m, of the square along which the tray is carried."""
+"""m, of the square along which the hands move."""
 START_S, EDGE_S = 0.3, 1.2
 """s until it starts, and for each edge."""
 _SCRIPT_S = 0.05
@@ -60,9 +60,12 @@ def baxter_hold() -> TorqueScene:
 
 
 def baxter_tray() -> TorqueScene:
-    """`baxter-tray`: level 1 is the pose of the left hand as the right one sees it; level 2 where the tray
-    is, which the right hand says, and that it is level; level 3 the posture. A script carries the tray along
-    a square once."""
+    """`baxter-tray`: level 1 is the pose of the left hand as the right one sees it; level 2 where a tray
+    would be, which the right hand says, and that it is level; level 3 the posture. A script moves the hands
+    along a square once.
+
+    There is no tray: nothing weighs anything, and nothing but level 1 keeps the hands together. What a real
+    one would add, a load and the forces between the hands, is not simulated."""
     robot, K_p, K_v = _robot()
     levels = (
         Level(_grip(K_p, K_v)),
@@ -78,7 +81,7 @@ def baxter_tray() -> TorqueScene:
     way = Waypoints(corners, np.array([START_S + EDGE_S * k for k in range(5)]))
     times = [START_S + _SCRIPT_S * k for k in range(1, round(4 * EDGE_S / _SCRIPT_S) + 1)]
     events = tuple((t, MoveTarget("tray", tuple(way.preview(t, 1e-3, 1).value.tolist()))) for t in times)
-    title = "Baxter carries a tray: the hands keep their grip, whatever the tray and the posture ask"
+    title = "Baxter moves as if it carried a tray: nothing but level 1 keeps the hands together"
     return _scene(robot, "baxter-tray", title, levels, events, START_S + 4 * EDGE_S + 0.5)
 
 

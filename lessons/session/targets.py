@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def target_at(task: Task, value: Array) -> Target:
     """A draggable target of a task that starts at one of its `Task.target`s."""
     if value.ndim == 2:
-        return Target(value, ROTATION_CAPS, task.components if isinstance(task, OnAxes) else None)
+        return Target(value, ROTATION_CAPS)
     in_space = task.unit == "m" or isinstance(task, Pointing)
     return Target(value, POSITION_CAPS if in_space else JOINT_CAPS)
 

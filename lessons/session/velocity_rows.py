@@ -13,7 +13,7 @@ from himpc.references import Reference
 from himpc.rotation import quaternion
 from himpc.stack import Stack
 from himpc.tasks import Task
-from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY, Layout, arranged
+from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY, Layout, arranged, on_axes
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -109,10 +109,10 @@ def write_truth(
         row[fields[f"x/{name}"]] = quaternion(value) if value.ndim == 2 else value
         if name not in references:
             continue
-        wanted = references[name].preview(t, 1e-3, 0)
+        wanted, along = references[name].preview(t, 1e-3, 0), task.coordinates(at.robot)
         row[fields[f"x_d/{name}"]] = quaternion(wanted.value) if value.ndim == 2 else wanted.value
-        row[fields[f"v_d/{name}"]] = wanted.velocity[0]
-        row[fields[f"a_d/{name}"]] = wanted.acceleration[0]
+        row[fields[f"v_d/{name}"]] = on_axes(along, wanted, wanted.velocity)
+        row[fields[f"a_d/{name}"]] = on_axes(along, wanted, wanted.acceleration)
         row[fields[f"error/{name}"]] = task.error(value, wanted.value)
         row[fields[f"level/{name}"]] = places[name]
     row[fields["manipulability"]] = manipulability(at)

@@ -268,13 +268,13 @@ def test_jump_rests_at_the_new_value() -> None:
     assert not preview.velocity.any()
 
 
-def test_chosen_axes_are_what_the_task_sees() -> None:
-    """A rotation's preview is cut to the axes its task controls."""
-    target = Target(np.eye(3), axes=[2])
+def test_a_rotation_turns_about_all_axes() -> None:
+    """Its preview has all of ω_d, whatever axes a task controls; one at rest may be as wide as the task."""
+    target = Target(np.eye(3))
     target.move(exp3(np.array([0.0, 0.0, 0.5])))
     preview = drive(target, 50, lambda k: None)[-1]
-    assert preview.velocity.shape == (6, 1)
-    assert preview.velocity[0, 0] > 0.01
+    assert preview.velocity.shape == (6, 3)
+    assert preview.velocity[0, 2] > 0.01
     assert Hold(np.eye(3), m=1).preview(0.0, T_S, 5).velocity.shape == (6, 1)
 
 

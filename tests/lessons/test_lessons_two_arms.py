@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from lessons.events import MoveTarget, Set
@@ -13,8 +14,8 @@ from lessons.scenes.two_arms import EDGE_S, SIDE, START_S
 from lessons.session.torque import TorqueSession
 
 
-def test_the_tray_is_carried_along_a_square() -> None:
-    """The hands keep their relative pose within 0.5 mm and 0.2°; the tray comes to every corner, level."""
+def test_the_hands_move_along_a_square_as_if_they_carried_a_tray() -> None:
+    """They keep their relative pose within 0.5 mm and 0.2°; its middle comes to every corner, level."""
     recording = run(torque_scene("baxter-tray"))
     assert np.abs(recording["error/grip"]).max() < 0.5e-3
     assert np.degrees(np.linalg.norm(recording["error/grip_turn"], axis=1).max()) < 0.2
@@ -27,6 +28,17 @@ def test_the_tray_is_carried_along_a_square() -> None:
     found = summary(recording)
     assert found["solver"]["unsolved"] == 0
     assert [(each["rank"], each["rows"]) for each in found["levels"]] == [(6, 6), (5, 5), (3, 14)]
+
+
+def test_nothing_but_level_1_keeps_the_hands_together() -> None:
+    """As the scene says, there is no tray: no weight in the plant, and without the grip the hands part."""
+    session = TorqueSession(torque_scene("baxter-tray"))
+    M = pin.crba(session.robot.model, session.robot.model.createData(), session.plant.q)
+    M = np.triu(M) + np.triu(M, 1).T + 0.1 * np.eye(14)
+    np.testing.assert_allclose(session.plant.mass_matrix(), M, atol=1e-9)
+    session.post(Set("levels.1.enabled", False))
+    row = [session.tick() for _ in range(1500)][-1]
+    assert np.linalg.norm(row[session.layout.fields["error/grip"]]) > 0.1
 
 
 def test_both_hands_are_dragged_apart_from_each_other() -> None:

@@ -113,6 +113,68 @@ def frame_rotation(on: Array, turn: Array, R: Array) -> None:
 
 
 @piece
+def about_one_axis(
+    task: Whole,
+    part: Whole,
+    parent: Whole,
+    turns: Whole,
+    placed: Array,
+    z: Array,
+    frame_joint: Whole,
+    frame_turn: Array,
+    R_d: Array,
+    R_now: Array,
+    w: Array,
+    J: Array,
+) -> None:
+    """The row of every orientation task on a single axis a: aᵀ J_l⁻¹(log₃(R R_dᵀ)) times the Jacobian of ω,
+    see `OrientationTask`; `jacobian` has written aᵀ times it.
+
+    Args:
+        task, part, parent, turns, placed, z, frame_joint, J: as in `jacobian`.
+        frame_turn, R_d: of each frame, of each task.
+        R_now, w: room for a rotation per task, and for three numbers.
+    """
+    for t in range(len(task)):
+        if task[t, 0] != ORIENTATION or task[t, 3] != 1:
+            continue
+        i = task[t, 2]
+        a, j = part[i], frame_joint[task[t, 1]]
+        frame_rotation(placed[j], frame_turn[task[t, 1]], R_now[t])
+        turned_away(R_now[t], R_d[t], w)
+        square = dot3(w, w)
+        angle = math.sqrt(square)
+        even = 0.5 * angle / math.tan(0.5 * angle) if angle > 1e-4 else 1.0 - square / 12.0
+        bent = (1.0 - even) / square if angle > 1e-4 else 1.0 / 12.0
+        b, c = (a + 1) % 3, (a + 2) % 3
+        on_a, on_b, on_c = (
+            even + bent * w[a] * w[a],
+            bent * w[a] * w[b] + 0.5 * w[c],
+            bent * w[a] * w[c] - 0.5 * w[b],
+        )
+        while j > 0:
+            if turns[j]:
+                J[i, j - 1] = on_a * z[j, a] + on_b * z[j, b] + on_c * z[j, c]
+            j = parent[j]
+
+
+@piece
+def leans(R: Array, D: Array, f: int, out: Array) -> None:
+    """φ (f × p)/‖f × p‖ of p = R Dᵀ f, (3,) rad: the residual of an orientation task with axis f free."""
+    g, h = (f + 1) % 3, (f + 2) % 3
+    ahead, first, second = dot3(R[f], D[f]), dot3(R[g], D[f]), dot3(R[h], D[f])
+    aside = math.sqrt(first * first + second * second)
+    out[0], out[1], out[2] = 0.0, 0.0, 0.0
+    if aside > 1e-12:
+        share = math.atan2(aside, ahead) / aside
+        out[g], out[h] = -share * second, share * first
+    elif ahead > 0.0:
+        out[g], out[h] = -second, first
+    else:
+        out[g] = math.pi
+
+
+@piece
 def turned_away(R: Array, D: Array, out: Array) -> None:
     """log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
 

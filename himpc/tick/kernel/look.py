@@ -13,8 +13,10 @@ from himpc.tick.kernel.kinematics import (
     GIVEN,
     JOINTS,
     ORIENTATION,
+    about_one_axis,
     frame_rotation,
     jacobian,
+    leans,
     place,
     points,
     turned_away,
@@ -63,11 +65,16 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     R_now, R_d = matrices(data, where[AT.R_now], T, 3, 3), matrices(data, where[AT.R_d], T, 3, 3)
     at, given = vector(data, where[AT.z], n), matrices(data, where[AT.given], N + 1, G, n)
 
+    turned = vector(data, where[AT.slope], 3)
+
     known = vector(whole, whole_where[WHOLE_AT.known], 2)
     if not known[0]:
         place(q_was, parent, turns, turn, shift, axis, placed, z)
         points(placed, frame_joint, frame_shift, point)
         jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[N], B[0])
+        about_one_axis(
+            task, part, parent, turns, placed, z, frame_joint, frame_turn, R_d, R_now, turned, B[0]
+        )
         for i in range(M):
             x_dot_was[i] = dot(B[0, i], v_was, n)
         known[0] = 1
@@ -77,6 +84,9 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         place(at, parent, turns, turn, shift, axis, placed, z)
         points(placed, frame_joint, frame_shift, point)
         jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[j], B[j])
+        about_one_axis(
+            task, part, parent, turns, placed, z, frame_joint, frame_turn, R_d, R_now, turned, B[j]
+        )
     motion = matrices(data, where[AT.motion], 3, N + 1, M)
     displacement, velocity_d, acceleration_d = motion[0], motion[1], motion[2]
     curves(
@@ -91,12 +101,14 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
         velocity_d,
         acceleration_d,
     )
-    turned = vector(data, where[AT.slope], 3)
     for t in range(T):
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
         if kind == ORIENTATION:
             frame_rotation(placed[frame_joint[frame]], frame_turn[frame], R_now[t])
-            turned_away(R_now[t], R_d[t], turned)
+            if size == 2:
+                leans(R_now[t], R_d[t], 3 - part[first] - part[first + 1], turned)
+            else:
+                turned_away(R_now[t], R_d[t], turned)
         for i in range(first, first + size):
             x_dot[i] = dot(B[0, i], v, n)
             if kind == GIVEN:

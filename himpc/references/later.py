@@ -1,0 +1,38 @@
+"""References a moment later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import final
+
+from himpc.references.preview import Preview
+from himpc.rotation import exp3
+
+
+@final
+class Later(Mapping[str, Preview]):
+    """Previews whose targets have gone on for `seconds` at their speed; of each only `value` is moved.
+
+    Attributes:
+        previews: by the names of their tasks.
+        seconds: s.
+    """
+
+    __slots__ = ("previews", "seconds")
+
+    def __init__(self, previews: Mapping[str, Preview], seconds: float) -> None:
+        self.previews, self.seconds = previews, seconds
+
+    def __getitem__(self, name: str) -> Preview:
+        preview = self.previews[name]
+        gone = self.seconds * preview.velocity[0]
+        value = preview.value
+        if value.ndim == 1:
+            return preview._replace(value=value + gone)
+        return preview._replace(value=exp3(gone) @ value) if gone.size == 3 else preview
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.previews)
+
+    def __len__(self) -> int:
+        return len(self.previews)

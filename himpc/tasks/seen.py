@@ -1,0 +1,39 @@
+"""A reference in the coordinates of a task to which it looks different as robot and target move."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from himpc.references.preview import Preview
+from himpc.tasks.task import Array
+
+NUDGE = 1e-4
+"""s, of the motion to both sides along which G is seen to change."""
+
+
+def rests(preview: Preview) -> bool:
+    """Whether the target stands still over the horizon."""
+    return not (preview.displacement.any() or preview.velocity.any() or preview.acceleration.any())
+
+
+def at_rest(preview: Preview, m: int) -> Preview:
+    """The preview of a target that stands still, in m coordinates."""
+    zero = np.zeros((len(preview.displacement), m))
+    return Preview(preview.value, zero, zero, zero)
+
+
+def seen(preview: Preview, motion: tuple[Array, Array, Array], G: Array, change: Array) -> Preview:
+    """ẋ_d = G ẏ_d and ẍ_d = G ÿ_d + Ġ ẏ_d of a target y_d, and by the trapezoidal rule x_d(k+j) − x_d(k).
+
+    Args:
+        preview: of the target.
+        motion: its displacement, velocity and acceleration, (N+1, 3) each.
+        G: (N+1, m, 3) at every knot.
+        change: Ġ, (N+1, m, 3), along the motion of robot and target.
+    """
+    displacement, velocity, acceleration = (each[:, :, None] for each in motion)
+    gone = np.zeros(G.shape[:2])
+    gone[1:] = (0.5 * (G[1:] + G[:-1]) @ np.diff(displacement, axis=0))[:, :, 0].cumsum(axis=0)
+    return Preview(
+        preview.value, gone, (G @ velocity)[:, :, 0], (G @ acceleration + change @ velocity)[:, :, 0]
+    )
