@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import ActiveRows, LevelProblem, Point
-from himpc.cascade.polish import polished
+from himpc.cascade.polish import descended, polished
 from himpc.cascade.white import WhiteLevel, white
 from himpc.limits.rows import Rows
-from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
+from himpc.qp import QPSolution, Solver, solve_qp
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,6 @@ _BINDING = 1e-9
 """N·m: a row closer than this to its bound is binding."""
 _NOISE = 1e-11
 """A row of which no larger share is left by (33) is rounding noise: its joint is not free any more."""
-_ROOM = 1e-8
-"""N·m: where U_{i−1} is all but the only point that the rows admit, solvers take rounding for a contradiction."""
 _ACCURATE = 1e-9
 """Points that miss their optimality conditions by more are polished."""
 
@@ -70,43 +68,42 @@ def solve_explicit(
     kept = np.flatnonzero((length > _NOISE * reach) & (np.isfinite(lower) | np.isfinite(upper)))
     length = length[kept]
     A, low, high = A[kept] / length[:, None], (lower - at)[kept] / length, (upper - at)[kept] / length
-    spent = 0.0
-    for room in (0.0, _ROOM):
-        given = level.c, A, low - room / length, high + room / length
-        solution = solve_qp(np.eye(level.c.size), *given, solver, iterations)
-        spent += solution.time_us
-        solution = _judged(solution, level, A, low, high, length, U_above)
-        if solution.kkt_residual > _ACCURATE:
-            better = polished(solution, level.c, A, low, high)
-            if better is not None:
-                better = _judged(better, level, A, low, high, length, U_above)
-                solution = better if better.kkt_residual < solution.kkt_residual else solution
-        if solution.solved:
-            U = U_above.copy()
-            U[: problem.knots] += (level.P @ solution.x).reshape(problem.knots, n)
-            multipliers = np.zeros(at.size)
-            multipliers[kept] = solution.multipliers / length
-            return _point(replace(solution, time_us=spent), U, multipliers, rows, lower, upper)
-    return None
+    found = solve_qp(np.eye(level.c.size), level.c, A, low, high, solver, iterations)
+
+    def judged(one: QPSolution) -> QPSolution:
+        return _judged(one, level, A, low, high, length, U_above)
+
+    best = judged(found)
+    for again in (polished, descended if iterations is None else None):
+        if again is not None and best.kkt_residual > _ACCURATE:
+            better = again(best, level.c, A, low, high)
+            best = best if better is None else min(best, judged(better), key=lambda one: one.kkt_residual)
+    if not best.solved:
+        return None
+    U = U_above.copy()
+    U[: problem.knots] += (level.P @ best.x).reshape(problem.knots, n)
+    multipliers = np.zeros(at.size)
+    multipliers[kept] = best.multipliers / length
+    return _point(best, U, multipliers, rows, lower, upper)
 
 
 def _judged(
     solution: QPSolution, level: WhiteLevel, A: Array, low: Array, high: Array, length: Array, U_above: Array
 ) -> QPSolution:
-    """The solution with the residual that counts: how far a gradient that is left moves each increment, as a
-    share of 1 N·m or of the increment; how far rows are beyond their bounds, N·m; and the gaps, N·m, of
-    bounds that press."""
+    """The solution with the residual that counts: how far a Newton step on the rows that press moves each
+    increment, as a share of 1 N·m or of the increment, and how far rows are beyond their bounds, N·m."""
     x, multipliers = solution.x, solution.multipliers
-    with np.errstate(all="ignore"):  # a point that was given up may be anything
-        gradient = x + level.c + A.T @ multipliers
-        size = np.maximum(1.0, np.abs(U_above.ravel()[: len(level.P)] + level.P @ x))
-        missing = float((np.abs(level.P) @ np.abs(gradient) / size).max(initial=0.0))
-        value = A @ x
-        outside = float((np.maximum(low - value, value - high) * length).max(initial=0.0))
-        pressing = np.abs(multipliers) > _BINDING * (1.0 + np.abs(multipliers).max(initial=0.0))
-        gap = np.where(multipliers > 0, high - value, value - low) * length
-        apart = float(np.abs(gap[pressing]).max(initial=0.0))
-        residual = max(missing, outside, apart)
+    if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
+        return replace(solution, kkt_residual=float("inf"))
+    gradient, value = x + level.c + A.T @ multipliers, A @ x
+    held = multipliers != 0.0
+    missing = np.where(multipliers > 0, high, low)[held] - value[held]
+    # Of the gradient that is left, what presses on the rows only changes their multipliers.
+    step = np.linalg.lstsq(A[held], missing + A[held] @ gradient)[0] - gradient
+    size = np.maximum(1.0, np.abs(U_above.ravel()[: len(level.P)] + level.P @ x))
+    moved = float((np.abs(level.P @ step) / size).max(initial=0.0))
+    outside = float((np.maximum(low - value, value - high) * length).max(initial=0.0))
+    residual = max(moved, outside)
     return replace(solution, kkt_residual=residual if residual >= 0 else float("inf"))
 
 

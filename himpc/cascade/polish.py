@@ -1,4 +1,5 @@
-"""The optimum of a QP from a point that is nearly one: the rows that bind are known, the rest is linear."""
+"""The optimum of min ½‖x + c‖² subject to low ≤ A x ≤ high, rows of length one, where a solver leaves off: from
+a point that is nearly one, or from any point that the rows admit."""
 
 from __future__ import annotations
 
@@ -13,41 +14,83 @@ Array = NDArray[np.float64]
 
 _NEAR = 1e-3
 """A point with a larger residual says nothing of which rows bind."""
-_BINDS = 1e-9
-"""A multiplier that is a smaller share of the largest one is what a solver left over; so is a row that is
-beyond its bound by no more."""
+_LEFT = 1e-12
+"""A multiplier that is a smaller share of the largest one is what a solver left over."""
+_BEYOND = 1e-9
+"""A row that is beyond its bound by no more is met."""
+_WRONG = 1e-9
+"""A multiplier that presses the wrong way by a smaller share of the largest one is none."""
 _CHANGES = 30
-"""How many rows may be taken or given back one by one."""
+"""How many rows may be taken or given back one by one, beside those that a solver named."""
 
 
 def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """min ½‖x + c‖² subject to low ≤ A x ≤ high, A's rows of length one, from the rows that a solver's point
-    says bind; None where it says nothing, or where these rows do not lead to the optimum."""
+    """From the rows that a solver's point says bind; None where it says nothing, or where these rows and few
+    others do not lead to the optimum."""
     multipliers = solution.multipliers
     if not (np.isfinite(multipliers).all() and solution.kkt_residual <= _NEAR):
         return None
-    side = np.sign(multipliers) * (np.abs(multipliers) > _BINDS * np.abs(multipliers).max(initial=0.0))
+    side = np.sign(multipliers) * (np.abs(multipliers) > _LEFT * np.abs(multipliers).max(initial=0.0))
     for _ in range(_CHANGES):
-        held = np.flatnonzero(side)
-        bound = np.where(side > 0, high, low)[held]
-        if not np.isfinite(bound).all():
+        if not np.isfinite(np.where(side > 0, high, low)[side != 0]).all():
             return None
-        rows = A[held]
-        x = -c
-        for _ in range(2):  # the second time takes away the first one's rounding
-            x = x + np.linalg.lstsq(rows, bound - rows @ x)[0]
-        pull = np.linalg.lstsq(rows.T, -c - x)[0]
-        wrong = -side[held] * pull
-        if held.size and wrong.max() > _BINDS * (1.0 + np.abs(pull).max()):
-            side[held[wrong.argmax()]] = 0.0
+        x, pull = _held(side, c, A, low, high)
+        wrong = -side * pull
+        if wrong.max(initial=0.0) > _WRONG * np.abs(pull).max(initial=0.0):
+            side[wrong.argmax()] = 0.0
             continue
         value = A @ x
-        outside = np.maximum(low - value, value - high)
-        outside[held] = 0.0
-        if outside.max(initial=0.0) <= _BINDS:
-            found = np.zeros(len(A))
-            found[held] = pull
-            return replace(solution, x=x, multipliers=found)
+        outside = np.where(side == 0, np.maximum(low - value, value - high), 0.0)
+        if outside.max(initial=0.0) <= _BEYOND:
+            return replace(solution, x=x, multipliers=pull)
         row = int(outside.argmax())
         side[row] = 1.0 if value[row] > high[row] else -1.0
     return None
+
+
+def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
+    """From x = 0, by the primal active-set method; None if the rows do not admit it.
+
+    Where they admit hardly another point, as below a level that has used up nearly all freedom, a solver that
+    looks for one from outside takes rounding for a contradiction. A row that blocks the way depends on none
+    of those held; after steps of no length the first row in order is taken or given back (Bland), so no set
+    of rows comes twice.
+    """
+    if not ((low <= 0.0) & (high >= 0.0)).all():
+        return None
+    x, side, stuck = np.zeros_like(c), np.zeros(len(A)), 0
+    for _ in range(10 * len(A)):
+        held = np.flatnonzero(side)
+        way = -c - x
+        way = way - np.linalg.lstsq(A[held], A[held] @ way)[0] if held.size else way
+        rate = A @ way
+        rate[held] = 0.0
+        moving = np.abs(rate) > _LEFT * (1.0 + np.abs(c).max())
+        room = np.full(len(A), np.inf)
+        room[moving] = (np.where(rate > 0, high, low) - A @ x)[moving] / rate[moving]
+        step = min(1.0, float(np.maximum(room, 0.0).min(initial=np.inf)))
+        x = x + step * way
+        stuck = 0 if step > 0.0 else stuck + 1
+        if step < 1.0:
+            row = int(np.flatnonzero(room <= step)[0] if stuck > len(A) else room.argmin())
+            side[row] = np.sign(rate[row])
+            continue
+        x, pull = _held(side, c, A, low, high)
+        wrong = -side * pull
+        if wrong.max(initial=0.0) <= _WRONG * np.abs(pull).max(initial=0.0):
+            return replace(solution, x=x, multipliers=pull, status="optimal")
+        side[np.flatnonzero(wrong > 0)[0] if stuck > len(A) else wrong.argmax()] = 0.0
+    return None
+
+
+def _held(side: Array, c: Array, A: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The optimum where rows are held at their upper (side 1) or lower (−1) bounds, and all multipliers."""
+    held, pull = np.flatnonzero(side), np.zeros(len(A))
+    if not held.size:
+        return -c, pull
+    rows, bound = A[held], np.where(side > 0, high, low)[held]
+    x = -c
+    for _ in range(2):  # the second time takes away the first one's rounding
+        x = x + np.linalg.lstsq(rows, bound - rows @ x)[0]
+    pull[held] = np.linalg.lstsq(rows.T, -c - x)[0]
+    return x, pull
