@@ -20,6 +20,10 @@ _BEYOND = 1e-9
 """A row that is beyond its bound by no more is met."""
 _WRONG = 1e-9
 """A multiplier that presses the wrong way by a smaller share of the largest one is none."""
+_ALONG = 1e-11
+"""A row that is met at a smaller share of the way's length lies along it: it depends on the rows held."""
+_STILL = 1e-9
+"""A way that is a smaller share of the optimum without rows has no length."""
 _CHANGES = 30
 """How many rows may be taken or given back one by one, beside those that a solver named."""
 
@@ -63,9 +67,9 @@ def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array)
         held = np.flatnonzero(side)
         way = -c - x
         way = way - np.linalg.lstsq(A[held], A[held] @ way)[0] if held.size else way
+        far = np.abs(way).max(initial=0.0)
         rate = A @ way
-        rate[held] = 0.0
-        moving = np.abs(rate) > _LEFT * (1.0 + np.abs(c).max())
+        moving = (side == 0) & (np.abs(rate) > _ALONG * far) & (far > _STILL * (1.0 + np.abs(c).max()))
         room = np.full(len(A), np.inf)
         room[moving] = (np.where(rate > 0, high, low) - A @ x)[moving] / rate[moving]
         step = min(1.0, float(np.maximum(room, 0.0).min(initial=np.inf)))
