@@ -2,9 +2,9 @@
 
 Nothing of `himpc` takes part but the problem's data. A set of rows that bind is guessed, and the optimality
 conditions of (32) or (34) under these rows, with (33) as printed, are linear: they are solved in doubles and
-corrected until what they miss by, evaluated in integers of several hundred bits, is nothing. Whether the guess
-was right is then plain to see: no other row is beyond its bound, and every multiplier presses the right way.
-The cost is strictly convex, so a point that meets the conditions is the optimum, whoever made the guess.
+corrected until what they miss by, evaluated in integers of several hundred bits, is nothing. Whether the
+guess was right is then plain to see: no other row is beyond its bound, and every multiplier presses the right
+way. The cost is strictly convex, so a point that meets the conditions is the optimum, whoever made the guess.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Fixed = NDArray[Any]
 
 _BITS = 300
 _RANK = 1e-10
-"""Directions that a level feels by less than this share of its rows are left to lower levels, as in `himpc`."""
+"""Directions that a level feels by less than this share of its rows are left to lower levels, as in himpc."""
 _DEPENDENT = 1e-9
 """A bound of which no larger share is left by rows that are held already depends on them."""
 _BEYOND = 1e-11
@@ -53,12 +53,12 @@ class Exact:
 
 def fixed(x: Any) -> Fixed:
     """Doubles as integers times 2^_BITS."""
-    return np.frompyfunc(lambda v: int(math.ldexp(v, _BITS)), 1, 1)(np.asarray(x, np.float64))
+    return np.asarray(np.frompyfunc(lambda v: int(math.ldexp(v, _BITS)), 1, 1)(np.asarray(x, np.float64)))
 
 
 def rounded(x: Fixed) -> Array:
     """And back."""
-    return np.frompyfunc(lambda v: v / (1 << _BITS), 1, 1)(x).astype(np.float64)
+    return np.asarray(np.frompyfunc(lambda v: v / (1 << _BITS), 1, 1)(x), np.float64)
 
 
 def times(a: Fixed, b: Fixed) -> Fixed:
@@ -148,7 +148,7 @@ class _System:
     def solve(self, side: Array) -> tuple[Fixed, NDArray[np.bool_], Array] | None:
         """U (N, n), which rows are held, and all multipliers, for rows held at their upper (1) or lower (−1)
         bounds; None if the conditions do not determine them."""
-        K, n, N = self._K, self._n, self._N
+        K, n = self._K, self._n
         held = self._independent(side)
         row, joint = np.nonzero(held)
         bound = np.where(side > 0, self.upper, self.lower)[row, joint]
@@ -192,7 +192,7 @@ class _System:
         self, U: Fixed, e: Fixed, pull: Fixed, row: NDArray[Any], joint: NDArray[Any], bound: Fixed
     ) -> list[Array]:
         """What the conditions miss by, rounded only at the end: stationarity, e, and rows held."""
-        K, n = self._K, self._n
+        K = self._K
         pushed = np.array([times(self._B[j], U[j]) for j in range(self._N)])
         error = np.array(
             [
@@ -251,7 +251,8 @@ class _System:
             basis, _ = np.linalg.qr((kept / np.linalg.norm(kept, axis=1, keepdims=True)).T)
             for _ in range(2):
                 bounds = bounds - (bounds @ basis) @ basis.T
-        _, R, order = qr(bounds.T, mode="economic", pivoting=True)
+        factors: Any = qr(bounds.T, mode="economic", pivoting=True)
+        R, order = factors[1:]
         chosen = order[: len(R)][np.abs(np.diag(R)) > _DEPENDENT]
         held[row[chosen], joint[chosen]] = True
         return held

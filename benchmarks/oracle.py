@@ -146,7 +146,7 @@ def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iter
 def table(found: list[Found]) -> str:
     """A row per robot, in Markdown."""
     lines = [
-        "| robot | levels, held by bounds | compiled: none, largest error, N·m | explicit: none, largest error, N·m |",
+        "| robot | levels, held by bounds | compiled: none, worst error | explicit: none, worst error |",
         "|---|--:|--:|--:|",
     ]
     for robot in [*dict.fromkeys(each.robot for each in found), "all"]:

@@ -54,8 +54,8 @@ def solve_explicit(
         the optimum, or None if no solver gave a point that is within `KKT_TOLERANCE` of its optimality
         conditions: in N·m for every increment, or as a share of it where it is larger than 1 N·m.
     """
-    N, n = U_above.shape
-    level = white(problem, U_above, Z)
+    n = U_above.shape[1]
+    level = white(problem, U_above, [B for B, _ in above], Z)
     at = (rows.L @ U_above).ravel()
     lower, upper = rows.lower.ravel(), rows.upper.ravel()
     if above:

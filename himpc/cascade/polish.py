@@ -1,5 +1,5 @@
-"""The optimum of min ½‖x + c‖² subject to low ≤ A x ≤ high, rows of length one, where a solver leaves off: from
-a point that is nearly one, or from any point that the rows admit."""
+"""The optimum of min ½‖x + c‖² subject to low ≤ A x ≤ high, rows of length one, where a solver leaves off:
+from a point that is nearly one, or from any point that the rows admit."""
 
 from __future__ import annotations
 

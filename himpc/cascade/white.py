@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ class WhiteLevel(NamedTuple):
     P: Array
 
 
-def white(problem: LevelProblem, U_above: Array, Z: Array) -> WhiteLevel:
+def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Array) -> WhiteLevel:
     """Problem i, (32) or (34), from its least-squares form ‖Q^½ e‖² + ‖R^½ U‖².
 
     H = GᵀQG + R is never formed: where weights or inertias are far apart its condition is 10¹⁷ and R is lost
@@ -36,15 +37,16 @@ def white(problem: LevelProblem, U_above: Array, Z: Array) -> WhiteLevel:
     Args:
         problem: the level's data.
         U_above: U_{i−1}, (N, n).
+        upper: B_p of every level above, (N, m_p, n).
         Z: orthonormal bases of what (33) leaves free, (N, n, d); surplus columns are zero.
     """
-    K, (m, n) = problem.knots, problem.B.shape[1:]
+    K, m = problem.knots, problem.B.shape[1]
     root_R = np.sqrt(problem.R)
     felt, unfelt = [], []
     effect = []
     for j in range(K):
         B = problem.B[j] / root_R
-        basis, _ = np.linalg.qr(root_R[:, None] * Z[j][:, Z[j].any(axis=0)])
+        basis = _free(np.vstack([each[j] for each in upper]) / root_R if upper else None, root_R, Z[j])
         left, singular, Vt = np.linalg.svd(B @ basis)
         count = int((singular > RANK_TOLERANCE * np.sqrt((B * B).sum())).sum())
         turned = basis @ Vt.T
@@ -60,6 +62,16 @@ def white(problem: LevelProblem, U_above: Array, Z: Array) -> WhiteLevel:
     c = Q.T @ np.concatenate([e.ravel(), T.T @ effort])
     own = np.linalg.solve(F.T, T.T).T if T.size else T
     return WhiteLevel(np.concatenate([c, S.T @ effort]), np.hstack([own, S]) / np.tile(root_R, K)[:, None])
+
+
+def _free(rows: Array | None, root_R: Array, Z: Array) -> Array:
+    """An orthonormal basis of √R ∘ span Z, (n, d), from the rows (33) that leave it if none of them depends
+    on others: what R weighs far apart is far apart in Z."""
+    Z = Z[:, Z.any(axis=0)]
+    if rows is None or len(rows) + Z.shape[1] != len(root_R):
+        return np.linalg.qr(root_R[:, None] * Z)[0]
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.linalg.qr((rows / length).T, mode="complete")[0][:, len(rows) :]
 
 
 def _diagonal(blocks: list[Array]) -> Array:
