@@ -14,6 +14,10 @@ from himpc.tick.kernel.constants import RANK_TOLERANCE
 Array = NDArray[np.float64]
 
 
+_APART = 1e-6
+"""Singular values that are a smaller share of the one before belong to directions that rows do not fix."""
+
+
 class WhiteLevel(NamedTuple):
     """min ½‖y + c‖² over y, where U = U_{i−1} + P y at the knots that the level looks ahead.
 
@@ -65,13 +69,18 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
 
 
 def _free(rows: Array | None, root_R: Array, Z: Array) -> Array:
-    """An orthonormal basis of √R ∘ span Z, (n, d), from the rows (33) that leave it if none of them depends
-    on others: what R weighs far apart is far apart in Z."""
+    """An orthonormal basis of √R ∘ span Z, (n, d): where R weighs joints far apart it is taken from the rows
+    (33) that leave it, since in Z the digits of what is weighed less are gone."""
     Z = Z[:, Z.any(axis=0)]
-    if rows is None or len(rows) + Z.shape[1] != len(root_R):
-        return np.linalg.qr(root_R[:, None] * Z)[0]
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    return np.linalg.qr((rows / length).T, mode="complete")[0][:, len(rows) :]
+    rank = len(root_R) - Z.shape[1]
+    if rows is not None and len(rows) >= rank:
+        even = (rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), np.finfo(float).tiny)).T
+        if len(rows) == rank:
+            return np.linalg.qr(even, mode="complete")[0][:, rank:]
+        left, singular, _ = np.linalg.svd(even)
+        if singular[rank:].max(initial=0.0) < _APART * singular[rank - 1]:
+            return left[:, rank:]
+    return np.linalg.qr(root_R[:, None] * Z)[0]
 
 
 def _diagonal(blocks: list[Array]) -> Array:
