@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lu_factor, lu_solve, qr
+from scipy.linalg import qr, solve_triangular
 
 from himpc.cascade.level import ActiveRows, LevelProblem
 from himpc.limits.rows import Rows
@@ -100,6 +100,29 @@ def optimum(
     return None
 
 
+class _Corrector:
+    """Solves v + Aᵀe + Cᵀλ = r₁, A v − e = r₂, C v = r₃ in doubles, by QR factorisations: neither A nor C is
+    squared."""
+
+    def __init__(self, A: Array, C: Array) -> None:
+        self._A, self._count = A, len(C)
+        Q, R = np.linalg.qr(C.T, mode="complete")
+        self._R, self._held, self._free = R[: len(C)], Q[:, : len(C)], Q[:, len(C) :]
+        self._F = np.linalg.qr(np.vstack([A @ self._free, np.eye(self._free.shape[1])]), mode="r")
+
+    def solve(self, right: Array) -> Array:
+        """(v, e, λ) for (r₁, r₂, r₃)."""
+        d, k = self._A.shape[1], len(self._A)
+        r1, r2, r3 = right[:d], right[d : d + k], right[d + k :]
+        v = self._held @ solve_triangular(self._R, r3, trans="T") if self._count else np.zeros(d)
+        if self._free.shape[1]:
+            rest = self._free.T @ (r1 - v - self._A.T @ (self._A @ v - r2))
+            v = v + self._free @ solve_triangular(self._F, solve_triangular(self._F, rest, trans="T"))
+        e = self._A @ v - r2
+        press = self._held.T @ (r1 - v - self._A.T @ e)
+        return np.concatenate([v, e, solve_triangular(self._R, press) if self._count else press])
+
+
 class _System:
     """The linear conditions of one level."""
 
@@ -158,12 +181,7 @@ class _System:
         E = self._scaled_rows(row, joint)
         size = np.linalg.norm(E, axis=1)
         d, k, c = A.shape[1], len(A), len(E)
-        M = np.zeros((d + k + c, d + k + c))
-        M[:d, :d], M[:d, d : d + k], M[d : d + k, :d] = np.eye(d), A.T, A
-        M[d : d + k, d : d + k] = -np.eye(k)
-        M[d + k :, :d] = E / size[:, None]
-        M[:d, d + k :] = M[d + k :, :d].T
-        factor = lu_factor(M, check_finite=False)
+        solver = _Corrector(A, E / size[:, None])
         U, e, pull = self._before.copy(), fixed(np.zeros((K, k // K))), fixed(np.zeros(c))
         scale = np.concatenate([1.0 / np.tile(self._root_R, K), np.ones(k), 1.0 / size])
         last = math.inf
@@ -172,7 +190,7 @@ class _System:
             if not missing.any():
                 break
             most = np.abs(missing).max()
-            change = lu_solve(factor, missing, check_finite=False) * scale
+            change = solver.solve(missing) * scale
             if not np.isfinite(change).all() or not most < 1e3 * last:
                 return None
             last = min(last, most)
