@@ -18,7 +18,7 @@ _LEFT = 1e-12
 """A multiplier that is a smaller share of the largest one is what a solver left over."""
 _BEYOND = 1e-9
 """A row that is beyond its bound by no more is met."""
-_WRONG = 1e-9
+_WRONG = 1e-12
 """A multiplier that presses the wrong way by a smaller share of the largest one is none."""
 _ALONG = 1e-11
 """A row that is met at a smaller share of the way's length lies along it: it depends on the rows held."""
@@ -46,7 +46,7 @@ def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) 
         value = A @ x
         outside = np.where(side == 0, np.maximum(low - value, value - high), 0.0)
         if outside.max(initial=0.0) <= _BEYOND:
-            return replace(solution, x=x, multipliers=pull)
+            return replace(solution, x=x, multipliers=np.where(wrong > 0, 0.0, pull))
         row = int(outside.argmax())
         side[row] = 1.0 if value[row] > high[row] else -1.0
     return None
@@ -82,7 +82,7 @@ def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array)
         x, pull = _held(side, c, A, low, high)
         wrong = -side * pull
         if wrong.max(initial=0.0) <= _WRONG * np.abs(pull).max(initial=0.0):
-            return replace(solution, x=x, multipliers=pull, status="optimal")
+            return replace(solution, x=x, multipliers=np.where(wrong > 0, 0.0, pull), status="optimal")
         side[np.flatnonzero(wrong > 0)[0] if stuck > len(A) else wrong.argmax()] = 0.0
     return None
 

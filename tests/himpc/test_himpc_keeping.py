@@ -34,7 +34,8 @@ def place(compiled: Path) -> Iterator[Path]:
     yield compiled
     os.chown(file.parent, os.getuid(), -1)
     file.parent.chmod(0o700)
-    file.unlink(missing_ok=True)
+    for each in {file, *code_of(compiled)}:  # of a folder that is not trusted it goes elsewhere
+        each.unlink(missing_ok=True)
     file.touch(0o600)
     file.write_bytes(data)
 
