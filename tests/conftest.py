@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -14,6 +15,10 @@ from typing import TYPE_CHECKING, Any
 # Before NumPy is imported anywhere: the matrices are tiny, and threads only fight over the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# A job in the background inherits that Ctrl-C means nothing, and so would every program that a test starts.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import pytest
 from hypothesis import settings
@@ -72,7 +77,7 @@ def pytest_configure(config: pytest.Config) -> None:
     fresh clone the first run does it, and is kept for the test that compares it with the second."""
     if hasattr(config, "workerinput"):
         return
-    if not any(_ROOT.glob("himpc/**/__pycache__/*.nbi")) and "NUMBA_CACHE_DIR" not in os.environ:
+    if not any(_ROOT.glob("himpc/**/__pycache__/compiled/*.code")) and "NUMBA_CACHE_DIR" not in os.environ:
         file = Path(mkdtemp(), "first.npz")
         config.add_cleanup(lambda: rmtree(file.parent))
         config.stash[_COLD] = str(file), _run(file)

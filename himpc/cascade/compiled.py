@@ -4,20 +4,19 @@ compiled first, by a process of its own, see `compiler`."""
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from logging import getLogger
 from pathlib import Path
-from types import CellType, FunctionType
 from typing import Any
 
 import numpy.ma  # noqa: F401  (Numba imports it at the first call with an array, which would be a robot's first tick)
 from numba import boolean, float64, int64, intp, njit, types
-from numba.core import config, event
+from numba.core import event
 
 from himpc.cascade.compiler import compile_apart, compiles_here
+from himpc.cascade.keeping import Kept
 from himpc.cascade.loading import load
 from himpc.cascade.pieces import Piece, Whole
 
@@ -38,25 +37,6 @@ GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 
 Function = Callable[..., Any]
 
-
-def cached(**options: Any) -> Callable[[Function], Any]:
-    """A decorator that compiles with Numba's `options` and keeps the code on disk: beside the source, else in
-    the user's cache, else in a temporary folder, else not at all."""
-
-    def decorate(function: Function) -> Any:
-        try:
-            return njit(cache=True, **options)(function)
-        except RuntimeError:  # neither the installation nor the user's home can be written to
-            folder = _temporary_folder()
-        if folder is None:
-            return njit(**options)(function)
-        os.environ["NUMBA_CACHE_DIR"] = folder  # for children too
-        setattr(config, "CACHE_DIR", folder)  # noqa: B010  (Numba defines it from a table, unseen by checkers)
-        return njit(cache=True, **options)(function)
-
-    return decorate
-
-
 _ANY_ORDER = {"reassoc", "contract", "nsz"}
 """Sums may be taken in any order; NaN and infinity keep their meaning."""
 
@@ -72,22 +52,18 @@ def entry(*arguments: Any) -> Callable[[Function], Any]:
     Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
     that its compilation takes.
 
-    Numba takes a function on disk for current as long as its own file is unchanged. What a closure holds is
-    part of what it looks for, though: the function is given one with a digest of all files of its folder and
-    of the folders that pieces come from.
+    What is on disk is current as long as no file of its folder has changed, or of the folders that pieces
+    come from.
     """
 
     def compile_now(function: Function) -> Any:
-        code, digest = function.__code__, sha256()
+        digest = sha256()
         for folder in sorted(_folders(function)):
             for file in sorted(folder.glob("*.py")):
                 digest.update(file.read_bytes())
-        sources = CellType(digest.hexdigest())
-        stamped = FunctionType(
-            code.replace(co_freevars=("sources",)), function.__globals__, function.__name__, None, (sources,)
-        )
-        stamped.__module__, stamped.__qualname__ = function.__module__, function.__qualname__
-        return _compiled_now(cached(**_OPTIONS, pipeline_class=Whole)(stamped), arguments)
+        fast: Any = njit(**_OPTIONS, pipeline_class=Whole)(function)
+        fast._cache = Kept(Path(function.__code__.co_filename), function.__qualname__, digest.digest())
+        return _compiled_now(fast, arguments)
 
     return compile_now
 
@@ -100,45 +76,37 @@ def _folders(function: Function) -> set[Path]:
 
 
 def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
-    place, module = fast.stats.cache_path, fast.py_func.__module__
-    found = place is not None and load(fast, arguments)
-    if not found and place is not None and not compiles_here() and module != "__main__":
-        _FIRST_WORD.say()
-        with _one_at_a_time(place, "waiting"):
-            found = load(fast, arguments)  # somebody else may have compiled it meanwhile
-            if not found:
-                compile_apart(module, lambda name: event.end_event(_APART, name))
-                found = load(fast, arguments)
+    module = fast.py_func.__module__
+    found = load(fast, arguments)
     if not found:
-        with _one_at_a_time(place, "compiling"):
-            fast.compile(arguments)
+        place = fast.stats.cache_path
+        if not compiles_here() and module != "__main__" and fast._cache.has_room():
+            _FIRST_WORD.say()
+            with _one_at_a_time(place, "waiting"):
+                found = load(fast, arguments)  # somebody else may have compiled it meanwhile
+                if not found:
+                    compile_apart(module, lambda name: event.end_event(_APART, name))
+                    found = load(fast, arguments)
+        if not found:
+            with _one_at_a_time(place, "compiling"):
+                fast.compile(arguments)
     fast.disable_compile()
     return fast
-
-
-def _temporary_folder() -> str | None:
-    """For compiled code, nobody else's to write: what is in it will be run. None if there can be none."""
-    try:
-        folder = Path(tempfile.gettempdir(), f"himpc-lab-compiled-{os.getuid() if fcntl else 'user'}")
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
-        ours = not fcntl or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
-        if ours and not folder.is_symlink() and os.access(folder, os.W_OK):
-            return str(folder)
-        return tempfile.mkdtemp(prefix="himpc-lab-compiled-")
-    except OSError:
-        return None
 
 
 @contextmanager
 def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
     """Processes that need the same code wait for the first one, and then find it on disk."""
-    if fcntl is None or folder is None:
+    lock = None
+    if fcntl is not None and folder is not None:
+        with suppress(OSError):  # a full disk, say
+            lock = os.open(Path(folder, f"himpc-lab-{what}.lock"), os.O_WRONLY | os.O_CREAT, 0o600)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+    try:
         yield
-        return
-    with open(Path(folder, f"himpc-lab-{what}.lock"), "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
+    finally:
+        if lock is not None:
+            os.close(lock)
 
 
 class _FirstWord(event.Listener):

@@ -1,14 +1,17 @@
-"""The explicit route: all rows and the equality constraints (33) as printed; the compiled one's oracle."""
+"""The explicit route: every bound a row of a QP for a general solver; the compiled route's second opinion."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import ActiveRows, LevelProblem, Point
+from himpc.cascade.polish import descended, polished
+from himpc.cascade.white import WhiteLevel, white
 from himpc.limits.rows import Rows
 from himpc.qp import QPSolution, Solver, solve_qp
 
@@ -16,10 +19,10 @@ Array = NDArray[np.float64]
 
 _BINDING = 1e-9
 """N·m: a row closer than this to its bound is binding."""
-_ALONG = 1e-6
-"""A row of which this share lies in what RANK_TOLERANCE leaves to lower levels is rounding noise."""
-_ON_SUBSPACE = 1e-7
-"""N·m: how far a point may lie from the subspace that (33) leaves."""
+_NOISE = 1e-11
+"""A row of which no larger share is left by (33) is rounding noise: its joint is not free any more."""
+_ACCURATE = 1e-9
+"""Points that miss their optimality conditions by more are polished."""
 
 
 def solve_explicit(
@@ -31,14 +34,12 @@ def solve_explicit(
     solver: Solver,
     iterations: int | None = None,
 ) -> Point | None:
-    """Problem i over all N·n increments with every bound and every equality (33) handed to the solver.
+    """Problem i over all N·n increments, (32) or (34), with every bound handed to the solver.
 
-    Near a singularity the printed equality rows are dependent: active-set solvers may refuse them, and a
-    point that meets them to the tolerance may be far from their subspace. Next to it a row may be nothing but
-    rounding: level 1 of the straight planar arm feels one direction by 6e-12 of the other, which as a row of
-    its own would take that direction from level 2 for no reason (and moved the torque by 2.6 N·m). In both
-    cases the subspace that RANK_TOLERANCE leaves is described by orthonormal rows. Knots beyond the level's
-    own horizon keep the increments of the level above.
+    The QP is stated in the level's white coordinates, see `white`: its Hessian is the identity however far
+    weights and inertias are apart, (33) holds for all of them, and rows have length one. A point whose
+    residual is not all but nothing is solved for once more from the rows that it says bind, see `polished`.
+    Knots beyond the level's own horizon keep the increments of the level above.
 
     Args:
         problem: the level's data.
@@ -50,31 +51,60 @@ def solve_explicit(
         iterations: that one attempt may take, see `solve_qp`; None: as many as it likes.
 
     Returns:
-        the optimum, or None if the solver gave no point within the KKT tolerance.
+        the optimum, or None if no solver gave a point that is within `KKT_TOLERANCE` of its optimality
+        conditions: in N·m for every increment, or as a share of it where it is larger than 1 N·m.
     """
-    N, n = U_above.shape
-    H, f = quadratic(problem, n)
-    bounds = _every_joint(rows.L.tobytes(), rows.L.shape, n)
+    n = U_above.shape[1]
+    level = white(problem, U_above, [B for B, _ in above], Z)
+    at = (rows.L @ U_above).ravel()
     lower, upper = rows.lower.ravel(), rows.upper.ravel()
     if above:
         # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
-        at = bounds @ U_above.ravel()
         lower, upper = np.minimum(lower, at), np.maximum(upper, at)
-    tail = np.eye(N * n)[problem.knots * n :]
-    for equalities in _equalities(above, U_above, Z):
-        E = np.vstack([equalities, tail])
-        target = E @ U_above.ravel()
-        A, low, high = np.vstack([bounds, E]), np.r_[lower, target], np.r_[upper, target]
-        solution = solve_qp(H, f, A, low, high, solver, iterations)
-        if solution.solved and _off_subspace(solution.x.reshape(N, n) - U_above, Z) <= _ON_SUBSPACE:
-            return _point(solution, rows, lower, upper, bounds, (N, n))
-    return None
+    every = _every_joint(rows.L.tobytes(), rows.L.shape, n)[:, : problem.knots * n]
+    A = every @ level.P
+    length = np.sqrt(np.einsum("ij,ij->i", A, A))
+    reach = every @ np.tile(1.0 / np.sqrt(problem.R), problem.knots)
+    kept = np.flatnonzero((length > _NOISE * reach) & (np.isfinite(lower) | np.isfinite(upper)))
+    length = length[kept]
+    A, low, high = A[kept] / length[:, None], (lower - at)[kept] / length, (upper - at)[kept] / length
+    found = solve_qp(np.eye(level.c.size), level.c, A, low, high, solver, iterations)
+
+    def judged(one: QPSolution) -> QPSolution:
+        return _judged(one, level, A, low, high, length, U_above)
+
+    best = judged(found)
+    for again in (polished, descended if iterations is None else None):
+        if again is not None and best.kkt_residual > _ACCURATE:
+            better = again(best, level.c, A, low, high)
+            best = best if better is None else min(best, judged(better), key=lambda one: one.kkt_residual)
+    if not best.solved:
+        return None
+    U = U_above.copy()
+    U[: problem.knots] += (level.P @ best.x).reshape(problem.knots, n)
+    multipliers = np.zeros(at.size)
+    multipliers[kept] = best.multipliers / length
+    return _point(best, U, multipliers, rows, lower, upper)
 
 
-def _off_subspace(change: Array, Z: Array) -> float:
-    """How far a change of the increments leaves span Z at any knot, N·m."""
-    column = change[:, :, None]
-    return float(np.abs(column - Z @ (Z.transpose(0, 2, 1) @ column)).max())
+def _judged(
+    solution: QPSolution, level: WhiteLevel, A: Array, low: Array, high: Array, length: Array, U_above: Array
+) -> QPSolution:
+    """The solution with the residual that counts: how far a Newton step on the rows that press moves each
+    increment, as a share of 1 N·m or of the increment, and how far rows are beyond their bounds, N·m."""
+    x, multipliers = solution.x, solution.multipliers
+    if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
+        return replace(solution, kkt_residual=float("inf"))
+    gradient, value = x + level.c + A.T @ multipliers, A @ x
+    held = multipliers != 0.0
+    missing = np.where(multipliers > 0, high, low)[held] - value[held]
+    # Of the gradient that is left, what presses on the rows only changes their multipliers.
+    step = np.linalg.lstsq(A[held], missing + A[held] @ gradient)[0] - gradient
+    size = np.maximum(1.0, np.abs(U_above.ravel()[: len(level.P)] + level.P @ x))
+    moved = float((np.abs(level.P @ step) / size).max(initial=0.0))
+    outside = float((np.maximum(low - value, value - high) * length).max(initial=0.0))
+    residual = max(moved, outside)
+    return replace(solution, kkt_residual=residual if residual >= 0 else float("inf"))
 
 
 def quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
@@ -90,52 +120,16 @@ def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
     return np.asarray(np.kron(np.frombuffer(L).reshape(shape), np.eye(n)), np.float64)
 
 
-def _equalities(above: Sequence[tuple[Array, Array]], U_above: Array, Z: Array) -> Iterator[Array]:
-    """(33) as printed unless rows of it are noise; then, or if that is refused, by orthonormal rows."""
-    N, n = U_above.shape
-    if not above:
-        yield np.empty((0, N * n))
-        return
-    if not any(_binds(B, Z) for B, _ in above):
-        yield np.vstack([_block_diagonal(B) for B, _ in above])
-    fixed = []
-    for j in range(N):
-        left, singular, _ = np.linalg.svd(np.eye(n) - Z[j] @ Z[j].T)
-        fixed.append(left[:, singular > 0.5].T)
-    rows = np.zeros((sum(len(block) for block in fixed), N * n))
-    start = 0
-    for j, block in enumerate(fixed):
-        rows[start : start + len(block), j * n : (j + 1) * n] = block
-        start += len(block)
-    yield rows
-
-
-def _binds(B: Array, Z: Array) -> bool:
-    """Whether a row, however short, points along what is left to lower levels."""
-    length = np.sqrt((B * B).sum(axis=2, keepdims=True))
-    return bool((np.abs(B @ Z) > _ALONG * length).any())
-
-
-def _block_diagonal(B: Array) -> Array:
-    N, m, n = B.shape
-    blocks = np.zeros((N, m, N, n))
-    index = np.arange(N)
-    blocks[index, :, index] = B
-    return blocks.reshape(N * m, N * n)
-
-
 def _point(
-    solution: QPSolution, rows: Rows, lower: Array, upper: Array, bounds: Array, shape: tuple[int, int]
+    solution: QPSolution, U: Array, multipliers: Array, rows: Rows, lower: Array, upper: Array
 ) -> Point:
-    count = bounds.shape[0]
-    multipliers = solution.multipliers[:count]
-    value = bounds @ solution.x
+    value = (rows.L @ U).ravel()
     slack = np.where(multipliers > 0, upper - value, value - lower)
     # An interior-point-like solver leaves tiny multipliers everywhere: binding means both.
     active = np.flatnonzero((np.abs(multipliers) > _BINDING) & (slack < 1e3 * _BINDING))
-    row, joint = np.divmod(active, shape[1])
+    row, joint = np.divmod(active, U.shape[1])
     return Point(
-        solution.x.reshape(shape),
+        U,
         ActiveRows(row, joint, multipliers[active], slack[active]),
         solution.kkt_residual,
         solution.status,

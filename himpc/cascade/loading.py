@@ -16,13 +16,10 @@ def load(function: Any, arguments: tuple[Any, ...]) -> bool:
     """Whether a function for arguments of these types was on disk. If so, it is now called for them."""
     with global_compiler_lock:
         rtsys.initialize(function.targetctx)  # what machine code calls
-        cache = function._cache
-        with cache._guard_against_spurious_io_errors():
-            found = cache._load_overload(arguments, function.targetctx)
-            if found is None:
-                return False
-            function._cache_hits[arguments] += 1
-            function.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
-            function.add_overload(found)
-            return True
-    return False
+        found = function._cache.load_overload(arguments, function.targetctx)
+        if found is None:
+            return False
+        function._cache_hits[arguments] += 1
+        function.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+        function.add_overload(found)
+        return True

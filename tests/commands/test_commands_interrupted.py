@@ -165,3 +165,43 @@ def test_ctrl_c_while_the_first_modules_load(start: str) -> None:
         check=False,
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def deaf() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def test_a_job_in_the_background_goes_on() -> None:
+    """Who starts a program so that Ctrl-C is not meant for it (`nohup`, `&` in a script) has it so."""
+    code = """
+import os, signal
+from app.commands.interrupts import interruptible
+with interruptible():
+    os.kill(os.getpid(), signal.SIGINT)
+print("went on")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+        check=False,
+        preexec_fn=deaf,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "went on\n", "")
+
+
+def test_tests_in_the_background_start_programs_as_a_terminal_does() -> None:
+    """They inherit that Ctrl-C means nothing, the programs that they test must not."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-n", "0", "-k", "first_modules_load", __file__],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+        check=False,
+        preexec_fn=deaf,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "2 passed" in done.stdout

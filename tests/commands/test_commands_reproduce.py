@@ -120,8 +120,6 @@ def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        # A job in the background inherits that Ctrl-C means nothing; a terminal's does not.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     give_up = time.monotonic() + 120
     while not cells(part) and time.monotonic() < give_up:

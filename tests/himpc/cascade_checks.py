@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from problems import Hierarchy, kkt_violation
 
-from himpc.cascade.level import LevelSolution
+from benchmarks.exact import Exact, optimum
+from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.limits import Rows
 
 Array = NDArray[np.float64]
@@ -39,3 +40,29 @@ def assert_agree(one: list[LevelSolution], other: list[LevelSolution], tolerance
 
 def largest_difference(one: list[LevelSolution], other: list[LevelSolution]) -> float:
     return max(float(np.abs(a.U - b.U).max()) for a, b in zip(one, other, strict=True))
+
+
+def exact_increments(hierarchy: Hierarchy, *guesses: list[LevelSolution]) -> list[Array]:
+    """The increments of every level to the last digit, by `benchmarks.exact`: it never gives up where a
+    guess is nearly right, and whether one is right does not depend on who made it."""
+    above: list[tuple[LevelProblem, Exact]] = []
+    for place, problem in enumerate(hierarchy.problems):
+        found = None
+        for active in (*(guess[place].active for guess in guesses), NO_ROWS):
+            found = found or optimum(problem, hierarchy.rows, above, active)
+        assert found is not None, f"no guess leads to the optimum of level {place + 1}"
+        above.append((problem, found))
+    return [exact.U for _, exact in above]
+
+
+def off(solutions: list[LevelSolution], exact: list[Array]) -> float:
+    """How far solutions are from the optima, N·m."""
+    return max(float(np.abs(one.U - U).max()) for one, U in zip(solutions, exact, strict=True))
+
+
+def second_opinion(hierarchy: Hierarchy, compiled: list[LevelSolution]) -> list[Array]:
+    """The optima by the explicit route; where it gives up on one, which it may, by `exact_increments`."""
+    explicit = hierarchy.solve("explicit")
+    if all(solution.rung == "solve" for solution in explicit):
+        return [solution.U for solution in explicit]
+    return exact_increments(hierarchy, compiled, explicit)

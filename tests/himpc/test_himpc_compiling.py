@@ -7,6 +7,7 @@ import os
 import stat
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -56,8 +57,17 @@ def like_anybody() -> None:
         assert ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) == 0
 
 
-def start(folder: Path, script: str = LOAD, **environment: str) -> subprocess.Popen[str]:
-    """Somebody who may read everything and write nothing but to a temporary folder of the test."""
+def start(
+    folder: Path, script: str = LOAD, before: Callable[[], None] | None = None, **environment: str
+) -> subprocess.Popen[str]:
+    """Somebody who may read everything and write nothing but to a temporary folder of the test; `before`:
+    what is done first in that process."""
+
+    def prepare() -> None:
+        like_anybody()
+        if before is not None:
+            before()
+
     install, home, temporary = folder / "install", folder / "home", folder / "tmp"
     if not install.exists():
         for each in (install, home, temporary):
@@ -79,7 +89,7 @@ def start(folder: Path, script: str = LOAD, **environment: str) -> subprocess.Po
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=like_anybody,
+        preexec_fn=prepare,
     )
 
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 import pytest
-from cascade_checks import assert_agree, assert_sound
-from hypothesis import assume, given, settings
+from cascade_checks import assert_agree, assert_sound, off, second_opinion
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy, shifted
@@ -165,9 +165,7 @@ def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels
     later = a_tick_later(hierarchy, seed)
     solutions = later.solve(previous=before)
     assert_sound(later, solutions)
-    explicit = later.solve("explicit")
-    assume(all(solution.rung == "solve" and solution.kkt_residual <= 1e-9 for solution in explicit))
-    assert_agree(solutions, explicit)
+    assert off(solutions, second_opinion(later, solutions)) <= 1e-6
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -1,0 +1,192 @@
+"""Both routes against the optimum to many digits: random stacks on every robot of the catalog.
+
+    python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30] [--json -]
+
+A stack is of one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
+acceleration), horizons and limits, at a random state and with random targets. Each route solves what the
+controller would at that tick, and `benchmarks.exact` says where the optimum is. A row per robot: how often a
+route gave no point where there is an optimum, and how far its points are from the optimum, N·m.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.every_task import entry, scene_of
+from benchmarks.exact import Exact, optimum
+from himpc import HIMPC
+from himpc.cascade.cascade import solve_cascade
+from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
+from himpc.catalog import Route
+from himpc.limits import Rows, build_rows
+from himpc.limits.rows import least_slack
+from himpc.prediction.joint import JointState
+from himpc.references import Outlook
+from himpc.tasks import KINDS
+from lessons.scenes.catalog import prepared
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import assignment
+from robots import CATALOG
+
+Array = NDArray[np.float64]
+ROUTES: tuple[Route, ...] = ("compiled", "explicit")
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """What a controller solves at one tick."""
+
+    robot: str
+    seed: int
+    problems: list[LevelProblem]
+    rows: Rows
+    damping: LevelProblem
+
+    def solve(self, route: Route) -> list[LevelSolution]:
+        return solve_cascade(self.problems, self.rows, {}, lambda: self.damping, route, "daqp")
+
+
+@dataclass(frozen=True)
+class Found:
+    """How a route did at one level: bounds that hold the optimum, and how far the route's point is from it,
+    N·m; None where the route gave none."""
+
+    robot: str
+    seed: int
+    level: int
+    horizon: int
+    active: int
+    compiled: float | None
+    explicit: float | None
+
+
+def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
+    """A stack that can be solved; None if at this state no torque keeps to all limits."""
+    rng = np.random.default_rng(seed)
+    scene = scene_of(robot)
+    damping = "damping"
+    kinds = [kind for kind in KINDS if kind != damping]
+    levels = int(rng.integers(1, 5))
+    stack = [
+        entry(str(rng.choice(kinds)), scene)
+        | {
+            "name": f"x{place}",
+            "Q": float(10.0 ** rng.uniform(0.0, 5.0)),
+            "R": float(10.0 ** rng.uniform(-1.0, 2.0)),
+            "K_p": float(10.0 ** rng.uniform(0.0, 2.5)),
+            "K_v": float(10.0 ** rng.uniform(0.0, 1.5)),
+        }
+        for place in range(levels)
+    ]
+    settings = [
+        assignment("stack", stack),
+        assignment("horizon", int(rng.integers(1, longest + 1))),
+        assignment("R_on", str(rng.choice(["torque", "acceleration"]))),
+        assignment("limits.velocity_scale", float(rng.choice([1.0, 0.3, 0.1]))),
+        assignment("limits.torque_scale", float(rng.choice([1.0, 0.5]))),
+    ]
+    session = TorqueSession(prepared(scene, "himpc", settings))
+    controller = session.controller
+    assert isinstance(controller, HIMPC)
+    own, model = session.settings, session.robot
+    narrow = np.minimum(model.v_limit, 1e3) * own.limits.velocity_scale
+    q = session.plant.q + rng.normal(0.0, 0.1, model.n)
+    v = rng.uniform(-0.8, 0.8, model.n) * narrow
+    plan = controller.step(q, v, Outlook(session.references, 0.0, own.T_s, own.horizon))
+    problems = controller.problems
+    state = JointState(q, v, np.zeros(model.n))
+    rows = build_rows(state, plan.tau_0, np.array(own.M_bar), own.limits, plan.limits, own.horizon, own.T_s)
+    if not problems or least_slack(rows).any():
+        return None
+    return Stack(robot, seed, problems, rows, problems[-1])
+
+
+def judged(stack: Stack) -> list[Found] | None:
+    """A row per level; None where the optimum was not found out."""
+    solutions = {route: stack.solve(route) for route in ROUTES}
+    above: list[tuple[LevelProblem, Exact]] = []
+    found = []
+    right = dict.fromkeys(ROUTES, True)
+    for place, problem in enumerate(stack.problems):
+        points = {route: solutions[route][place] for route in ROUTES}
+        best = None
+        for guess in (points["explicit"].active, points["compiled"].active, NO_ROWS):
+            best = best or optimum(problem, stack.rows, above, guess)
+        if best is None:
+            return None
+        for route in ROUTES:  # below a level without a point there is another problem
+            right[route] = right[route] and points[route].rung == "solve"
+        errors = [float(np.abs(points[route].U - best.U).max()) if right[route] else None for route in ROUTES]
+        found.append(
+            Found(stack.robot, stack.seed, place + 1, len(problem.B), best.active, errors[0], errors[1])
+        )
+        above.append((problem, best))
+    return found
+
+
+def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iterator[Stack]:
+    """So many of them, robot by robot in turn."""
+    done = 0
+    while done < count:
+        stack = random_stack(robots[done % len(robots)], seed, longest)
+        seed += 1
+        if stack is not None:
+            done += 1
+            yield stack
+
+
+def table(found: list[Found]) -> str:
+    """A row per robot, in Markdown."""
+    lines = [
+        "| robot | levels, held by bounds | compiled: none, worst error | explicit: none, worst error |",
+        "|---|--:|--:|--:|",
+    ]
+    for robot in [*dict.fromkeys(each.robot for each in found), "all"]:
+        rows = [each for each in found if robot in (each.robot, "all")]
+        cells = []
+        for route in ROUTES:
+            errors = [error for each in rows if (error := getattr(each, route)) is not None]
+            cells.append(f"{len(rows) - len(errors)}, {max(errors, default=0.0):.1e}")
+        held = sum(each.active > 0 for each in rows)
+        lines.append(f"| {robot} | {len(rows)}, {held} | {cells[0]} | {cells[1]} |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--stacks", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--longest", type=int, default=30)
+    parser.add_argument("--robot", choices=CATALOG, default=None)
+    parser.add_argument("--json", default=None)
+    given = parser.parse_args()
+    robots = tuple(CATALOG) if given.robot is None else (given.robot,)
+    found, unknown = [], 0
+    for stack in stacks(given.stacks, given.seed, given.longest, robots):
+        rows = judged(stack)
+        if rows is None:
+            unknown += 1
+            print(f"{stack.robot} --seed {stack.seed}: no optimum found out", file=sys.stderr)
+            continue
+        found += rows
+        for each in rows:
+            if any(error is None or error > 1e-6 for error in (each.compiled, each.explicit)):
+                print(each, file=sys.stderr, flush=True)
+    print(table(found))
+    print(f"{given.stacks} stacks, of {unknown} the optimum was not found out", file=sys.stderr)
+    if given.json is not None:
+        text = json.dumps([asdict(each) for each in found], indent=1)
+        sys.stdout.write(text) if given.json == "-" else Path(given.json).write_text(text)
+    return 1 if unknown else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

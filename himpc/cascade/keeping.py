@@ -1,0 +1,172 @@
+"""Where compiled functions are kept: a file each, in a folder that is nobody else's to write.
+
+Numba's own cache trusts whatever lies in its folder: a file that is cut short or damaged ends every start,
+one that somebody else wrote is run, a full disk ends the program. Here a file begins with a digest of the
+rest, and with what it was compiled from and for; what is not whole, not ours or not of these sources is
+compiled anew and replaced, and what cannot be written is used from memory.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numba
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+_POSIX = os.name == "posix"
+_PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+"""No link to elsewhere, and no line ends changed."""
+_ROOM = 8 << 20
+"""Bytes that must fit beside what is kept already: more than all compiled code takes."""
+_FOLDER = "NUMBA_CACHE_DIR"
+"""In the environment: where to keep it instead."""
+
+
+class Kept:
+    """What Numba asks for one function's code; the folders in which it may be are tried in order.
+
+    Args:
+        source: the file that the function stands in.
+        name: the function's.
+        digest: of all that its code depends on.
+    """
+
+    def __init__(self, source: Path, name: str, digest: bytes) -> None:
+        self._source, self._name, self._digest = source.resolve(), name, digest
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder in which code is put; None if there is none."""
+        return next((str(folder) for folder in self._folders(make=True)), None)
+
+    def has_room(self) -> bool:
+        """Whether code can be written here."""
+        return any(_written(folder / "room", bytes(_ROOM), keep=False) for folder in self._folders(make=True))
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The compiled function for these types; None if it is not there, whole, ours and up to date."""
+        name, made_for = self._file(signature, context.codegen())
+        for folder in self._folders(make=False):
+            body = _read(folder / name)
+            if body is not None and body.startswith(made_for):
+                with suppress(Exception):  # whatever a pickle of another build may raise
+                    return CompileResult._rebuild(context, *pickle.loads(body[len(made_for) :]))
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keeps a compiled function in the first folder that takes it, if any does."""
+        if result.library.has_dynamic_globals or any(not each.can_cache for each in result.lifted):
+            return
+        name, made_for = self._file(signature, result.codegen)
+        body = made_for + dumps(result._reduce())
+        for folder in self._folders(make=True):
+            if _written(folder / name, sha256(body).digest() + body):
+                return
+
+    def enable(self) -> None:
+        """It is."""
+
+    def disable(self) -> None:
+        """Numba's word for not looking here; nobody here says it."""
+
+    def flush(self) -> None:
+        """Nothing waits to be written."""
+
+    def _file(self, signature: Any, codegen: Any) -> tuple[str, bytes]:
+        """The name of the file with the code for these types and this processor, and what it begins with."""
+        target = repr((signature, codegen.magic_tuple())).encode()
+        version = f"{numba.__version__} {sys.version}".encode()
+        made_for = sha256(b"\0".join((self._digest, target, version))).digest()
+        return f"{self._source.stem}.{self._name}-{sha256(target + version).hexdigest()[:16]}.code", made_for
+
+    def _folders(self, make: bool) -> Iterator[Path]:
+        """Folders that may hold it and are nobody else's to write, the one to write to first: what the
+        environment names, else one beside the source, else the user's cache; else a temporary one."""
+        own = f"{self._source.parent.name}-{sha256(bytes(self._source.parent)).hexdigest()[:16]}"
+        named = os.environ.get(_FOLDER)
+        if named:
+            chains = [(Path(named, f"himpc-lab-{own}"),)]
+        else:
+            user = _users_cache() / "himpc-lab"
+            chains = [(self._source.parent / "__pycache__" / "compiled",), (user, user / own)]
+        shared = Path(tempfile.gettempdir(), f"himpc-lab-compiled-{os.getuid() if _POSIX else 'user'}")
+        none = True
+        for chain in (*chains, (shared, shared / own)):
+            if make:
+                _make(chain[-1], above=chain[0] != shared)
+            if all(map(_ours, chain)) and (not make or os.access(chain[-1], os.W_OK)):
+                none = False
+                yield chain[-1]
+        if make and none and not named:
+            with suppress(OSError):
+                # For children, too: they find there what this process puts there.
+                os.environ[_FOLDER] = tempfile.mkdtemp(prefix="himpc-lab-compiled-")
+                yield from self._folders(make)
+
+
+def _users_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or "~\\AppData\\Local").expanduser()
+    if sys.platform == "darwin":
+        return Path("~/Library/Caches").expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+
+
+def _make(folder: Path, above: bool) -> None:
+    """Makes a folder for this user alone, if it can; `above`: with whatever is missing above its parent."""
+    missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
+    with suppress(OSError):
+        for each in reversed(missing if above else missing[:2]):
+            each.mkdir(mode=0o700)
+
+
+def _ours(folder: Path) -> bool:
+    """Whether a folder is there, belongs to this user and can be written by nobody else."""
+    try:
+        found = folder.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(found.st_mode) and _safe(found)
+
+
+def _safe(found: os.stat_result) -> bool:
+    return not _POSIX or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+
+
+def _read(file: Path) -> bytes | None:
+    """What stands in a file after the digest; None if it is not there, not ours or not whole."""
+    try:
+        with open(os.open(file, os.O_RDONLY | _PLAIN), "rb") as stream:
+            found = os.fstat(stream.fileno())
+            data = stream.read() if stat.S_ISREG(found.st_mode) and _safe(found) else b""
+    except OSError:
+        return None
+    digest, body = data[:32], data[32:]
+    return body if sha256(body).digest() == digest else None
+
+
+def _written(file: Path, data: bytes, keep: bool = True) -> bool:
+    """Whether a file could be written, whole or not at all; others may neither read nor write it."""
+    part = file.with_name(f".{file.name}.{uuid4().hex}")
+    try:
+        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN, 0o600), "wb") as stream:
+            stream.write(data)
+        if keep:
+            os.replace(part, file)
+        return True
+    except OSError:
+        return False
+    finally:
+        with suppress(OSError):
+            os.unlink(part)

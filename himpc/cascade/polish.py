@@ -1,0 +1,100 @@
+"""The optimum of min ½‖x + c‖² subject to low ≤ A x ≤ high, rows of length one, where a solver leaves off:
+from a point that is nearly one, or from any point that the rows admit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.qp import QPSolution
+
+Array = NDArray[np.float64]
+
+_NEAR = 1e-3
+"""A point with a larger residual says nothing of which rows bind."""
+_LEFT = 1e-12
+"""A multiplier that is a smaller share of the largest one is what a solver left over."""
+_BEYOND = 1e-9
+"""A row that is beyond its bound by no more is met."""
+_WRONG = 1e-12
+"""A multiplier that presses the wrong way by a smaller share of the largest one is none."""
+_ALONG = 1e-11
+"""A row that is met at a smaller share of the way's length lies along it: it depends on the rows held."""
+_STILL = 1e-9
+"""A way that is a smaller share of the optimum without rows has no length."""
+_CHANGES = 30
+"""How many rows may be taken or given back one by one, beside those that a solver named."""
+
+
+def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
+    """From the rows that a solver's point says bind; None where it says nothing, or where these rows and few
+    others do not lead to the optimum."""
+    multipliers = solution.multipliers
+    if not (np.isfinite(multipliers).all() and solution.kkt_residual <= _NEAR):
+        return None
+    side = np.sign(multipliers) * (np.abs(multipliers) > _LEFT * np.abs(multipliers).max(initial=0.0))
+    for _ in range(_CHANGES):
+        if not np.isfinite(np.where(side > 0, high, low)[side != 0]).all():
+            return None
+        x, pull = _held(side, c, A, low, high)
+        wrong = -side * pull
+        if wrong.max(initial=0.0) > _WRONG * np.abs(pull).max(initial=0.0):
+            side[wrong.argmax()] = 0.0
+            continue
+        value = A @ x
+        outside = np.where(side == 0, np.maximum(low - value, value - high), 0.0)
+        if outside.max(initial=0.0) <= _BEYOND:
+            return replace(solution, x=x, multipliers=np.where(wrong > 0, 0.0, pull))
+        row = int(outside.argmax())
+        side[row] = 1.0 if value[row] > high[row] else -1.0
+    return None
+
+
+def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
+    """From x = 0, by the primal active-set method; None if the rows do not admit it.
+
+    Where they admit hardly another point, as below a level that has used up nearly all freedom, a solver that
+    looks for one from outside takes rounding for a contradiction. A row that blocks the way depends on none
+    of those held; after steps of no length the first row in order is taken or given back (Bland), so no set
+    of rows comes twice.
+    """
+    if not ((low <= 0.0) & (high >= 0.0)).all():
+        return None
+    x, side, stuck = np.zeros_like(c), np.zeros(len(A)), 0
+    for _ in range(10 * len(A)):
+        held = np.flatnonzero(side)
+        way = -c - x
+        way = way - np.linalg.lstsq(A[held], A[held] @ way)[0] if held.size else way
+        far = np.abs(way).max(initial=0.0)
+        rate = A @ way
+        moving = (side == 0) & (np.abs(rate) > _ALONG * far) & (far > _STILL * (1.0 + np.abs(c).max()))
+        room = np.full(len(A), np.inf)
+        room[moving] = (np.where(rate > 0, high, low) - A @ x)[moving] / rate[moving]
+        step = min(1.0, float(np.maximum(room, 0.0).min(initial=np.inf)))
+        x = x + step * way
+        stuck = 0 if step > 0.0 else stuck + 1
+        if step < 1.0:
+            row = int(np.flatnonzero(room <= step)[0] if stuck > len(A) else room.argmin())
+            side[row] = np.sign(rate[row])
+            continue
+        x, pull = _held(side, c, A, low, high)
+        wrong = -side * pull
+        if wrong.max(initial=0.0) <= _WRONG * np.abs(pull).max(initial=0.0):
+            return replace(solution, x=x, multipliers=np.where(wrong > 0, 0.0, pull), status="optimal")
+        side[np.flatnonzero(wrong > 0)[0] if stuck > len(A) else wrong.argmax()] = 0.0
+    return None
+
+
+def _held(side: Array, c: Array, A: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The optimum where rows are held at their upper (side 1) or lower (−1) bounds, and all multipliers."""
+    held, pull = np.flatnonzero(side), np.zeros(len(A))
+    if not held.size:
+        return -c, pull
+    rows, bound = A[held], np.where(side > 0, high, low)[held]
+    x = -c
+    for _ in range(2):  # the second time takes away the first one's rounding
+        x = x + np.linalg.lstsq(rows, bound - rows @ x)[0]
+    pull[held] = np.linalg.lstsq(rows.T, -c - x)[0]
+    return x, pull

@@ -1,0 +1,93 @@
+"""A level's problem in white coordinates: its Hessian is the identity, and (33) holds for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import LevelProblem
+from himpc.tick.kernel.constants import RANK_TOLERANCE
+
+Array = NDArray[np.float64]
+
+
+_APART = 1e-6
+"""Singular values that are a smaller share of the one before belong to directions that rows do not fix."""
+
+
+class WhiteLevel(NamedTuple):
+    """min ½‖y + c‖² over y, where U = U_{i−1} + P y at the knots that the level looks ahead.
+
+    Attributes:
+        c: (d,), minus the optimum without bounds.
+        P: (K·n, d), N·m per unit of y.
+    """
+
+    c: Array
+    P: Array
+
+
+def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Array) -> WhiteLevel:
+    """Problem i, (32) or (34), from its least-squares form ‖Q^½ e‖² + ‖R^½ U‖².
+
+    H = GᵀQG + R is never formed: where weights or inertias are far apart its condition is 10¹⁷ and R is lost
+    in its rounding. Instead, knot by knot, √R ∘ U is turned into directions that the level feels and those
+    that it does not (by less than RANK_TOLERANCE of the size of its rows: they are left to lower levels, and
+    only bounds need them here); a QR factorisation of what is felt makes the rest of it.
+
+    Args:
+        problem: the level's data.
+        U_above: U_{i−1}, (N, n).
+        upper: B_p of every level above, (N, m_p, n).
+        Z: orthonormal bases of what (33) leaves free, (N, n, d); surplus columns are zero.
+    """
+    K, m = problem.knots, problem.B.shape[1]
+    root_R = np.sqrt(problem.R)
+    felt, unfelt = [], []
+    effect = []
+    for j in range(K):
+        B = problem.B[j] / root_R
+        basis = _free(np.vstack([each[j] for each in upper]) / root_R if upper else None, root_R, Z[j])
+        left, singular, Vt = np.linalg.svd(B @ basis)
+        count = int((singular > RANK_TOLERANCE * np.sqrt((B * B).sum())).sum())
+        turned = basis @ Vt.T
+        felt.append(turned[:, :count])
+        unfelt.append(turned[:, count:])
+        weighted = problem.root_Q * problem.C[:K, :, j]
+        effect.append(weighted[:, :, None] * (left[:, :count] * singular[:count]))
+    T, S = _diagonal(felt), _diagonal(unfelt)
+    effort = (root_R * U_above[:K]).ravel()
+    e = problem.root_Q * problem.residual(U_above)[:K]
+    G = np.concatenate(effect, axis=2).reshape(K * m, T.shape[1])
+    Q, F = np.linalg.qr(np.vstack([G, np.eye(T.shape[1])]))
+    c = Q.T @ np.concatenate([e.ravel(), T.T @ effort])
+    own = np.linalg.solve(F.T, T.T).T if T.size else T
+    return WhiteLevel(np.concatenate([c, S.T @ effort]), np.hstack([own, S]) / np.tile(root_R, K)[:, None])
+
+
+def _free(rows: Array | None, root_R: Array, Z: Array) -> Array:
+    """An orthonormal basis of √R ∘ span Z, (n, d): where R weighs joints far apart it is taken from the rows
+    (33) that leave it, since in Z the digits of what is weighed less are gone."""
+    Z = Z[:, Z.any(axis=0)]
+    rank = len(root_R) - Z.shape[1]
+    if rows is not None and len(rows) >= rank:
+        even = (rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), np.finfo(float).tiny)).T
+        if len(rows) == rank:
+            return np.linalg.qr(even, mode="complete")[0][:, rank:]
+        left, singular, _ = np.linalg.svd(even)
+        if singular[rank:].max(initial=0.0) < _APART * singular[rank - 1]:
+            return left[:, rank:]
+    return np.linalg.qr(root_R[:, None] * Z)[0]
+
+
+def _diagonal(blocks: list[Array]) -> Array:
+    """Blocks (n, d_j) along the diagonal of a matrix."""
+    rows = np.cumsum([0, *(block.shape[0] for block in blocks)])
+    columns = np.cumsum([0, *(block.shape[1] for block in blocks)])
+    matrix = np.zeros((rows[-1], columns[-1]))
+    for j, block in enumerate(blocks):
+        matrix[rows[j] : rows[j + 1], columns[j] : columns[j + 1]] = block
+    return matrix
