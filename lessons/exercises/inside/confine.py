@@ -91,10 +91,11 @@ def _hidden(path: Path) -> bool:
     return name in (*LAB, "site-packages", "dist-packages") or name.startswith(("python", "tests"))
 
 
-def confine() -> tuple[str, ...]:
-    """Gives up files, the network and other processes for good. Returns what of the system sees to it."""
+def confine(places: Sequence[Path]) -> tuple[str, ...]:
+    """Gives up files, but for reading in some places, the network and other processes for good. Returns what
+    of the system sees to it."""
     calls = _calls()  # before Landlock: loading it looks for a library
-    steps = (("Landlock", partial(_files, readable())), ("seccomp", calls))
+    steps = (("Landlock", partial(_files, places)), ("seccomp", calls))
     return tuple(name for name, step in steps if step())
 
 
@@ -109,6 +110,8 @@ def _files(places: Sequence[Path]) -> bool:
         for path in places:
             reading = AccessFs.READ_FILE | AccessFs.READ_DIR if path.is_dir() else AccessFs.READ_FILE
             rules.add_path_rule(path, access=reading)
+        for folder in filter(os.path.isdir, sys.path):
+            rules.add_path_rule(folder, access=AccessFs.READ_DIR)  # an import looks what there is
         rules.apply()
     except Exception:  # each kernel, container and version has reasons of its own
         return False
@@ -168,22 +171,24 @@ def hide_the_lab() -> None:
     sys.meta_path.insert(0, _Hidden())
 
 
-def refuse(refused: Refused) -> None:
+def refuse(places: Sequence[Path], refused: Refused) -> None:
     """From now on Python itself refuses what the system may not: opening files that no import reads,
     programs, signals, the network; in every thread. Alone this is politeness, no prison.
 
     Args:
+        places: where imports may read.
         refused: where it is noted.
     """
-    places = tuple(map(str, readable()))
+    archives = (each for each in sys.path if not os.path.isdir(each))
+    allowed = tuple(map(os.path.realpath, (*places, *archives)))
 
     def hook(event: str, given: Sequence[Any]) -> None:
         if event == "open":
             path, mode, flags = given
-            writing = set("wax+") & set(mode or "") or (isinstance(flags, int) and flags & _CHANGING)
-            if isinstance(path, int) or (
-                not writing and os.path.realpath(os.fsdecode(path)).startswith(places)
-            ):
+            if isinstance(path, int):
+                return
+            writing = bool(set("wax+") & set(mode or "")) or bool((flags or 0) & _CHANGING)
+            if not writing and os.path.realpath(os.fsdecode(path)).startswith(allowed):
                 return
             if not writing and str(path).endswith(".py"):  # as Python itself does, to quote a line
                 raise PermissionError(f"a submission may not read {path}")

@@ -18,7 +18,7 @@ import numpy as np
 
 import himpc.qp  # noqa: F401  # what a solution may import of the lab
 from lessons.exercises.inside import wire
-from lessons.exercises.inside.confine import Refused, confine, hide_the_lab, limited, refuse
+from lessons.exercises.inside.confine import Refused, confine, hide_the_lab, limited, readable, refuse
 from lessons.exercises.inside.now import Now, rebuilt
 from lessons.own.files import Source, execute, sentence
 from lessons.own.kinds import law_of, line_of
@@ -49,8 +49,9 @@ def serve(parent: int, memory: int, kernel: bool) -> None:
     refused = Refused()
     np.linalg.inv(np.eye(2))  # what libraries set up when first used
     hide_the_lab()
-    in_force = confine() if kernel else ()
-    refuse(refused)
+    places = readable()
+    in_force = confine(places) if kernel else ()
+    refuse(places, refused)
     wire.write(told, wire.READY, wire.of_json(in_force))
     law: Law = _nothing
     shape: Any = None
