@@ -16,6 +16,7 @@ from himpc.references import Preview
 from lessons.exercises import EXERCISES, load_exercise
 from lessons.exercises.apart import Apart, Exhausted
 from lessons.exercises.exercise import Check, Exercise
+from lessons.exercises.mistakes import Diagnosis
 from lessons.own.files import Source, read
 from lessons.recording.recording import Recording
 from lessons.recording.run import checked_duration, record
@@ -168,10 +169,15 @@ def graded(submission: Submission) -> Grade:
 def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[Line, ...]:
     """Every check of an exercise; a run that fails costs its own checks only."""
     recordings: dict[RunSpec, Recording | str] = {}
-    lines = []
+    diagnosis = Diagnosis(exercise.mistakes)
+    lines: list[Line] = []
+    general: list[tuple[int, str]] = []  # which lines say what it may be, and how they begin
     for check in exercise.checks(seed):
+        begins = ""
         try:
-            value, fault = _measured(check, shown, recordings), ""
+            value, fault = _measured(check, shown, diagnosis, recordings), ""
+        except _Lost as lost:
+            value, fault, begins = math.nan, "", f"{lost}: "
         except InputError as error:
             value, fault = math.nan, str(error)
         held = check.holds(value)
@@ -183,18 +189,29 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[Line, ...]:
                 check.condition,
                 check.points if held else 0,
                 check.points,
-                "" if held else fault or check.why,
+                "" if held else fault or begins + check.why,
             )
         )
+        if not held and not fault:
+            general.append((len(lines) - 1, begins))
+    if diagnosis.says:
+        for place, begins in general:
+            lines[place] = replace(lines[place], why=begins + diagnosis.says)
     return tuple(lines)
 
 
-def _measured(check: Check, shown: Shown, recordings: dict[RunSpec, Recording | str]) -> float:
+class _Lost(Exception):
+    """The robot was out of control; says when."""
+
+
+def _measured(
+    check: Check, shown: Shown, diagnosis: Diagnosis, recordings: dict[RunSpec, Recording | str]
+) -> float:
     if check.measure is None:
-        return beside(_scene(check.run, check.beside), shown, check.run.duration or 1.0)
+        return beside(_scene(check.run, check.beside), shown, diagnosis, check.run.duration or 1.0)
     if check.run not in recordings:
         scene = _scene(check.run)
-        session = TorqueSession(scene, controllers=partial(_own, shown))
+        session = TorqueSession(scene, controllers=partial(_own, shown, diagnosis))
         try:
             recordings[check.run] = record(session, checked_duration(scene.duration))
         except InputError as error:
@@ -203,7 +220,7 @@ def _measured(check: Check, shown: Shown, recordings: dict[RunSpec, Recording | 
     if isinstance(found, str):
         raise InputError(found)
     if found.session.diverged_at is not None:
-        raise InputError(f"the robot was out of control at {found.session.diverged_at:.2f} s: {check.why}")
+        raise _Lost(f"the robot was out of control at {found.session.diverged_at:.2f} s")
     return check.measure.value(found)
 
 
@@ -211,20 +228,23 @@ def _scene(run: RunSpec, controller: str | None = None) -> TorqueScene:
     return as_torque_scene(prepared(run.prepared(), controller, ()), "a controller of your own")
 
 
-def _own(shown: Shown, settings: TorqueSettings, robot: Robot) -> OwnController:
+def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Robot) -> OwnController:
     """The controller of a submission: what it is shown is computed here, and its torque comes from there."""
-    return OwnController(robot, settings.for_controller(), shown.fresh, _called, shown.where)
+    diagnosis.begin()
+
+    def call(law: Callable[[View], Any], now: View) -> Any:
+        answer = law(now)
+        diagnosis.see(now, answer)
+        return answer
+
+    return OwnController(robot, settings.for_controller(), shown.fresh, call, shown.where)
 
 
-def _called(law: Callable[[View], Any], now: View) -> Any:
-    return law(now)
-
-
-def beside(scene: TorqueScene, shown: Shown, duration: float) -> float:
+def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: float) -> float:
     """The largest difference in torque, N·m, between the scene's controller, which drives, and a submission
     that is shown the same states. Raises InputError if the submission fails."""
     session = TorqueSession(scene)
-    other = _own(shown, scene.settings, session.robot)
+    other = _own(shown, diagnosis, scene.settings, session.robot)
     other.reset(session.plant.tau)
     worst = 0.0
     while session.t < duration - 1e-9 and session.diverged_at is None:

@@ -180,7 +180,7 @@ def refuse(places: Sequence[Path], refused: Refused) -> None:
         refused: where it is noted.
     """
     archives = (each for each in sys.path if not os.path.isdir(each))
-    allowed = tuple(map(os.path.realpath, (*places, *archives)))
+    allowed = tuple(os.path.realpath(str(each)) for each in (*places, *archives))
 
     def hook(event: str, given: Sequence[Any]) -> None:
         if event == "open":
