@@ -94,6 +94,7 @@ def isolated(
             raise Fault(within.too_long) from None
         finally:
             child.kill()
+            _end_group(child.pid)
     if child.returncode != 0 or not answer:
         raise Fault(within.end(child.returncode))
     result, fault, refusal = pickle.loads(answer)
@@ -102,6 +103,12 @@ def isolated(
     if fault is not None:
         raise Fault(fault)
     return result
+
+
+def _end_group(leader: int) -> None:
+    """Ends what a process left behind in the process group it led."""
+    with suppress(OSError, AttributeError):
+        os.killpg(leader, signal.SIGKILL)
 
 
 def threads() -> int:
@@ -262,6 +269,7 @@ def _restrict(within: Allowance, parent: int) -> None:
     if sys.platform != "win32":
         import resource
 
+        os.setsid()  # what it starts can be ended with it
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         most = within.memory if hard == resource.RLIM_INFINITY else min(within.memory, hard)

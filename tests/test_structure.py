@@ -30,6 +30,9 @@ DOORS = {
     "rich": ("app/",),
     "matplotlib": ("lessons/plots/",),
     "distributed": ("lessons/cluster.py",),
+    "psutil": ("robots/family.py",),
+    "pyseccomp": ("lessons/exercises/inside/confine.py",),
+    "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
 
 
@@ -145,7 +148,7 @@ LESSONS = {
     "teaching": ("recording", "scenes", "settings", "events", "parallel"),
     "experiments": ("recording", "session", "scenes", "settings", "events", "parallel", "plots"),
     "course": ("teaching", "events"),
-    "exercises": ("teaching", "recording", "session", "scenes", "events", "parallel"),
+    "exercises": ("teaching", "recording", "session", "scenes", "settings", "events", "parallel"),
     "replay": ("course", "scenes", "settings", "events"),
     "papers": ("replay", "experiments", "scenes", "settings", "plots"),
     "plots": (),

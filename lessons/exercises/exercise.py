@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lessons.events import Push
+from lessons.exercises.mistakes import Mistake
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.claim import Relation, condition, holds
 from lessons.teaching.control import Script
@@ -23,7 +24,7 @@ class Check:
 
     Attributes:
         text: the sentence.
-        why: what it means if it is missed.
+        why: what it may mean if it is missed, where no known mistake fits.
         run: where it is measured; the controller is the submission.
         relation, bound: "at most" or "at least" so much.
         measure: of the submission's own run; None: the torque beside another controller's.
@@ -66,6 +67,7 @@ class Exercise:
         hints: that open one by one.
         lesson: the lesson it belongs to.
         checks: for a seed, which decides the disturbances.
+        mistakes: that are often made, to be named.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Exercise:
     hints: tuple[str, ...]
     lesson: str
     checks: Callable[[int], tuple[Check, ...]]
+    mistakes: tuple[Mistake, ...] = ()
 
     @property
     def scene(self) -> str:

@@ -1,39 +1,35 @@
-"""Grading: a submission is run in a process of its own and judged by what it does."""
+"""Grading: a submission has a process of its own and is judged by what the robot does."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 
+from himpc.controllers.own import OwnController
+from himpc.controllers.view import View
 from himpc.references import Preview
 from lessons.exercises import EXERCISES, load_exercise
+from lessons.exercises.apart import Apart, Exhausted
 from lessons.exercises.exercise import Check, Exercise
-from lessons.own.controllers import controller_of
-from lessons.own.files import Source, execute, read
-from lessons.own.kinds import law_of
+from lessons.exercises.mistakes import Diagnosis
+from lessons.own.files import Source, read
 from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import checked_duration, record
 from lessons.scenes.catalog import as_torque_scene, prepared
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
-from robots import InputError
-from robots.isolation import Allowance, Fault, isolated
+from lessons.settings.torque import TorqueSettings
+from robots import InputError, Robot
+from robots.isolation import PATIENCE, Allowance, Fault, isolated
 
 WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program itself", "leave that out")
 """What grading one file may cost."""
-_WRITING = frozenset("wax+")
-_REFUSED = ("socket.", "subprocess.", "os.system", "os.exec", "os.fork", "os.posix_spawn", "os.kill",
-            "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.truncate", "os.link", "os.symlink",
-            "shutil.", "webbrowser.", "ctypes.")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -67,6 +63,8 @@ class Grade:
         exercise: name of the exercise, "" if nobody knows which.
         lines: one per check; none if it could not be run.
         error: one sentence if it could not be run, or was ended.
+        protection: what of the system kept it from files, the network and other processes; () where only
+            Python did.
     """
 
     file: str
@@ -74,6 +72,7 @@ class Grade:
     exercise: str
     lines: tuple[Line, ...] = ()
     error: str = ""
+    protection: tuple[str, ...] = ()
 
     @property
     def points(self) -> int:
@@ -97,12 +96,28 @@ class Submission:
         exercise: which; None: what the file says in EXERCISE.
         seed: decides the disturbances.
         within: what grading it may cost.
+        kernel: whether the system's own means keep it from files, the network and other processes; else
+            only Python does.
     """
 
     source: Source
     exercise: str | None = None
     seed: int = 0
     within: Allowance = WITHIN
+    kernel: bool = True
+
+
+class Shown(Protocol):
+    """A submission to those who judge it: what it is shown and what it returns are all they have of it."""
+
+    @property
+    def where(self) -> str:
+        """File and line, for the beginning of a sentence."""
+        ...
+
+    def fresh(self) -> Callable[[View], Any]:
+        """Its law, without memory."""
+        ...
 
 
 def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
@@ -119,57 +134,50 @@ def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
 def grade_apart(submission: Submission) -> Grade:
     """Grades a submission in a process of its own; whatever it does there is a grade."""
     source, asked = submission.source, submission.exercise
-    with _placed(source) as here:
-        try:
-            found = isolated(graded, here, asked, submission.seed, within=submission.within, copied=True)
-        except Fault as fault:
-            found = Grade(here.path, here.digest, asked or "", error=f"{here.path}: {fault}")
-        except InputError as error:
-            found = Grade(here.path, here.digest, asked or "", error=str(error))
-    lines = (replace(line, why=line.why.replace(here.path, source.path)) for line in found.lines)
-    error = found.error.replace(here.path, source.path)
-    return replace(found, file=source.path, lines=tuple(lines), error=error)
-
-
-@contextmanager
-def _placed(source: Source) -> Iterator[Source]:
-    """The file where it was read or, on a machine that has it not, written to a folder of its own."""
+    # Its own time is counted in its own process; what the checks take is no fault of it.
+    within = replace(submission.within, seconds=PATIENCE * submission.within.seconds)
     try:
-        there = read(source.path).text == source.text
-    except InputError:
-        there = False
-    if there:
-        yield source
-        return
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / Path(source.path).name
-        path.write_text(source.text, encoding="utf-8")
-        yield Source(str(path), source.text)
+        return isolated(graded, submission, within=within, copied=True)
+    except Fault as fault:
+        error = f"{source.path}: {fault}"
+    except InputError as refusal:
+        error = str(refusal)
+    return Grade(source.path, source.digest, asked or "", error=error)
 
 
-def graded(source: Source, exercise: str | None, seed: int) -> Grade:
-    """The same in this process, which the submission may end or block. Raises InputError for a file that
-    cannot be loaded."""
-    refuse_from(source.path)
-    module = execute(source)
-    law_of(module)
-    name = exercise or str(vars(module).get("EXERCISE", ""))
-    if name not in EXERCISES:
-        raise InputError(
-            f'{source.path}: does not say which exercise it is: write e.g. EXERCISE = "joint-pd" at its top, '
-            f"or name one of {', '.join(EXERCISES)}"
-        )
-    lines = judged_by(load_exercise(name), source.path, seed)
-    return Grade(source.path, source.digest, name, lines)
+def graded(submission: Submission) -> Grade:
+    """The same in this process, which holds the plant and the checks; the submission has another one.
+
+    Raises:
+        InputError: the file cannot be loaded, or nobody knows which exercise it is.
+    """
+    source, within = submission.source, submission.within
+    with Apart(source, within.seconds, within.memory, submission.kernel) as apart:
+        name = submission.exercise or apart.exercise
+        if name not in EXERCISES:
+            raise InputError(
+                f'{source.path}: does not say which exercise it is: write e.g. EXERCISE = "joint-pd" at its '
+                f"top, or name one of {', '.join(EXERCISES)}"
+            )
+        try:
+            lines = judged_by(load_exercise(name), apart, submission.seed)
+        except Exhausted as end:
+            return Grade(source.path, source.digest, name, (), str(end), apart.protection)
+        return Grade(source.path, source.digest, name, lines, protection=apart.protection)
 
 
-def judged_by(exercise: Exercise, path: str, seed: int) -> tuple[Line, ...]:
+def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[Line, ...]:
     """Every check of an exercise; a run that fails costs its own checks only."""
     recordings: dict[RunSpec, Recording | str] = {}
-    lines = []
+    diagnosis = Diagnosis(exercise.mistakes)
+    lines: list[Line] = []
+    general: list[tuple[int, str]] = []  # which lines say what it may be, and how they begin
     for check in exercise.checks(seed):
+        begins = ""
         try:
-            value, fault = _measured(check, path, recordings), ""
+            value, fault = _measured(check, shown, diagnosis, recordings), ""
+        except _Lost as lost:
+            value, fault, begins = math.nan, "", f"{lost}: "
         except InputError as error:
             value, fault = math.nan, str(error)
         held = check.holds(value)
@@ -181,37 +189,62 @@ def judged_by(exercise: Exercise, path: str, seed: int) -> tuple[Line, ...]:
                 check.condition,
                 check.points if held else 0,
                 check.points,
-                "" if held else fault or check.why,
+                "" if held else fault or begins + check.why,
             )
         )
+        if not held and not fault:
+            general.append((len(lines) - 1, begins))
+    if diagnosis.says:
+        for place, begins in general:
+            lines[place] = replace(lines[place], why=begins + diagnosis.says)
     return tuple(lines)
 
 
-def _measured(check: Check, path: str, recordings: dict[RunSpec, Recording | str]) -> float:
+class _Lost(Exception):
+    """The robot was out of control; says when."""
+
+
+def _measured(
+    check: Check, shown: Shown, diagnosis: Diagnosis, recordings: dict[RunSpec, Recording | str]
+) -> float:
     if check.measure is None:
-        return beside(_scene(check.run, check.beside), path, check.run.duration or 1.0)
+        return beside(_scene(check.run, check.beside), shown, diagnosis, check.run.duration or 1.0)
     if check.run not in recordings:
+        scene = _scene(check.run)
+        session = TorqueSession(scene, controllers=partial(_own, shown, diagnosis))
         try:
-            recordings[check.run] = run(_scene(check.run, path))
+            recordings[check.run] = record(session, checked_duration(scene.duration))
         except InputError as error:
             recordings[check.run] = str(error)
     found = recordings[check.run]
     if isinstance(found, str):
         raise InputError(found)
     if found.session.diverged_at is not None:
-        raise InputError(f"the robot was out of control at {found.session.diverged_at:.2f} s: {check.why}")
+        raise _Lost(f"the robot was out of control at {found.session.diverged_at:.2f} s")
     return check.measure.value(found)
 
 
-def _scene(run: RunSpec, controller: str) -> TorqueScene:
+def _scene(run: RunSpec, controller: str | None = None) -> TorqueScene:
     return as_torque_scene(prepared(run.prepared(), controller, ()), "a controller of your own")
 
 
-def beside(scene: TorqueScene, path: str, duration: float) -> float:
-    """The largest difference in torque, N·m, between the scene's controller, which drives, and a file's that
-    is shown the same states. Raises InputError if the file's fails."""
+def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Robot) -> OwnController:
+    """The controller of a submission: what it is shown is computed here, and its torque comes from there."""
+    diagnosis.begin()
+
+    def call(law: Callable[[View], Any], now: View) -> Any:
+        answer = law(now)
+        diagnosis.see(now, answer)
+        return answer
+
+    return OwnController(robot, settings.for_controller(), shown.fresh, call, shown.where)
+
+
+def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: float) -> float:
+    """The largest difference in torque, N·m, between the scene's controller, which drives, and a submission
+    that is shown the same states. Raises InputError if the submission fails."""
     session = TorqueSession(scene)
-    other = controller_of(prepared(scene, path, ()).settings, session.robot)
+    other = _own(shown, diagnosis, scene.settings, session.robot)
     other.reset(session.plant.tau)
     worst = 0.0
     while session.t < duration - 1e-9 and session.diverged_at is None:
@@ -237,28 +270,9 @@ def as_data(found: Grade) -> dict[str, Any]:
         "points": found.points,
         "of": found.of,
         "error": found.error,
+        "protection": list(found.protection),
         "checks": [
             {**vars(line), "measured": line.measured if math.isfinite(line.measured) else None}
             for line in found.lines
         ],
     }
-
-
-def refuse_from(path: str) -> None:
-    """From now on whatever a file's code does with other files, programs or the network is refused. This is
-    politeness among people who mean well, no prison."""
-
-    def hook(event: str, given: Sequence[Any]) -> None:
-        reading = event == "open" and not _WRITING & set(str(given[1] or "r"))
-        if event != "open" and not event.startswith(_REFUSED):
-            return
-        if reading and str(given[0]).endswith((".py", ".pyc", ".so", ".pyd")):
-            return  # an import
-        frame = sys._getframe(1)
-        while frame is not None:
-            if frame.f_code.co_filename == path:
-                what = f"{event} {given[0]:.60}" if isinstance(given[0], str) else event
-                raise PermissionError(f"a submission may not do that ({what})")
-            frame = frame.f_back
-
-    sys.addaudithook(hook)

@@ -8,28 +8,35 @@ You need: what a torque is; lesson "a-redundant-arm"
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import radians
+from typing import Any
 
+from himpc.controllers.view import View
 from lessons.events import MoveTarget
 from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.laws import held, wanted
+from lessons.exercises.mistakes import Law, Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
 ERROR = Signal("error/posture", "deg")
 ALONE = ("levels.position.enabled=false", "levels.orientation.enabled=false")
-IIWA = RunSpec("iiwa14-hold", set=(*ALONE, "levels.posture.K_p=100", "levels.posture.K_v=20"), duration=1.0)
-PLANAR = RunSpec("planar3-hold", set=ALONE, duration=3.0)
+IIWA = RunSpec("iiwa14-hold", set=(*ALONE, "levels.posture.K_p=100", "levels.posture.K_v=20"), duration=0.3)
+QUICK = ("levels.posture.K_p=2000", "levels.posture.K_v=400")
+STIFF = ("levels.posture.K_p=1000", "levels.posture.K_v=180")
+PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
-    moved = tuple(radians(each) for each in (10.0, 80.0, -80.0))
-    there = (0.1, MoveTarget("posture", moved))
-    sent = RunSpec("planar3-hold", set=ALONE, events=(there,), duration=2.5)
+    # Where gravity pulls otherwise than at the start.
+    moved = tuple(radians(each) for each in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
+    sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (
         Check(
             "The iiwa stays where it is.",
-            "gravity pulls on it: g(q) is missing, or has the wrong sign",
+            "gravity, the spring or M̄ is not what the equation says",
             IIWA,
             0.2,
             measure=Measure(ERROR),
@@ -37,29 +44,58 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "The planar arm comes back after a push.",
-            "the stiffness K_p has the wrong sign, or is missing",
+            "the spring K_p does not pull it back",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
-            3.0,
+            0.5,
             measure=Measure(ERROR, "last"),
             points=3,
         ),
         Check(
             "It is calm afterwards.",
-            "the damping K_v is missing or has the wrong sign: it swings",
+            "the damper K_v does not brake it",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
-            10.0,
+            5.0,
             measure=Measure(Signal("v", "deg/s"), "last"),
             points=2,
         ),
         Check(
-            "A new posture is reached.",
-            "the error is not taken towards the target q_d",
+            "A new posture is reached, where gravity pulls otherwise.",
+            "the error is not taken towards the target q_d, or gravity is not that of where the arm is",
             sent,
             1.0,
             measure=Measure(ERROR, "last"),
             points=3,
         ),
     )
+
+
+def _law(now: View, *, gravity: float = 1.0, M_bar: bool = True, **how: Any) -> Any:
+    effort = wanted(now.levels[0], **how)
+    return gravity * now.gravity + (now.M_bar * effort if M_bar else effort)
+
+
+def _frozen() -> Law:
+    first: list[Any] = []
+
+    def law(now: View) -> Any:
+        first.append(now.gravity)
+        return _law(now) - now.gravity + first[0]
+
+    return law
+
+
+MISTAKES: tuple[Mistake, ...] = (
+    wrong("the torque is held: the law does not answer to q and q̇", held),
+    wrong("the stiffness K_p has the wrong sign", _law, K_p=-1.0),
+    wrong("the stiffness K_p is missing", _law, K_p=0.0),
+    wrong("the damping K_v has the wrong sign", _law, K_v=-1.0),
+    wrong("the damping K_v is missing", _law, K_v=0.0),
+    wrong("gravity g(q) is missing", _law, gravity=0.0),
+    wrong("gravity g(q) has the wrong sign", _law, gravity=-1.0),
+    Mistake("gravity g(q) is that of the start: it is another one at every q", _frozen),
+    wrong("M̄ is missing: it turns an acceleration into a torque", _law, M_bar=False),
+    wrong("the target q_d is missing: the error is q − q_d", _law, target=False),
+)
 
 
 EXERCISE = Exercise(
@@ -73,4 +109,5 @@ EXERCISE = Exercise(
     ),
     lesson="a-redundant-arm",
     checks=checks,
+    mistakes=MISTAKES,
 )

@@ -9,6 +9,8 @@ You need: Jacobians; exercise "joint-pd"; lesson "two-tasks"
 from __future__ import annotations
 
 from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.laws import osf
+from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
@@ -20,31 +22,40 @@ EXACT = (
     "nominal.armature=[0.05,0.05,0.03]",
     "nominal.damping=[0.15,0.1,0.08]",
 )
-CIRCLE = RunSpec("planar3-circle", set=("q1_amplitude_deg=20", *EXACT), duration=2.0)
-ROUGH = RunSpec("planar3-circle", set=("q1_amplitude_deg=20",), duration=1.0)
+CIRCLE = RunSpec("planar3-circle", set=("q1_amplitude_deg=40", *EXACT), duration=1.2)
+# Two tasks that cannot both be done: only the order says which one is.
+HOLD = RunSpec(
+    "planar3-circle",
+    set=(
+        'stack=[{"task": "position", "axes": "xy", "K_p": 200, "K_v": 10}, {"task": "posture"}]',
+        *EXACT,
+    ),
+    duration=1.2,
+)
+ROUGH = RunSpec("planar3-circle", set=("q1_amplitude_deg=20",), duration=0.5)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
     return (
         Check(
-            "The hand follows its circle, with the exact model.",
-            "the first level does not close (4): a sign, or J̇q̇ is missing",
-            CIRCLE,
-            2.0,
-            measure=Measure(Signal("error/position", "mm"), "rms", after=1.0),
+            "The hand follows its circle, though the second task is to stay: the first one comes first.",
+            "the first level does not close (4), or does not come first",
+            HOLD,
+            2.5,
+            measure=Measure(Signal("error/position", "mm"), "rms", after=0.6),
             points=2,
         ),
         Check(
             "Joint 1 swings as asked: the second level gets the freedom there is.",
-            "the second level is left out, or its sign is wrong",
+            "the second level does not close (4) with what it gets",
             CIRCLE,
             2.0,
-            measure=Measure(Signal("error/q1", "deg"), "rms", after=1.0),
+            measure=Measure(Signal("error/q1", "deg"), "rms", after=0.6),
             points=2,
         ),
         Check(
             "Nothing of the second level reaches the hand, in the arm's own terms.",
-            "the projector is not dynamically consistent, or missing; return a row of torques per level",
+            "the projector is not the dynamically consistent one; return a row of torques per level",
             CIRCLE,
             1e-6,
             measure=Measure(Signal("dynamic_leak", "m/s²")),
@@ -52,13 +63,33 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "The torque is OSF's, with a model that is a little wrong and a push.",
-            "J̇q̇, the order of the products, or what the levels above already do to this one",
+            "one of the terms is another one: J̇q̇, Λ, N, or what the levels above already do to this one",
             pushed(ROUGH, seed, "link_3", 3.0, plane=True),
             1e-6,
             beside="osf",
             points=3,
         ),
     )
+
+
+MISTAKES: tuple[Mistake, ...] = (
+    wrong("the levels are in reverse order: the first one comes first", osf, order=-1),
+    wrong("the second level is left out", osf, levels=1),
+    wrong("J̇q̇ is missing: ẍ = J q̈ + J̇q̇", osf, curvature=0.0),
+    wrong("J̇q̇ has the wrong sign: it is taken off ẍ", osf, curvature=-1.0),
+    wrong("the projector is missing: J N, not J, for the level below", osf, projector="none"),
+    wrong("the projector is transposed: the order of its products is M⁻¹JᵀΛJ", osf, projector="transposed"),
+    wrong(
+        "the projector is not dynamically consistent: M⁻¹JᵀΛ, not J⁺, belongs there",
+        osf,
+        projector="plain",
+    ),
+    wrong("what the levels above do to a level is asked for twice: take off J₂M⁻¹τ₁", osf, twice=True),
+    wrong("the bias C q̇ + g is missing", osf, bias=False),
+    wrong("the stiffness K_p has the wrong sign", osf, K_p=-1.0),
+    wrong("the damping K_v has the wrong sign", osf, K_v=-1.0),
+    wrong("the damping K_v is missing", osf, K_v=0.0),
+)
 
 
 EXERCISE = Exercise(
@@ -73,4 +104,5 @@ EXERCISE = Exercise(
     ),
     lesson="two-tasks",
     checks=checks,
+    mistakes=MISTAKES,
 )

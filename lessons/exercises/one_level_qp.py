@@ -8,12 +8,18 @@ You need: quadratic programs; exercise "time-delay"; lesson "torque-has-a-limit"
 
 from __future__ import annotations
 
+from functools import partial
+
 from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.laws import held, hierarchy
+from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false")
+# An M̄ that is no multiple of the unit matrix: who forgets it errs.
+M_BAR = ("M_bar=[0.06,0.03,0.02]", "T_s=0.002")
+ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false", *M_BAR)
 FREE = RunSpec("planar3-circle", set=ALONE, duration=1.0)
 WEAK = RunSpec("planar3-circle", set=(*ALONE, "limits.torque_scale=0.02"), duration=1.0)
 SLOW = RunSpec("planar3-circle", set=(*ALONE, "limits.velocity_scale=0.02"), duration=1.0)
@@ -26,7 +32,7 @@ def checks(seed: int) -> tuple[Check, ...]:
     return (
         Check(
             "With room to spare the torque is the optimum.",
-            "G, e⁰ or a sign in f: the residual (28) is taken at the next knot",
+            "G, e⁰, H or f is another one: the residual (28) is taken at the next knot",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
             1e-6,
             beside="hiqp",
@@ -34,7 +40,7 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "The torque stays within its bound.",
-            "the torque bound (32f) is missing: it is on τ₀ + Δτ",
+            "the torque bound (32f) is not kept: it is on τ₀ + Δτ",
             WEAK,
             100.0001,
             measure=Measure(Signal("torque share", "%")),
@@ -42,7 +48,7 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "At the torque bound it is the optimum, not a cut-off one.",
-            "the bound must stand in the QP: cutting the torque afterwards is not the same",
+            "it is not the optimum: the bounds must stand in the QP",
             WEAK,
             1e-6,
             beside="hiqp",
@@ -67,6 +73,44 @@ def checks(seed: int) -> tuple[Check, ...]:
     )
 
 
+_law = partial(hierarchy, levels=1)
+
+MISTAKES: tuple[Mistake, ...] = (
+    wrong("the torque is held: nothing is optimised", held),
+    wrong("no bound is in the QP", _law, limits="none"),
+    wrong(
+        "the torque is cut off afterwards, and not bounded in the QP",
+        hierarchy,
+        levels=1,
+        limits="afterwards",
+    ),
+    wrong("f has the wrong sign: f = GᵀQe⁰", _law, f=-1.0),
+    wrong("R is missing: it weighs the increments, and stands in H", _law, R=False),
+    wrong("Q is missing in f = GᵀQe⁰", _law, Q=False),
+    wrong(
+        "the desired values are this tick's: (28) is about the next knot, index 1",
+        hierarchy,
+        levels=1,
+        ahead=0,
+    ),
+    wrong("M̄ is missing in G = (1 + K_v T_s) J M̄⁻¹", _law, M_bar=False),
+    wrong("τ₀ is missing: the QP gives increments", _law, alone=True),
+    wrong("the velocity bound (32e) is missing", _law, limits="torque"),
+    wrong(
+        "the bound (32f) is on Δτ alone, and belongs on τ₀ + Δτ",
+        hierarchy,
+        levels=1,
+        limits="on the increment",
+    ),
+    wrong(
+        "the velocity bound is approached at once: `approach` is not used",
+        hierarchy,
+        levels=1,
+        limits="at once",
+    ),
+)
+
+
 EXERCISE = Exercise(
     name="one-level-qp",
     card=card_of(__doc__),
@@ -81,4 +125,5 @@ EXERCISE = Exercise(
     ),
     lesson="torque-has-a-limit",
     checks=checks,
+    mistakes=MISTAKES,
 )

@@ -8,26 +8,32 @@ You need: exercise "joint-pd"; lesson "no-model-needed"
 
 from __future__ import annotations
 
+from typing import Any
+
+from himpc.controllers.view import View
+from lessons.events import Set
 from lessons.exercises.exercise import Check, Exercise, pushed
 from lessons.exercises.joint_pd import ALONE, ERROR
+from lessons.exercises.laws import held, wanted
+from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure
 
 GAINS = ("levels.posture.K_p=100", "levels.posture.K_v=20")
-LOADED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS, "plant.payload_kg=3"), duration=1.0)
-MISLED = RunSpec(
-    "iiwa14-hold", set=(*ALONE, *GAINS, "plant.payload_kg=3", "nominal.mass_scale=2"), duration=1.0
-)
-FRICTION = RunSpec("planar3-hold", set=(*ALONE, "plant.damping=1"), duration=1.5)
-PLANAR = RunSpec("planar3-hold", set=ALONE, duration=0.6)
+# Hung on while it runs: a torque that was right before is not any more.
+HUNG = ((0.05, Set("plant.payload_kg", 3.0)),)
+LOADED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), events=HUNG, duration=0.6)
+MISLED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS, "nominal.mass_scale=2"), events=HUNG, duration=0.4)
+FRICTION = RunSpec("planar3-hold", set=(*ALONE, "plant.damping=1"), duration=1.0)
+PLANAR = RunSpec("planar3-hold", set=ALONE, duration=0.3)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
     return (
         Check(
-            "A load of 3 kg that nobody told of does not sag.",
-            "the estimate Ĥ = τ₀ − M̄ q̈₀ is not used, or has a sign wrong",
+            "A load of 3 kg that is hung on, and that nobody told of, does not sag.",
+            "Ĥ = τ₀ − M̄ q̈₀ is not what it should be",
             LOADED,
             0.05,
             measure=Measure(ERROR),
@@ -35,7 +41,7 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "It does not matter what the model says.",
-            "the nominal model is read: now.M, now.bias or now.gravity",
+            "Ĥ is not the estimate, or reads the nominal model: now.M, now.bias or now.gravity",
             MISLED,
             0.05,
             measure=Measure(ERROR),
@@ -43,21 +49,48 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "With friction and a push the arm comes back.",
-            "K_p or K_v has the wrong sign, or τ₀ is left out",
-            pushed(FRICTION, seed, "link_3", 10.0, plane=True),
+            "K_p, K_v or τ₀ is not what the equation says",
+            pushed(FRICTION, seed, "link_3", 10.0, at=0.05, plane=True),
             0.3,
             measure=Measure(ERROR, "last"),
             points=2,
         ),
         Check(
             "The torque is that of the equation.",
-            "q̈₀ is missing: without it what is asked for is added to what is there already",
-            pushed(PLANAR, seed + 1, "link_2", 5.0, at=0.1, plane=True),
+            "one of its terms is another one: τ₀, M̄, q̈₀, K_p x̃ or K_v ẋ̃",
+            pushed(PLANAR, seed + 1, "link_2", 5.0, at=0.02, plane=True),
             1e-6,
             beside="tdeosf",
             points=3,
         ),
     )
+
+
+def _law(now: View, *, tau: str = "τ₀", a: float = 1.0, M_bar: bool = True, **how: Any) -> Any:
+    effort = wanted(now.levels[0], **how) - a * now.q_ddot
+    before = {"τ₀": now.tau_0, "g": now.gravity, "both": now.tau_0 + now.gravity, "none": 0.0}[tau]
+    return before + (now.M_bar * effort if M_bar else effort)
+
+
+def _late(now: View) -> Any:
+    return _law(now, a=now.T_s)
+
+
+MISTAKES: tuple[Mistake, ...] = (
+    wrong("the torque is held: the law does not answer to q and q̇", held),
+    wrong("q̈₀ has the wrong sign in Ĥ = τ₀ − M̄ q̈₀", _law, a=-1.0),
+    wrong("q̈₀ is missing: without it what is asked for is added to what is there already", _law, a=0.0),
+    wrong("q̈₀ is a difference of velocities that is not divided by T_s", _late),
+    wrong("the model stands where τ₀ belongs", _law, tau="g"),
+    wrong("the model stands where Ĥ belongs: read it from the last tick", _law, tau="g", a=0.0),
+    wrong("g(q) is in τ₀ already, and is added again", _law, tau="both"),
+    wrong("τ₀ is missing in Ĥ = τ₀ − M̄ q̈₀", _law, tau="none"),
+    wrong("M̄ is missing: it turns an acceleration into a torque", _law, M_bar=False),
+    wrong("the stiffness K_p has the wrong sign", _law, K_p=-1.0),
+    wrong("the stiffness K_p is missing", _law, K_p=0.0),
+    wrong("the damping K_v has the wrong sign", _law, K_v=-1.0),
+    wrong("the damping K_v is missing", _law, K_v=0.0),
+)
 
 
 EXERCISE = Exercise(
@@ -71,4 +104,5 @@ EXERCISE = Exercise(
     ),
     lesson="no-model-needed",
     checks=checks,
+    mistakes=MISTAKES,
 )

@@ -9,21 +9,24 @@ You need: exercise "one-level-qp"; lesson "inside-the-qp"
 from __future__ import annotations
 
 from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.laws import held, hierarchy
+from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-SETTINGS = ("horizon=1", "damping=false", "q1_amplitude_deg=60")
+# An M̄ that is no multiple of the unit matrix: who forgets it errs.
+SETTINGS = ("horizon=1", "damping=false", "M_bar=[0.06,0.03,0.02]", "T_s=0.002", "q1_amplitude_deg=60")
 FREE = RunSpec("planar3-circle", set=SETTINGS, duration=1.0)
 WEAK = RunSpec("planar3-circle", set=(*SETTINGS, "limits.torque_scale=0.04"), duration=1.0)
-FIGHT = RunSpec("planar3-conflict", set=SETTINGS[:2], duration=1.5)
+FIGHT = RunSpec("planar3-conflict", set=SETTINGS[:-1], duration=1.5)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
     return (
         Check(
             "With room to spare the torque is the optimum of both levels.",
-            "a residual or a sign, as in the exercise before, or the second level is left out",
+            "a residual, a weight or a level is not what it should be",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
             1e-6,
             beside="hiqp",
@@ -31,7 +34,7 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "Nothing leaks from level 2 to level 1.",
-            "the equality (33): J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁; a weighted sum is not strict. Return a row per level",
+            "the equality (33) is not kept: J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁. Return a row per level",
             WEAK,
             1e-7,
             measure=Measure(Signal("priority_leak", "m/s²")),
@@ -39,7 +42,7 @@ def checks(seed: int) -> tuple[Check, ...]:
         ),
         Check(
             "Where torque is short, level 2 gives way.",
-            "the bounds must stand in the QP of both levels",
+            "it is not the optimum: the bounds must stand in the QP of both levels",
             WEAK,
             1e-6,
             beside="hiqp",
@@ -56,6 +59,34 @@ def checks(seed: int) -> tuple[Check, ...]:
     )
 
 
+MISTAKES: tuple[Mistake, ...] = (
+    wrong("the torque is held: nothing is optimised", held),
+    wrong("no bound is in the QP", hierarchy, limits="none"),
+    wrong("the equality (33) is missing: a weighted sum is not strict", hierarchy, equality="none"),
+    wrong("J₁ stands where J₁M̄⁻¹ belongs in the equality (33)", hierarchy, equality="without M̄"),
+    wrong("J₁M̄⁻¹Δτ₂ is set to zero: it must be what it is for Δτ₁", hierarchy, equality="zero"),
+    wrong("the levels are in reverse order: the first one comes first", hierarchy, order=-1),
+    wrong("the second level is left out", hierarchy, levels=1),
+    wrong("f has the wrong sign: f = GᵀQe⁰", hierarchy, f=-1.0),
+    wrong("R is missing: it weighs the increments, and stands in H", hierarchy, R=False),
+    wrong("Q is missing in f = GᵀQe⁰", hierarchy, Q=False),
+    wrong(
+        "the desired values are this tick's: (28) is about the next knot, index 1",
+        hierarchy,
+        ahead=0,
+    ),
+    wrong("M̄ is missing in G = (1 + K_v T_s) J M̄⁻¹", hierarchy, M_bar=False),
+    wrong("τ₀ is missing: the QP gives increments", hierarchy, alone=True),
+    wrong("the velocity bound (32e) is missing", hierarchy, limits="torque"),
+    wrong("the bound (32f) is on Δτ alone, and belongs on τ₀ + Δτ", hierarchy, limits="on the increment"),
+    wrong(
+        "the velocity bound is approached at once: `approach` is not used",
+        hierarchy,
+        limits="at once",
+    ),
+)
+
+
 EXERCISE = Exercise(
     name="two-levels",
     card=card_of(__doc__),
@@ -69,4 +100,5 @@ EXERCISE = Exercise(
     ),
     lesson="inside-the-qp",
     checks=checks,
+    mistakes=MISTAKES,
 )

@@ -126,7 +126,8 @@ def sentence(path: str, error: BaseException) -> str:
     """Where in the file an exception came from, and what it says."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return f"{path}, line {error.lineno}: {error.msg}"
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
+    steps = traceback.walk_tb(error.__traceback__)
+    lines = [line for frame, line in steps if frame.f_code.co_filename == path]
     place = f"{path}, line {lines[-1]}" if lines else path
     if isinstance(error, SystemExit):
         return f"{place}: it ends the program (SystemExit): leave that out"

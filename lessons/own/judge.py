@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from types import ModuleType
 
-from lessons.own.files import Source, execute
+from lessons.own.files import Source
 from lessons.own.kinds import Kind, kind_of
+from lessons.own.load import load
 from robots import InputError
 from robots.isolation import Allowance, Fault, isolated
 
@@ -16,7 +18,7 @@ def judged(source: Source) -> Kind:
     return _judged(source)
 
 
-LOADING = Allowance(20.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
+LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
 """What a file may cost before it is known to be harmless."""
 
 
@@ -29,7 +31,7 @@ def _judged(source: Source) -> Kind:
 
 
 def _kind(source: Source) -> Kind:
-    return kind_of(execute(source))
+    return kind_of(load(source, math.inf))
 
 
 def loaded(source: Source) -> ModuleType:
@@ -40,4 +42,4 @@ def loaded(source: Source) -> ModuleType:
 
 @lru_cache(maxsize=64)
 def _loaded(source: Source) -> ModuleType:
-    return execute(source)
+    return load(source)

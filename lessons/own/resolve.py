@@ -14,9 +14,10 @@ from himpc.configuration import Configuration
 from himpc.stack import Level
 from himpc.tasks import Task
 from lessons.own.check import check_lesson, check_scene
-from lessons.own.files import Source, execute, is_file, read, sentence
+from lessons.own.files import Source, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
+from lessons.own.load import alone, load
 from lessons.scenes.catalog import as_torque_scene, load_scene, with_own_tasks
 from lessons.scenes.scene import Scene
 from lessons.settings.assignments import parse_assignment
@@ -195,12 +196,13 @@ def module_of(source: Source) -> ModuleType:
 
 @lru_cache(maxsize=64)
 def _module_of(source: Source) -> ModuleType:
-    return execute(source)
+    return load(source)
 
 
 def _called(source: Source, function: Callable[[], Any]) -> Any:
     try:
-        return function()
+        with alone(source.path):
+            return function()
     except (Exception, SystemExit) as error:
         if isinstance(error, InputError) and str(error).startswith(source.path):
             raise

@@ -10,6 +10,7 @@ import numpy as np
 from himpc.telemetry import relaid
 from lessons.recording.recording import Recording
 from lessons.scenes.scene import Scene
+from lessons.session.session import Session
 from lessons.session.start import begin
 from robots import InputError
 
@@ -38,7 +39,16 @@ def run(
         InputError: settings or duration cannot be, or a controller of one's own failed.
     """
     seconds = checked_duration(scene.duration if duration is None else duration)
-    session = begin(scene, seed)
+    return record(begin(scene, seed), seconds, progress, to_the_end)
+
+
+def record(
+    session: Session,
+    seconds: float,
+    progress: Callable[[float], None] | None = None,
+    to_the_end: bool = False,
+) -> Recording:
+    """The same of a session that has begun."""
     rows, elapsed, started = [], 0.0, perf_counter()
     layout = session.layout
     # Half a period's tolerance: a sum of periods carries rounding.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, final
 
 import numpy as np
@@ -27,7 +27,7 @@ from lessons.session.session import LOST_SPEED, Session
 from lessons.session.targets import carried, kept, move_target, target_at
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
-from robots import InputError, Plant, convergence_gauge
+from robots import InputError, Plant, Robot, convergence_gauge
 
 Array = NDArray[np.float64]
 
@@ -60,12 +60,19 @@ class TorqueSession(Session):
     settings: TorqueSettings
     plant: Plant
 
-    def __init__(self, scene: TorqueScene, seed: int = 0) -> None:
-        """Raises InputError if the scene's settings do not fit its robot."""
+    def __init__(
+        self,
+        scene: TorqueScene,
+        seed: int = 0,
+        controllers: Callable[[TorqueSettings, Robot], Controller] = controller_of,
+    ) -> None:
+        """controllers: makes the controller that settings name. Raises InputError if the scene's settings do
+        not fit its robot."""
         super().__init__(scene, seed)
+        self._controller_of = controllers
         self.settings = scene.settings
         self.plant = Plant(scene.robot, scene.settings.plant)
-        self.controller = controller_of(scene.settings, scene.robot)
+        self.controller = self._controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
         self._data = scene.robot.model.createData()
         self._row, self._at = np.full(self.layout.size, np.nan), Places.of(self.layout)
@@ -173,7 +180,7 @@ class TorqueSession(Session):
         if settings.controller == self.settings.controller:
             self.controller.configure(settings.for_controller())
         else:
-            self._hand_over(controller_of(settings, self.robot))
+            self._hand_over(self._controller_of(settings, self.robot))
         if recomposed:
             self.layout, self.references, self.plan, self.given = layout, references, None, None
             self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
@@ -187,7 +194,7 @@ class TorqueSession(Session):
     def renew(self) -> None:
         """The code of one's own was changed: it takes over without a bump. Raises InputError if it is wrong;
         the one before goes on."""
-        self._hand_over(controller_of(self.settings, self.robot))
+        self._hand_over(self._controller_of(self.settings, self.robot))
         self.failure = None
 
     def advance(self) -> Array:

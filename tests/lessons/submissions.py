@@ -1,4 +1,4 @@
-"""Thirty submissions, as students hand them in: ten are right, twenty are wrong, each differently."""
+"""Submissions as students hand them in: fifteen right ones, known mistakes, and what misbehaves."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ QP = (
         "            upper = np.r_[np.maximum(upper, rows[:-len(B)] @ U), B @ U]\n",
     )
 )
-RIGHT = {"joint-pd": PD, "null-space": OSF, "time-delay": TDE, "one-level-qp": QP, "two-levels": QP}
+ONE = QP.replace("in now.levels:", "in now.levels[:1]:")
+RIGHT = {"joint-pd": PD, "null-space": OSF, "time-delay": TDE, "one-level-qp": ONE, "two-levels": QP}
 
 # The same laws as somebody else writes them.
 _PD_CLASS = """
@@ -64,7 +65,7 @@ class Controller:
         q_d_dot, q_d_ddot = posture.x_dot_d[0], posture.x_ddot_d[0]
         spring = -posture.K_p * posture.error
         damper = posture.K_v * (q_d_dot - now.q_dot)
-        print("torque", now.gravity)
+        print("torque")
         return (q_d_ddot + spring + damper) * now.M_bar + now.gravity
 """
 _OSF_ONE_BY_ONE = """
@@ -112,6 +113,205 @@ _TWO_BY_BASIS = (
         "            continue\n",
     )
 )
+
+
+_PD_LOOP = """
+def torque(now):
+    found = []
+    for joint in range(now.n):
+        each = now.levels[0]
+        a = each.x_ddot_d[0][joint]
+        a += each.K_v[joint] * (each.x_dot_d[0][joint] - each.x_dot[joint])
+        a -= each.K_p[joint] * each.error[joint]
+        found.append(float(now.gravity[joint] + now.M_bar[joint] * a))
+    return found
+"""
+_OSF_CLASS = """
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+class Controller:
+    def torque(self, now):
+        M = cho_factor(now.M)
+        q_ddot, N, rows = cho_solve(M, -now.bias * 0.0), np.eye(now.n), []
+        for level in now.levels:
+            want = level.x_ddot_d[0] - level.K_v * (level.x_dot - level.x_dot_d[0])
+            want = want - level.K_p * level.error - level.J_dot_q_dot
+            J = level.J @ N
+            B = cho_solve(M, J.T)
+            step = B @ np.linalg.pinv(J @ B, rcond=1e-9, hermitian=True)
+            q_ddot = q_ddot + step @ (want - level.J @ q_ddot)
+            N = N - step @ J
+            rows.append(now.M @ q_ddot + now.bias)
+        return np.vstack(rows)
+"""
+_TDE_CLASS = """
+import numpy as np
+
+class Controller:
+    def torque(self, now):
+        asked = np.zeros(now.n)
+        for level in [now.level("posture")]:
+            asked += level.x_ddot_d[0]
+            asked += level.K_v * (level.x_dot_d[0] - level.x_dot)
+            asked -= level.K_p * level.error
+        return np.diag(now.M_bar) @ (asked - now.q_ddot) + np.array(now.tau_0)
+"""
+_ONE_OF_ACCELERATIONS = ONE.replace(
+    "torques.append(now.tau_0 + solve_qp(H, f, rows, lower, upper).x)",
+    "W = np.diag(now.M_bar)\n"
+    "        u = solve_qp(W @ H @ W, W @ f, rows @ W, lower, upper).x\n"
+    "        return now.tau_0 + now.M_bar * u",
+)
+_TWO_BY_ELIMINATION = (
+    start_of("two-levels")
+    .replace('EXERCISE = "two-levels"', "")
+    .replace(
+        _HOLE,
+        "        if torques:\n"
+        "            first = torques[0] - now.tau_0\n"
+        "            B = now.levels[0].J / now.M_bar\n"
+        "            P = np.eye(now.n) - np.linalg.pinv(B) @ B\n"
+        "            H_free, f_free = P @ H @ P + 1e-12 * np.eye(now.n), P @ (f + H @ first)\n"
+        "            lower, upper = lower - rows @ first, upper - rows @ first\n"
+        "            y = solve_qp(H_free, f_free, rows @ P, np.minimum(lower, 0), np.maximum(upper, 0)).x\n"
+        "            torques.append(torques[0] + P @ y)\n"
+        "            continue\n",
+    )
+)
+STYLES: dict[str, tuple[str, ...]] = {
+    "joint-pd": (PD, _PD_CLASS, _PD_LOOP),
+    "null-space": (OSF, _OSF_ONE_BY_ONE, _OSF_CLASS),
+    "time-delay": (TDE, _TDE_ESTIMATE, _TDE_CLASS),
+    "one-level-qp": (ONE, _QP_OF_TORQUES, _ONE_OF_ACCELERATIONS),
+    "two-levels": (QP, _TWO_BY_BASIS, _TWO_BY_ELIMINATION),
+}
+"""Right solutions in three styles each."""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """What is changed in a right solution, the marks it deserves, and words of what is to be said of it.
+
+    Attributes:
+        good, bad: the lines that are there and that stand there instead; good "" for another text altogether.
+        most: points it may get.
+        words: that name the mistake.
+    """
+
+    good: str
+    bad: str
+    most: int
+    words: str
+
+    def text(self, exercise: str) -> str:
+        """The submission."""
+        if not self.good:
+            return self.bad
+        assert self.good in RIGHT[exercise], self.good
+        return RIGHT[exercise].replace(self.good, self.bad)
+
+
+_HELD = "def torque(now):\n    return now.tau_0\n"
+_FROZEN = (
+    TASK
+    + """
+class Controller:
+    gravity = None
+
+    def torque(self, now):
+        if self.gravity is None:
+            self.gravity = now.gravity
+        return self.gravity + now.M_bar * wanted(now.level("posture"))
+"""
+)
+MISTAKES: dict[str, dict[str, Mistake]] = {
+    "joint-pd": {
+        "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 2, "K_p has the wrong sign"),
+        "no K_p": Mistake("level.K_p *", "0.0 *", 4, "K_p is missing"),
+        "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 2, "K_v has the wrong sign"),
+        "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
+        "no gravity": Mistake("now.gravity +", "", 5, "g(q) is missing"),
+        "sign of gravity": Mistake("now.gravity +", "-now.gravity +", 5, "g(q) has the wrong sign"),
+        "gravity of the start": Mistake("", _FROZEN, 7, "g(q) is that of the start"),
+        "no M̄": Mistake("now.M_bar *", "", 5, "M̄ is missing"),
+        "no target": Mistake("level.error", 'level.x["posture"]', 5, "q_d is missing"),
+        "holds the torque": Mistake("", _HELD, 2, "the torque is held"),
+    },
+    "null-space": {
+        "no J̇q̇": Mistake("- level.J_dot_q_dot", "", 7, "J̇q̇ is missing"),
+        "sign of J̇q̇": Mistake("- level.J_dot_q_dot", "+ level.J_dot_q_dot", 7, "J̇q̇ has the wrong sign"),
+        "no projection": Mistake("level.J @ N", "level.J", 4, "the projector is missing"),
+        "transposed projector": Mistake(
+            "M_inv @ J.T @ L @ J", "J.T @ L @ J @ M_inv", 6, "the order of its products"
+        ),
+        "not consistent": Mistake(
+            "M_inv @ J.T @ L @ J", "np.linalg.pinv(J) @ J", 6, "not dynamically consistent"
+        ),
+        "asks twice": Mistake("- level.J @ M_inv @ tau", "", 6, "asked for twice"),
+        "reverse order": Mistake(
+            "in now.levels:", "in now.levels[::-1]:", 3, "the levels are in reverse order"
+        ),
+        "only one level": Mistake("in now.levels:", "in now.levels[:1]:", 4, "the second level is left out"),
+        "no bias": Mistake("now.bias +", "", 5, "C q̇ + g is missing"),
+        "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 3, "K_p has the wrong sign"),
+        "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 3, "K_v has the wrong sign"),
+    },
+    "time-delay": {
+        "holds the torque": Mistake("", _HELD, 1, "the torque is held"),
+        "sign of q̈₀": Mistake("- now.q_ddot", "+ now.q_ddot", 3, "q̈₀ has the wrong sign"),
+        "no q̈₀": Mistake("- now.q_ddot", "", 3, "q̈₀ is missing"),
+        "q̈₀ without T_s": Mistake("- now.q_ddot", "- now.T_s * now.q_ddot", 3, "not divided by T_s"),
+        "the model instead": Mistake("now.tau_0 +", "now.gravity +", 3, "the model stands where τ₀ belongs"),
+        "Ĥ from the model": Mistake("", PD, 3, "the model stands where Ĥ belongs"),
+        "gravity as well": Mistake("now.tau_0 +", "now.tau_0 + now.gravity +", 2, "g(q) is in τ₀ already"),
+        "no M̄": Mistake("now.M_bar *", "", 3, "M̄ is missing"),
+        "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 3, "K_p has the wrong sign"),
+        "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
+        "no τ₀": Mistake("now.tau_0 +", "", 2, "τ₀ is missing"),
+    },
+    "one-level-qp": {
+        "no bounds": Mistake(
+            "solve_qp(H, f, rows, lower, upper)",
+            "solve_qp(H, f, rows, lower - 1e5, upper + 1e5)",
+            5,
+            "no bound is in the QP",
+        ),
+        "bound afterwards": Mistake(
+            "solve_qp(H, f, rows, lower, upper).x",
+            "np.clip(np.linalg.solve(H, -f), lower[: now.n], upper[: now.n])",
+            7,
+            "cut off afterwards",
+        ),
+        "no velocity bound": Mistake("- now.q_dot)", ") * 1e6", 8, "the velocity bound (32e) is missing"),
+        "bound on Δτ": Mistake("_lower - now.tau_0", "_lower", 7, "is on Δτ alone"),
+        "approached at once": Mistake("min(1.0, now.bounds.approach * now.T_s or 1.0)", "1.0", 8, "at once"),
+        "sign of f": Mistake("G.T @ (level.Q * e)", "-G.T @ (level.Q * e)", 2, "f has the wrong sign"),
+        "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 9, "R is missing"),
+        "no Q": Mistake("level.Q * e", "e", 5, "Q is missing in f"),
+        "references of now": Mistake("_d[1]", "_d[0]", 6, "this tick's"),
+        "no M̄": Mistake("level.J / now.M_bar", "level.J", 3, "M̄ is missing in G"),
+        "holds the torque": Mistake("", _HELD, 3, "the torque is held"),
+        "increments alone": Mistake("now.tau_0 + solve_qp", "solve_qp", 3, "τ₀ is missing"),
+    },
+    "two-levels": {
+        "weighted, not strict": Mistake("if torques:", "if False:", 3, "the equality (33) is missing"),
+        "J instead of J M̄⁻¹": Mistake("now.levels[0].J / now.M_bar", "now.levels[0].J", 5, "J₁ stands where"),
+        "equal to zero": Mistake("B @ U]", "0 * B @ U]", 4, "is set to zero"),
+        "no bounds": Mistake(
+            "= bounds(now)", "= bounds(now)\n        lower, upper = lower - 1e3, upper + 1e3", 7, "no bound"
+        ),
+        "references of now": Mistake("_d[1]", "_d[0]", 7, "this tick's"),
+        "reverse order": Mistake(
+            "in now.levels:", "in now.levels[::-1]:", 3, "the levels are in reverse order"
+        ),
+        "only one level": Mistake(
+            "in now.levels:", "in [now.levels[0]] * 2:", 5, "the second level is left out"
+        ),
+        "holds the torque": Mistake("", _HELD, 2, "the torque is held"),
+        "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 7, "R is missing"),
+    },
+}
 
 
 @dataclass(frozen=True)

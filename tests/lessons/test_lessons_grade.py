@@ -14,10 +14,13 @@ from typing import Any
 import pytest
 from submissions import PD, RIGHT, SUBMISSIONS
 
+from himpc.controllers.answers import OwnFault
+from himpc.controllers.view import View
 from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.exercises.folder import Row, grade_folder
-from lessons.exercises.grade import WITHIN, Grade, Submission, grade, grade_apart, judged_by
-from lessons.own.files import Source, execute, read
+from lessons.exercises.grade import WITHIN, Grade, Line, Submission, grade, grade_apart, judged_by
+from lessons.own.files import Source, execute, sentence
+from lessons.own.kinds import law_of
 from lessons.parallel import on_cores, one_by_one
 from robots import InputError
 
@@ -92,12 +95,33 @@ def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
     return Graded(rows, out.read_text(), grades, shares)
 
 
-def here(path: str, exercise: str, about: str = ""):
+@dataclass(frozen=True)
+class Near:
+    """A submission in this process, which costs no other: for those that are only wrong."""
+
+    source: Source
+
+    @property
+    def where(self) -> str:
+        return self.source.path
+
+    def fresh(self) -> Callable[[View], Any]:
+        law = law_of(execute(self.source))()
+
+        def told(now: View) -> Any:
+            try:
+                return law(now)
+            except Exception as error:
+                raise OwnFault(sentence(self.source.path, error)) from None
+
+        return told
+
+
+def here(text: str, exercise: str, about: str = "") -> tuple[Line, ...]:
     """The lines of the checks about something, without the process of its own."""
-    execute(read(path))
     whole = load_exercise(exercise)
     chosen = replace(whole, checks=lambda seed: tuple(c for c in whole.checks(seed) if about in c.text))
-    return judged_by(chosen, path, 0)
+    return judged_by(chosen, Near(Source("mine.py", text)), 0)
 
 
 @pytest.mark.parametrize("exercise", EXERCISES)
@@ -110,7 +134,7 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_wrong_solution_loses_the_grade_points_of_its_mistake(what: str, file, thirty: Graded) -> None:
+def test_wrong_solution_loses_the_grade_points_of_its_mistake(what: str, thirty: Graded) -> None:
     exercise, good, bad, missed = WRONG[what]
     assert good in RIGHT[exercise]
     text = RIGHT[exercise].replace(good, bad)
@@ -119,14 +143,14 @@ def test_wrong_solution_loses_the_grade_points_of_its_mistake(what: str, file, t
     if graded:
         lines = [line for line in thirty.grades[graded[0]].lines if missed in line.check]
     else:
-        lines = here(file(text), exercise, missed)
+        lines = here(text, exercise, missed)
     assert [line.points for line in lines] == [0], lines
 
 
 @pytest.mark.parametrize("exercise", EXERCISES)
-def test_the_file_with_the_hole_runs_and_its_grade_is_not_full(exercise: str, file) -> None:
+def test_the_file_with_the_hole_runs_and_its_grade_is_not_full(exercise: str) -> None:
     assert f'EXERCISE = "{exercise}"' in start_of(exercise)
-    lines = here(file(start_of(exercise)), exercise)
+    lines = here(start_of(exercise), exercise)
     assert sum(1 for line in lines if line.why) > 0
     assert not any("Error" in line.why for line in lines)
 

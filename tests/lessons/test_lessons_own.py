@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from lessons.own.files import execute, read
 from lessons.own.kinds import kind_of
+from lessons.own.load import load
 from lessons.own.new import text_of
 from lessons.own.resolve import lesson_named, scene_named
 from lessons.recording.run import run
@@ -99,7 +101,28 @@ FAULTS = {
     "raises at import": ("\nraise ValueError('so')\n", r"mine.py, line 2: ValueError: so"),
     "exits at import": ("import sys\nsys.exit(3)\n", r"mine.py, line 2: .*SystemExit"),
     "leaves at import": ("import os\nos._exit(0)\n", "ends the program"),
-    "crashes at import": ("import os\nos.kill(os.getpid(), 11)\n", "SIGSEGV"),
+    "crashes at import": ("import ctypes\nctypes.string_at(0)\n", "SIGSEGV"),
+    "forks at import": (
+        "import os\nfor _ in range(4):\n    os.fork()\n",
+        r"line 3: .*no process \(os.fork\)",
+    ),
+    "signals at import": (
+        "import os, signal\nos.kill(os.getppid(), signal.SIGINT)\n",
+        r"line 2: .*no process \(os.kill\)",
+    ),
+    "interrupts at import": ("import _thread\n_thread.interrupt_main()\nwhile True: pass\n", "loading it"),
+    "runs a program at import": (
+        "import subprocess\nsubprocess.Popen(['sleep', '60'])\n",
+        r"line 2: .*\(subprocess.Popen\)",
+    ),
+    "replaces parts of NumPy": (
+        "import numpy as np\nnp.array = np.linalg.inv = None\n" + HOLDS,
+        r"loading it replaces numpy\.\w+.*leave that out",
+    ),
+    "signals in a tick": (
+        "import os\ndef torque(now):\n    os.kill(os.getpid(), 2)\n",
+        r"line 3: .*no process \(os.kill\)",
+    ),
     "memory at import": ("x = [0] * 10**12\n", "line 1: .*memory"),
     "no function": ("torque = 3\n", "torque must be a function"),
     "no method": ("class Controller:\n    pass\n", "a method torque"),
@@ -135,13 +158,13 @@ def test_own_controller_that_is_wrong_is_one_sentence(what: str, tmp_path: Path)
 
 def test_own_call_may_wait_for_a_core_but_not_sleep(file, monkeypatch) -> None:
     """A busy machine makes no good controller a bad one."""
-    from lessons.own import controllers
+    from lessons.own import deadline
 
     scene = load_scene("planar3-hold")
     law = file("import time\n\ndef torque(now):\n    time.sleep(0.7)\n    return now.bias\n")
     with pytest.raises(InputError, match=r"line 4: one call takes longer than 0\.5 s"):
         run(prepared(scene, law, ()), 0.01)
-    monkeypatch.setattr(controllers, "waited", lambda pid: time.monotonic())
+    monkeypatch.setattr(deadline, "waited", lambda pid: time.monotonic())
     assert run(prepared(scene, law, ()), 0.003)["tau"].shape == (3, 3)
 
 
@@ -153,6 +176,49 @@ def test_own_endless_import_ends_at_the_deadline(file, monkeypatch) -> None:
     monkeypatch.setattr(judge, "LOADING", replace(judge.LOADING, seconds=3.0))
     with pytest.raises(InputError, match="loading it takes longer than 3 s"):
         run(prepared(load_scene("planar3-hold"), file("while True:\n    pass\n"), ()), 0.05)
+
+
+ONCE = """
+import pathlib
+seen = pathlib.Path(__file__).with_suffix(".seen")
+if seen.exists():
+    {}
+seen.touch()
+def torque(now):
+    return now.bias
+"""
+
+
+@pytest.mark.parametrize("where", ["main", "thread"])
+def test_own_second_import_that_never_ends_is_ended(where: str, file, monkeypatch) -> None:
+    """The trial ended well, and what comes then is bounded, too."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    from lessons.own import controllers
+
+    monkeypatch.setattr(controllers, "load", partial(load, seconds=1.0))
+    scene = prepared(load_scene("planar3-hold"), file(ONCE.format("while True: pass")), ())
+    began = time.monotonic()
+    with pytest.raises(InputError, match=r"mine\.py: loading it takes longer than 1 s"):
+        run(scene, 0.05) if where == "main" else ThreadPoolExecutor(1).submit(run, scene, 0.05).result()
+    assert time.monotonic() - began < 40.0
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        ("import os; os.fork()", "os.fork"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGINT)", "os.kill"),
+        ("import signal; signal.raise_signal(signal.SIGINT)", "interrupts"),
+        ("import numpy; numpy.array = None", r"replaces numpy\.array"),
+    ],
+)
+def test_own_second_import_does_no_harm(what: str, words: str, file) -> None:
+    scene = prepared(load_scene("planar3-hold"), file(ONCE.format(what)), ())
+    with pytest.raises(InputError, match=words) as caught:
+        run(scene, 0.05)
+    assert len(str(caught.value)) < 500
+    assert np.array([1.0]).shape == (1,)
 
 
 def test_own_controller_that_fails_holds_the_robot_until_reset(file) -> None:

@@ -1,0 +1,100 @@
+"""`now` as numbers: taken apart on the lab's side, put together again in the process of the submission."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from math import prod
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ask = Callable[[str, int, list[Array]], Array]
+"""Calls a function of the model on the lab's side: its name, the level it is about, its arguments."""
+
+OF_TICK = ("q", "q_dot", "q_ddot", "tau_0", "M_bar", "M", "bias", "gravity")
+OF_BOUNDS = ("tau_lower", "tau_upper", "v_lower", "v_upper", "q_lower", "q_upper")
+OF_LEVEL = ("error", "x_dot", "x_ddot", "J", "J_dot_q_dot", "displacement_d", "x_dot_d", "x_ddot_d",
+            "K_p", "K_v", "Q", "R")  # fmt: skip
+"""The arrays of `himpc.controllers.view`, in the order in which they are sent."""
+
+
+def numbers_of(now: Any) -> list[Array]:
+    """The arrays of a `View`, in order."""
+    bounds = now.bounds
+    found = [getattr(now, name) for name in OF_TICK]
+    found += [getattr(bounds, name) for name in OF_BOUNDS]
+    for level in now.levels:
+        found += [getattr(level, name) for name in OF_LEVEL]
+        found += level.x.values()
+    return found
+
+
+def shape_of(now: Any) -> dict[str, Any]:
+    """What is to be known to read them: names, the shape of each, and what is no array."""
+    return {
+        "T_s": now.T_s,
+        "N": now.N,
+        "approach": now.bounds.approach,
+        "levels": [[level.name, level.tasks, list(level.x)] for level in now.levels],
+        "shapes": [each.shape for each in numbers_of(now)],
+    }
+
+
+class Part(SimpleNamespace):
+    """A level, or the bounds: names and numbers, in the symbols of the HIMPC paper."""
+
+    def __setattr__(self, name: str, _: Any) -> None:
+        raise AttributeError(f"what a controller sees is read-only: {name} cannot be set")
+
+
+class Now(Part):
+    """What `himpc.controllers.view.View` shows, in a process that does not have it."""
+
+    q: Array
+    levels: tuple[Part, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.q.size
+
+    def level(self, name: str) -> Part:
+        """A level by its name. Raises KeyError, naming the levels there are."""
+        for level in self.levels:
+            if level.name == name:
+                return level
+        raise KeyError(f"no level '{name}' is on: there are {', '.join(each.name for each in self.levels)}")
+
+
+def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
+    """`now` of a tick; its arrays are read-only.
+
+    Args:
+        shape: `shape_of` the `View`.
+        data: the numbers of its arrays, one after the other.
+        ask: calls a function of the model.
+    """
+    numbers, arrays, at = np.frombuffer(data, float), [], 0
+    for sides in shape["shapes"]:
+        end = at + prod(sides)
+        arrays.append(numbers[at:end].reshape(sides))
+        at = end
+    following = iter(arrays)
+    tick = {name: next(following) for name in OF_TICK}
+    bounds = Part(**{name: next(following) for name in OF_BOUNDS}, approach=shape["approach"])
+    levels = []
+    for place, (name, tasks, values) in enumerate(shape["levels"]):
+        parts: dict[str, Any] = {each: next(following) for each in OF_LEVEL}
+        parts["x"] = {each: next(following) for each in values}
+        parts["jacobian"] = partial(_asked, ask, "jacobian", place)
+        levels.append(Part(name=name, tasks=tuple(tasks), **parts))
+    nominal = Part(mass_matrix=partial(_asked, ask, "mass_matrix", 0), bias=partial(_asked, ask, "bias", 0))
+    return Now(**tick, T_s=shape["T_s"], N=shape["N"], levels=tuple(levels), bounds=bounds, nominal=nominal)
+
+
+def _asked(ask: Ask, name: str, level: int, *args: Any) -> Array:
+    return ask(name, level, [np.asarray(each, float) for each in args])

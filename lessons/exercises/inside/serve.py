@@ -1,0 +1,103 @@
+"""The process of a submission: numbers of `now` come in, a torque goes out.
+
+It imports what a solution may need and nothing that runs or judges a robot: whatever a submission climbs to,
+replaces or ends here, plant, checks and right answers are elsewhere.
+"""
+
+from __future__ import annotations
+
+import ctypes.util  # noqa: F401  # loaded before it is refused
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import himpc.qp  # noqa: F401  # what a solution may import of the lab
+from lessons.exercises.inside import wire
+from lessons.exercises.inside.confine import Refused, confine, hide_the_lab, limited, readable, refuse
+from lessons.exercises.inside.now import Now, rebuilt
+from lessons.own.files import Source, execute, sentence
+from lessons.own.kinds import law_of, line_of
+from robots import InputError
+
+Law = Callable[[Any], Any]
+ROOT = str(Path(__file__).parents[3])
+"""Where the lab lies; who starts this puts it first in `sys.path`."""
+
+
+def serve(parent: int, memory: int, kernel: bool) -> None:
+    """Answers messages until there are none.
+
+    Args:
+        parent: process with which it ends.
+        memory: bytes of address space it may have.
+        kernel: whether the system's own means are to be used; else Python's alone.
+    """
+    heard, told = os.dup(0), os.dup(1)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number in range(3):
+        os.dup2(nowhere, number)
+    limited(memory, parent)
+    sys.path.remove(ROOT)
+    sys.dont_write_bytecode = True
+    _, data = wire.read(heard)
+    source = Source(*json.loads(data))
+    refused = Refused()
+    np.linalg.inv(np.eye(2))  # what libraries set up when first used
+    hide_the_lab()
+    places = readable()
+    in_force = confine(places) if kernel else ()
+    refuse(places, refused)
+    wire.write(told, wire.READY, wire.of_json(in_force))
+    law: Law = _nothing
+    shape: Any = None
+
+    def ask(name: str, level: int, arguments: list[Any]) -> Any:
+        lists = [each.tolist() for each in arguments]
+        wire.write(told, wire.ASK, wire.of_json([name, level, lists]))
+        kind, data = wire.read(heard)
+        if kind != wire.REPLY:
+            raise ValueError(data.decode())
+        return wire.array_of(data)
+
+    while True:
+        try:
+            kind, data = wire.read(heard)
+        except EOFError:
+            os._exit(0)
+        if kind == wire.SHAPE:
+            shape = json.loads(data)
+            continue
+        try:
+            if kind == wire.LOAD:
+                module = execute(source)
+                law = law_of(module)()
+                said = [str(vars(module).get("EXERCISE", "")), line_of(module)]
+                answer = wire.READY, wire.of_json(said)
+            else:
+                answer = _answered(law(rebuilt(shape, data, ask)))
+        except InputError as error:
+            answer = wire.FAULT, str(error).encode()
+        except BaseException as error:
+            answer = wire.FAULT, sentence(source.path, error).encode()
+        if refused:
+            answer = wire.FAULT, f"{source.path}: a submission may not do that ({refused[0]})".encode()
+        wire.write(told, *answer)
+
+
+def _answered(found: Any) -> tuple[bytes, bytes]:
+    try:
+        array = np.array("" if found is None else found, float)
+        if array.ndim <= 2 and array.size <= 10_000:
+            return wire.TORQUE, wire.of_array(array)
+        return wire.OTHER, f"an array of shape {array.shape}".encode()
+    except (TypeError, ValueError):
+        return wire.OTHER, ("nothing" if found is None else f"a {type(found).__name__}").encode()
+
+
+def _nothing(_: Now) -> None:
+    """The law before there is one."""

@@ -1,0 +1,84 @@
+"""Messages between the lab and the process of a submission: a kind, a length, bytes. Nothing is unpickled."""
+
+from __future__ import annotations
+
+import json
+import os
+from struct import Struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LOAD = b"L"
+"""To the submission: execute the file anew. The answer is READY or FAULT."""
+SHAPE = b"S"
+"""To the submission: how the numbers of the next ticks are to be read, see `now.described`. No answer."""
+TICK = b"T"
+"""To the submission: the numbers of a tick. The answer is TORQUE, OTHER or FAULT, after any ASK."""
+REPLY = b"R"
+"""To the submission: the matrix it asked for."""
+READY = b"Y"
+"""From the submission: JSON of what the file says about itself."""
+TORQUE = b"U"
+"""From the submission: an array."""
+OTHER = b"O"
+"""From the submission: what it returned is no array; the name of its type."""
+FAULT = b"F"
+"""From the submission: one sentence about what it did wrong."""
+ASK = b"A"
+"""From the submission: JSON of a function of the model that is to be called. The answer is REPLY or FAULT."""
+
+HEADER = Struct("<cI")
+LARGEST = 1 << 20  # bytes of a message: far more than the torques of any robot
+_RANK = Struct("<B")
+_SIDE = Struct("<I")
+
+
+def packed(kind: bytes, data: bytes) -> bytes:
+    """A message as it is written."""
+    return HEADER.pack(kind, len(data)) + data
+
+
+def of_json(value: Any) -> bytes:
+    return json.dumps(value).encode()
+
+
+def of_array(values: Array) -> bytes:
+    """An array with its shape."""
+    sides = b"".join(_SIDE.pack(side) for side in values.shape)
+    return _RANK.pack(values.ndim) + sides + np.ascontiguousarray(values, float).tobytes()
+
+
+def array_of(data: bytes) -> Array:
+    """The array, read-only. Raises ValueError for bytes that are none."""
+    if not data or len(data) < 1 + 4 * data[0]:
+        raise ValueError("no shape")
+    begin = 1 + 4 * data[0]
+    shape = tuple(side for (side,) in _SIDE.iter_unpack(data[1:begin]))
+    return np.frombuffer(data, float, offset=begin).reshape(shape)
+
+
+def write(pipe: int, kind: bytes, data: bytes) -> None:
+    """Writes a message, however long it takes. Raises OSError."""
+    left = memoryview(packed(kind, data))
+    while left:
+        left = left[os.write(pipe, left) :]
+
+
+def read(pipe: int) -> tuple[bytes, bytes]:
+    """The next message, however long it takes. Raises EOFError if the other side is gone."""
+    kind, length = HEADER.unpack(_exactly(pipe, HEADER.size))
+    return kind, _exactly(pipe, length)
+
+
+def _exactly(pipe: int, count: int) -> bytes:
+    found = b""
+    while len(found) < count:
+        more = os.read(pipe, count - len(found))
+        if not more:
+            raise EOFError
+        found += more
+    return found

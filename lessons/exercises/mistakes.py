@@ -1,0 +1,71 @@
+"""Which known mistake a submission makes: the one that returns the same torques wherever it was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, final
+
+import numpy as np
+
+from himpc.controllers.view import View
+
+Law = Callable[[View], Any]
+CLOSE = 1e-6
+"""Share of the largest torque by which two laws may differ and count as the same."""
+_FIRST, _EVERY = 30, 10
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistake that is often made.
+
+    Attributes:
+        says: one sentence about it.
+        make: a law that makes it, without memory.
+    """
+
+    says: str
+    make: Callable[[], Law]
+
+
+@final
+class Diagnosis:
+    """What is left of the known mistakes of an exercise, run by run."""
+
+    def __init__(self, mistakes: Sequence[Mistake]) -> None:
+        self._left = list(mistakes)
+        self._laws: list[Law] = []
+        self._seen = 0
+
+    def begin(self) -> None:
+        """A run begins."""
+        self._laws, self._seen = [each.make() for each in self._left], 0
+
+    def see(self, now: View, answer: Any) -> None:
+        """What a submission made of a tick: the first ones of a run, then every tenth."""
+        self._seen += 1
+        if self._seen > _FIRST and self._seen % _EVERY:
+            return
+        alike = [_alike(law(now), answer) for law in self._laws]
+        self._left = [each for each, same in zip(self._left, alike, strict=True) if same]
+        self._laws = [each for each, same in zip(self._laws, alike, strict=True) if same]
+
+    @property
+    def says(self) -> str:
+        """The sentence of the first mistake that fits all that was seen; "" if none does."""
+        return self._left[0].says if self._left else ""
+
+
+def _alike(ours: Any, theirs: Any) -> bool:
+    try:
+        here, there = np.atleast_2d(np.asarray(ours, float))[-1], np.atleast_2d(np.asarray(theirs, float))[-1]
+        return bool(np.abs(here - there).max() <= CLOSE * (1.0 + np.abs(here).max()))
+    except (TypeError, ValueError):
+        return False
+
+
+def wrong(says: str, law: Callable[..., Any], **how: Any) -> Mistake:
+    """A law without memory with something wrong in it."""
+    return Mistake(says, lambda: partial(law, **how))

@@ -1,0 +1,48 @@
+"""How long a process takes to answer by its own doing: what it computes, and what it sleeps."""
+
+from __future__ import annotations
+
+import time
+from typing import final
+
+from robots.family import spent
+from robots.isolation import PATIENCE
+
+LOOK = 0.1
+"""s between looks at a process that has not answered."""
+
+
+@final
+class Watch:
+    """One question to a process. What it waits for a core on a busy machine does not count, up to `PATIENCE`
+    times as much in all.
+
+    Attributes:
+        seconds: that the answer may take.
+        what: is being done, for the beginning of a sentence.
+        began: when it was asked.
+        slept: s that it neither computed nor waited for a core, as far as it was looked at.
+    """
+
+    def __init__(self, pid: int, seconds: float, what: str) -> None:
+        self.seconds, self.what, self.began = seconds, what, time.monotonic()
+        self._pid, self.slept = pid, 0.0
+        self._last: float | None = None
+        self._computed = 0.0
+
+    @property
+    def passed(self) -> float:
+        """s since it was asked."""
+        return time.monotonic() - self.began
+
+    def over(self) -> bool:
+        """Whether it took too long. To be asked every tenth of a second."""
+        now = time.monotonic()
+        computed, asleep = spent(self._pid)
+        if self._last is None:
+            self._last, self._computed = now, computed
+        elif asleep:
+            self.slept += now - self._last
+        self._last = now
+        own = computed - self._computed + self.slept
+        return own > self.seconds or self.passed > PATIENCE * self.seconds
