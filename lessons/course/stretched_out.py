@@ -71,8 +71,9 @@ REGULAR = Step(
     why=r"""
     The torque never leaves its bounds, and after a few tenths of a second the hand is on its
     circle, with no case distinction for singular poses. $R$ is a damping factor, too. But it damps
-    the *change* of torque: at rest it costs nothing, so it need not be small to be accurate, nor
-    tuned anew for every pose. The ghost, with a hundred times the $R$, does as well.
+    the *change* of torque: at rest it costs nothing, so it need not be small to be accurate. The
+    ghost, with a hundred times the $R$, does as well; with a million times the hand swings by
+    centimetres and more.
     """,
     claims=(
         Claim(

@@ -11,6 +11,8 @@ import re
 
 import numpy as np
 import pytest
+from interventions_course import COURSE_ROWS
+from interventions_documents import DOCUMENT_ROWS
 from quoted import QUOTED, CourseRuns, Quoted, specs, step_of
 
 from lessons.course import COURSE, load_lesson
@@ -46,6 +48,7 @@ def test_a_number_in_a_sentence_is_measured(quoted: Quoted, course_runs: CourseR
 # -------------------------------------------------- numbers that follow from settings, or are the papers'
 
 
+ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
 WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
 LOOSE = re.compile(rf"(?<![\w.−-])−?\d+(?:\.\d+)?|\b(?:{WORDS})\b")
 """Digits, and words that are numbers."""
@@ -57,7 +60,8 @@ GIVEN: dict[str, tuple[str, ...]] = {
     # Of the step's own text and script.
     "a-redundant-arm/1": ("60",),
     "when-tasks-fight/2": ("2",),
-    "seeing-ahead/2": ("8", "42"),  # and the paper's improvement
+    "seeing-ahead/2": ("8", "0.3", "1", "42"),  # and the paper's improvement
+    "seeing-ahead/3": ("20",),
     "deliveries/2": ("8", "16.5"),
     "sensors-are-coarse/0": ("4",),
     "inside-the-qp/0": ("2",),
@@ -67,7 +71,7 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "no-model-needed/1": ("1", "1", "−1"),
     "no-model-needed/2": ("1",),
     "no-model-needed/3": ("−1", "0.91", "−0.89"),  # eigenvalues: below
-    "the-model-is-wrong/2": ("1",),
+    "the-model-is-wrong/2": ("1", "0.01", "1"),  # and a setting
     # What follows from settings and equations: below.
     "two-tasks/1": ("200", "50"),
     "stretched-out/0": ("million",),
@@ -76,7 +80,7 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
     "inside-the-qp/3": ("half",),  # 5 of 10 cm, 7 of 14 degrees
     # Every other torque counts, or is computed.
-    "deadlines/0": ("half",),
+    "deadlines/0": ("2",),
     "deadlines/1": ("half", "half", "1", "8"),  # and the paper's period and step time
     "deadlines/2": ("half",),
     # The line search halves; a control step is 0.1 s.
@@ -95,8 +99,10 @@ def test_every_number_in_an_explanation_is_measured_or_said_to_be_given() -> Non
     for name in COURSE:
         for place, step in enumerate(load_lesson(name).steps):
             key, why = f"{name}/{place}", " ".join(step.why.split())
-            for each in QUOTED:
-                why = why.replace(each.phrase, "§") if each.step == key else why
+            phrases = [each.phrase for each in QUOTED if each.step == key]
+            phrases += [each.says for each in ROWS if each.at == key]
+            for phrase in phrases:
+                why = why.replace(phrase, "§")
             loose = LOOSE.findall(REFERENCE.sub("§", re.sub(r"\$\$?.+?\$\$?", "§", why)))
             if loose:
                 found[key] = tuple(loose)
