@@ -117,9 +117,9 @@ HEAVIER = Step(
     The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower;
     a larger $\bar M$ takes it back. Lighter links make corrections faster and the error smaller, and
     they do not lead to the cliff, since the inertia of the motors is left: with links of a twentieth
-    the gauge reads 0.47. It passes 1 where the motors are lighter as well, 0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay
-    bounded (Remark 4). That is enough, not necessary: in the long run the spectral radius decides,
-    the gauge.
+    the gauge reads 0.47. It passes 1 where the motors are lighter as well, 0.01 kg·m² each. As long as
+    $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4). That is enough, not
+    necessary: in the long run the spectral radius decides, the gauge.
     """,
     prediction=Choice(
         "Links 50 % heavier, not told. HIMPC's largest error grows …",

@@ -1,7 +1,8 @@
 """Explanations tested by intervention: the cause is taken away, and the effect has to go.
 
-Each row quotes a sentence, names a run that shows the effect, what takes the cause away, and what is measured with it
-and without. The rows of the course are in `interventions_course`, those of the documents in `interventions_documents`.
+Each row quotes a sentence, names a run that shows the effect, what takes the cause away, and what is measured
+with it and without. The rows of the course are in `interventions_course`, those of the documents in
+`interventions_documents`.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ class Intervention:
     """A sentence that says what causes what.
 
     Attributes:
-        at: where it stands: "lesson/place" for a step, "further/lesson" for what its page derives, or the name of a
-            document of `test_lessons_interventions.DOCUMENTS`.
+        at: where it stands: "lesson/place" for a step, "further/lesson" for what its page derives, or the
+            name of a document of `test_lessons_interventions.DOCUMENTS`.
         says: the sentence, or the part of it that names the cause, word for word.
         measure: the effect.
         there: its range with the cause, in the measure's unit.

@@ -13,7 +13,7 @@ INF = float("inf")
 
 # fmt: off
 COURSE_ROWS = (
-    # ------------------------------------------------------------------------------------ one-task
+    # ---------------------------------------- one-task
     Intervention(
         "one-task/3", "0.2 s later it does 70°/s the other way",
         of("v", "deg/s", "mean", 0.45, 0.5, column=1), (65, 75), ("limits.velocity=false",), (-500, -200),
@@ -31,7 +31,7 @@ COURSE_ROWS = (
     Intervention(
         "one-task/3", "the hand hardly notices", HAND, (1.8, 2.8), ("damping=true",), (1.8, 2.8), stays=True,
     ),
-    # ------------------------------------------------------------------------------------ two-tasks
+    # ---------------------------------------- two-tasks
     Intervention(
         "two-tasks/3", "But a $Q$ that small has to outweigh $R$ as well.",
         Q1, (8, 20), ("levels.q1.R=0.001", "levels.position.R=0.001"), (0, 0.1),
@@ -42,7 +42,7 @@ COURSE_ROWS = (
         Q1, (0.15, 0.4), ("levels.q1.R=0.1", "levels.position.R=0.1"), (0, 0.05),
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-3"), on="two-tasks/3",
     ),
-    # ------------------------------------------------------------------------------------ stretched-out
+    # ---------------------------------------- stretched-out
     Intervention(
         "stretched-out/1", "with a million times the hand swings by centimetres and more",
         of("error/position", "mm", "largest", 1.0), (50, INF), ("R=1000",), (0, 0.5), of=("R=1e7",),
@@ -52,7 +52,7 @@ COURSE_ROWS = (
         of("error/position", "mm", "range", 1.0), (100, 900), ("R=1e5",), (0, 5),
         of=("R=1e7",), on="stretched-out/1", seconds=4.0,
     ),
-    # ------------------------------------------------------------------------------------ deadlines
+    # ---------------------------------------- deadlines
     Intervention(
         "deadlines/0", "every single torque is one tick late", HAND, (3, 4), ("deadline_ms=0",), (1.2, 1.7),
     ),
@@ -65,7 +65,7 @@ COURSE_ROWS = (
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
         of=("plant.encoder_resolution_deg=0.001",),
     ),
-    # ------------------------------------------------------------------------------------ the-model-is-wrong
+    # ---------------------------------------- the-model-is-wrong
     Intervention(
         "the-model-is-wrong/1", "here that is mostly the friction",
         HAND, (1.0, 2.5), ("plant.friction=0",), (0, 0.3),
@@ -86,7 +86,8 @@ COURSE_ROWS = (
         of=("plant.mass_scale=0.5", "plant.inertia_scale=0.5"),
     ),
     Intervention(
-        "the-model-is-wrong/2", "the inertia of the motors is left: with links of a twentieth the gauge reads 0.47",
+        "the-model-is-wrong/2",
+        "the inertia of the motors is left: with links of a twentieth the gauge reads 0.47",
         RADIUS, (0.465, 0.475), ("plant.armature=0.01",), (1.2, 4),
         of=("plant.mass_scale=0.05", "plant.inertia_scale=0.05"), seconds=0.5,
     ),
@@ -95,8 +96,8 @@ COURSE_ROWS = (
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
         of=("M_bar_scale=4",), seconds=0.5,
     ),
-    # ------------------------------------------------------------------------------------ how-strict-is-strict
-    # ------------------------------------------------------------------------------------ seeing-ahead
+    # ---------------------------------------- how-strict-is-strict
+    # ---------------------------------------- seeing-ahead
     Intervention(
         "seeing-ahead/0", "it cannot leave for a place that it does not know of",
         of("way of the base", "m", "range", 6.5, 8.0), (0, 0.05), ("controller=htmpc",), (0.4, 0.8),
@@ -107,7 +108,8 @@ COURSE_ROWS = (
         EE, (25, 40), ("limits.jerk=false",), (5.5, 6.9),
     ),
     Intervention(
-        "seeing-ahead/1", "with half the top speed for 4 mm", EE, (25, 40), ("limits.velocity_scale=0.5",), (3.5, 4.5),
+        "seeing-ahead/1", "with half the top speed for 4 mm", EE, (25, 40), ("limits.velocity_scale=0.5",),
+        (3.5, 4.5),
     ),
     Intervention(
         "seeing-ahead/1", "three times the acceleration hardly helps",
@@ -134,7 +136,8 @@ COURSE_ROWS = (
         EE, (15, 25), ("rate_hz=100",), (6, 14),
     ),
     Intervention(
-        "seeing-ahead/3", "with 5 1/s for the hand it is off by half", EE, (15, 25), ("gains=[5,2]",), (7, 13),
+        "seeing-ahead/3", "with 5 1/s for the hand it is off by half", EE, (15, 25), ("gains=[5,2]",),
+        (7, 13),
     ),
     Intervention(
         "seeing-ahead/3", "with 20 1/s by 3 mm", EE, (15, 25), ("gains=[20,2]",), (2, 4),

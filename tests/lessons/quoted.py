@@ -315,7 +315,7 @@ def specs(quoted: Quoted) -> tuple[RunSpec, RunSpec | None]:
 
 
 class CourseRuns(NamedTuple):
-    """What the check says of all lessons, and the numbers of `QUOTED` and of the interventions by their run."""
+    """What the check says of all lessons, and the numbers of `QUOTED` and the interventions by run."""
 
     verdicts: list[Verdict]
     values: dict[RunSpec, dict[Measure, float]]

@@ -18,6 +18,7 @@ from test_lessons_quoted import texts
 from docs.further import further
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
+from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 
 ROOT = Path(__file__).parents[2]
@@ -75,11 +76,12 @@ def test_without_its_cause_an_effect_goes(row: Intervention, course_runs: Course
 
 
 def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
-    """The glossary: for the costs (31), which are written without a half, the price is twice the multiplier."""
+    """The glossary: for the costs (31), written without a half, the price is twice the multiplier."""
     scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).prepared()
 
     def after(ticks: int, change: float) -> TorqueSession:
-        session = TorqueSession(scene)
+        session = begin(scene)
+        assert isinstance(session, TorqueSession)
         for _ in range(ticks):
             session.tick()
         session.post(Set("limits.torque_scale", 0.25 + change))
