@@ -85,7 +85,7 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"Rounding leaves $e = 10^{-9}$ m/s² along the arm, where $g = 10^{-12}$. What do an inverse "
+            r"A trace of $e = 10^{-9}$ m/s² is left along the arm, where $g = 10^{-12}$. What do an inverse "
             r"and HIMPC ask "
             "for? ($Q = 200$, $R = 10$.)",
             r"The inverse asks for $e/g = ⟨inverse⟩$ N·m, out of nothing. HIMPC asks for $Q g e/R = "

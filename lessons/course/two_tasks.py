@@ -33,8 +33,8 @@ BOTH = Step(
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
     why=r"""
     As long as all wishes can be granted together, priorities hardly matter: the ghost has none, only
-    equal weights. They still do wherever something is not granted *at once*, after a sudden change
-    or at a bound.
+    equal weights. They still do wherever a bound is in the way of one of them: lesson *Torque has a
+    limit*.
     """,
     claims=(
         Claim(

@@ -9,11 +9,36 @@ Q1 = of("error/q1", "deg")
 RADIUS = of("gauge_radius")
 SPEED = of("speed share", "%")
 NO_LIMITS = ("limits.velocity=false", "limits.acceleration=false", "limits.jerk=false")
+JOINT_2 = of("q", "deg", column=1)
 INF = float("inf")
+EXACT = (
+    "nominal.mass_scale=1",
+    "nominal.inertia_scale=1",
+    "nominal.armature=[0.05,0.05,0.03]",
+    "nominal.damping=[0.15,0.1,0.08]",
+)
 
 # fmt: off
 COURSE_ROWS = (
+    # ---------------------------------------- a-redundant-arm
+    Intervention(
+        "a-redundant-arm/0", "All seven joints take part",
+        of("q", "deg", "range", column=6), (5, 30), ("levels.orientation.enabled=false",), (0, 1),
+    ),
+    Intervention(
+        "a-redundant-arm/1", "only the part of the wish that lies in the null space is granted",
+        of("q", "deg", "range", column=2), (27, 31),
+        ("levels.position.enabled=false", "levels.orientation.enabled=false"), (57, 61),
+    ),
     # ---------------------------------------- one-task
+    Intervention(
+        "one-task/0", "because by then the torques had learned to push back",
+        of("error/position", "mm", "mean", 0.35, 0.4, column=0), (-2, -0.3), ("controller=osf", *EXACT),
+        (5, 90),
+    ),
+    Intervention(
+        "one-task/2", "with $\\bar M^{-1} = 30$ here", HAND, (3.6, 4.2), ("R_on=acceleration",), (10, 40),
+    ),
     Intervention(
         "one-task/3", "0.2 s later it does 70°/s the other way",
         of("v", "deg/s", "mean", 0.45, 0.5, column=1), (65, 75), ("limits.velocity=false",), (-500, -200),
@@ -31,7 +56,33 @@ COURSE_ROWS = (
     Intervention(
         "one-task/3", "the hand hardly notices", HAND, (1.8, 2.8), ("damping=true",), (1.8, 2.8), stays=True,
     ),
+    # ---------------------------------------- no-model-needed
+    Intervention(
+        "no-model-needed/0", "its springs hold that, so it sags by centimetres",
+        of("error/position", "mm", "last"), (20, 90), ("nominal.payload_kg=1",), (0, 0.1),
+        of=("controller=hqp",),
+    ),
+    Intervention(
+        "no-model-needed/1", "every millisecond only a part of the error in $\\ddot q$ is removed",
+        HAND, (40, 80), ("M_bar_scale=1",), (12, 19),
+    ),
+    Intervention(
+        "no-model-needed/3", "each correction is more than twice too large",
+        RADIUS, (1.05, 9), ("M_bar_scale=4",), (0, 0.99), seconds=0.2,
+    ),
     # ---------------------------------------- two-tasks
+    Intervention(
+        "two-tasks/0", "They still do wherever a bound is in the way of one of them",
+        HAND, (1, 3), ("controller=himpc",), (0, 0.2), of=("controller=weighted",), on="torque-has-a-limit/1",
+    ),
+    Intervention(
+        "two-tasks/1", "So the gains are prices, too.",
+        HAND, (200, 300), ("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"), (5, 150),
+    ),
+    Intervention(
+        "two-tasks/2", "no weight of level 2 can change that",
+        HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
+    ),
     Intervention(
         "two-tasks/3", "But a $Q$ that small has to outweigh $R$ as well.",
         Q1, (8, 20), ("levels.q1.R=0.001", "levels.position.R=0.001"), (0, 0.1),
@@ -42,7 +93,39 @@ COURSE_ROWS = (
         Q1, (0.15, 0.4), ("levels.q1.R=0.1", "levels.position.R=0.1"), (0, 0.05),
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-3"), on="two-tasks/3",
     ),
+    # ---------------------------------------- swap-the-priorities
+    Intervention(
+        "swap-the-priorities/2", "It is not the bounds that keep it calm",
+        of("v", "deg/s"), (85, 105), ("limits.velocity=false", "limits.torque=false", "limits.position=off"),
+        (85, 105), stays=True,
+    ),
+    # ---------------------------------------- when-tasks-fight
+    Intervention(
+        "when-tasks-fight/0", "The singularity is made by the algorithm",
+        of("torque share", "%"), (1e5, INF), ("controller=osf_damped",), (0, 2000),
+    ),
+    Intervention(
+        "when-tasks-fight/1", "The trouble is not what the model says, it is the inverse.",
+        of("torque share", "%"), (1e5, INF), ("controller=tdeosf_damped",), (0, 2000),
+    ),
+    Intervention(
+        "when-tasks-fight/1", "It knows the arm better and fails at the same place",
+        of("torque share", "%"), (1e5, INF), ("plant.friction=0", *EXACT), (1e5, INF), of=("controller=osf",),
+        stays=True,
+    ),
     # ---------------------------------------- stretched-out
+    Intervention(
+        "stretched-out/0", "for a tenth of a second the demand is small",
+        of("torque share", "%", "largest", 0.0, 0.1), (1e6, INF), ("smooth=true",), (0, 1),
+    ),
+    Intervention(
+        "stretched-out/0", "A damped inverse, `osf_damped`, asks for a fifth of the limit.",
+        of("torque share", "%"), (1e6, INF), ("controller=osf_damped",), (18, 22),
+    ),
+    Intervention(
+        "stretched-out/2", "Nearly all of it was the jump",
+        HAND, (2, 10), ("smooth=true",), (0, 0.5), of=("smooth=false",),
+    ),
     Intervention(
         "stretched-out/1", "with a million times the hand swings by centimetres and more",
         of("error/position", "mm", "largest", 1.0), (50, INF), ("R=1000",), (0, 0.5), of=("R=1e7",),
@@ -51,6 +134,57 @@ COURSE_ROWS = (
         "further/stretched-out", "the run with $R = 10^7$ swings by decimetres",
         of("error/position", "mm", "range", 1.0), (100, 900), ("R=1e5",), (0, 5),
         of=("R=1e7",), on="stretched-out/1", seconds=4.0,
+    ),
+    # ---------------------------------------- torque-has-a-limit
+    Intervention(
+        "torque-has-a-limit/0", "A bound that is not met does nothing",
+        HAND, (0.03, 0.07), ("limits.torque_scale=1",), (0.03, 0.07), stays=True,
+    ),
+    Intervention(
+        "torque-has-a-limit/1", "With joint 1 first it is the hand that goes without, by 1.6 mm",
+        HAND, (0, 0.1), ("order=q1,position",), (1.55, 1.7),
+    ),
+    Intervention(
+        "torque-has-a-limit/1", "joint 1 does not notice",
+        Q1, (0.45, 0.65), ("order=q1,position",), (0, 0.05),
+    ),
+    Intervention(
+        "torque-has-a-limit/1", "the order makes no difference",
+        Q1, (9, 13), ("order=q1,position",), (9, 13), of=("q1_amplitude_deg=60",), stays=True,
+    ),
+    Intervention(
+        "torque-has-a-limit/2", "for with joint 1 first it is the same",
+        HAND, (8, 12), ("order=q1,position",), (8, 12), stays=True,
+    ),
+    Intervention(
+        "torque-has-a-limit/2", "16 mm instead of 10, since level 2 has moved joint 1 meanwhile",
+        HAND, (15.5, 17), ("levels.q1.enabled=false",), (9.5, 11), of=("q1_amplitude_deg=-30",),
+    ),
+    # ---------------------------------------- stopping-takes-distance
+    Intervention(
+        "stopping-takes-distance/0", "overruns its range by 0.6°",
+        JOINT_2, (150.55, 150.75),
+        ("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"), (149, 150.2),
+    ),
+    Intervention(
+        "stopping-takes-distance/0", "with the rows on speed off as well only 0.1° is left",
+        JOINT_2, (150.05, 150.15), ("limits.torque_scale=1", "plant.saturate=true"), (150.4, 151),
+        of=("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"),
+    ),
+    Intervention(
+        "stopping-takes-distance/0", "Three times the torque alone changes nothing",
+        JOINT_2, (150.5, 150.8), ("limits.torque_scale=3", "plant.saturate=false"), (150.5, 150.8),
+        stays=True,
+    ),
+    # ---------------------------------------- how-far-ahead
+    Intervention(
+        "how-far-ahead/0", "Twice the $\\bar M$ halves the error; no horizon does that.",
+        of("error/position", "mm", "rms"), (0.75, 1.0), ("M_bar_scale=2",), (0.3, 0.55),
+    ),
+    Intervention(
+        "how-far-ahead/1", "Now the first step alone cannot do it all",
+        of("error/position", "mm", "rms"), (0.75, 1.1), ("R_on=acceleration",), (1.2, 9),
+        of=("R_on=torque", "horizon=1"),
     ),
     # ---------------------------------------- deadlines
     Intervention(
@@ -61,11 +195,32 @@ COURSE_ROWS = (
         HAND, (3, 4), ("T_s=0.002", "deadline_ms=2"), (3, 4), stays=True,
     ),
     Intervention(
+        "deadlines/1", "The error grows with the period", HAND, (3, 4), ("T_s=0.005", "deadline_ms=5"),
+        (7, 15),
+    ),
+    Intervention(
         "deadlines/2", "noise counts double",
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
         of=("plant.encoder_resolution_deg=0.001",),
     ),
+    # ---------------------------------------- sensors-are-coarse
+    Intervention(
+        "sensors-are-coarse/0", "With finer encoders the noise goes in proportion.",
+        of("delta_tau", "N·m", "rms"), (3.2, 4.4), ("plant.encoder_resolution_deg=0.0025",), (1.6, 2.2),
+    ),
+    Intervention(
+        "sensors-are-coarse/1", "half of it leaves half of the noise",
+        of("delta_tau", "N·m", "rms"), (3.2, 4.4), ("M_bar_scale=0.5",), (1.6, 2.2), of=("T_s=0.001",),
+    ),
+    Intervention(
+        "sensors-are-coarse/1", "again the error grows by little more than half",
+        HAND, (0.088, 0.102), ("M_bar_scale=0.5",), (0.138, 0.165), of=("T_s=0.001",),
+    ),
     # ---------------------------------------- the-model-is-wrong
+    Intervention(
+        "the-model-is-wrong/0", "time-delay estimation only what has happened",
+        HAND, (0.009, 0.014), ("T_s=0.0005",), (0.004, 0.007), of=("controller=himpc",),
+    ),
     Intervention(
         "the-model-is-wrong/1", "here that is mostly the friction",
         HAND, (1.0, 2.5), ("plant.friction=0",), (0, 0.3),
@@ -148,6 +303,17 @@ COURSE_ROWS = (
     ),
     Intervention(
         "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (28, 50),
+    ),
+    # ---------------------------------------- your-robot
+    Intervention(
+        "your-robot/1", "what it does not know of the weight, the springs must carry",
+        of("error/position", "mm", "last"), (10, 100),
+        ("nominal.mass_scale=1.5", "nominal.inertia_scale=1.5"),
+        (0, 0.1), of=("controller=hqp",),
+    ),
+    Intervention(
+        "further/your-robot", "Safer, and less accurate.",
+        HAND, (9, 16), ("plant.mass_scale=1", "plant.inertia_scale=1"), (5, 8.5), on="your-robot/1",
     ),
 )
 # fmt: on

@@ -134,8 +134,8 @@ QUOTED = (
         0.5,
     ),
     Quoted("stretched-out/2", "an error of some millimetres right at the start", _of(HAND), 2, 10, None),
-    Quoted("torque-has-a-limit/0", "three quarters of the 0.24 N·m", _of(TORQUE), 70, 80),
-    Quoted("torque-has-a-limit/1", "falls behind by ten degrees and more", _of(Q1), 10, 30),
+    Quoted("torque-has-a-limit/0", "nine tenths of the 0.24 N·m", _of(TORQUE), 85, 92),
+    Quoted("torque-has-a-limit/1", "falls behind by half a degree", _of(Q1), 0.45, 0.6),
     Quoted("stopping-takes-distance/0", "it comes at 57°/s", _of(Signal("v", "deg/s", column=1)), 56.5, 57.5),
     Quoted(
         "stopping-takes-distance/2",

@@ -15,6 +15,7 @@ from interventions_course import COURSE_ROWS
 from interventions_documents import DOCUMENT_ROWS
 from quoted import QUOTED, CourseRuns, Quoted, specs, step_of
 
+from himpc.limits import Limits
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget
 from lessons.papers.printed import printed
@@ -74,8 +75,10 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "the-model-is-wrong/2": ("1", "0.01", "1"),  # and a setting
     # What follows from settings and equations: below.
     "two-tasks/1": ("200", "50"),
-    "stretched-out/0": ("million",),
-    "stopping-takes-distance/0": ("57", "0.3", "100"),
+    "stretched-out/0": ("0.06", "million"),
+    "torque-has-a-limit/1": ("60",),  # settings
+    "torque-has-a-limit/2": ("−30",),
+    "stopping-takes-distance/0": ("57", "0.3", "100", "60", "41"),
     "stopping-takes-distance/1": ("20", "50"),
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
     "inside-the-qp/3": ("half",),  # 5 of 10 cm, 7 of 14 degrees
@@ -135,6 +138,8 @@ def test_the_inverse_of_a_straight_arm_magnifies_many_million_times() -> None:
     plant.reset(scene.q_0)
     J = plant.jacobian(scene.robot.tip)[:2]
     assert np.linalg.cond(J @ np.linalg.solve(plant.mass_matrix(), J.T)) > 1e7
+    asked = begin(scene).tick()[begin(scene).layout.fields["a_d/position"]]
+    np.testing.assert_allclose(asked, [-0.06, 0.0], atol=5e-3)  # along the arm
 
 
 def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
@@ -144,6 +149,7 @@ def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
     assert math.degrees(d) == pytest.approx(0.3, abs=0.02)
     assert v**2 / (2.0 * d) == pytest.approx(100.0, abs=1.0)
     assert v / 20.0 == pytest.approx(0.05, abs=1e-3)  # the 50 steps of a gentle stop
+    assert Limits().velocity_approach * (math.radians(100.0) + v) == pytest.approx(41.0, abs=0.5)
     scene = torque_scene("planar3-hold")
     plant = Plant(scene.robot, scene.settings.plant)
     q = np.array(scene.q_0)
