@@ -33,7 +33,11 @@ settings.load_profile("same-every-time")
 
 _TOGETHER = (
     ("tests/app/browser/",),
-    ("tests/lessons/test_lessons_course.py", "tests/lessons/test_lessons_quoted.py"),
+    (
+        "tests/lessons/test_lessons_course.py",
+        "tests/lessons/test_lessons_quoted.py",
+        "tests/lessons/test_lessons_interventions.py",
+    ),
 )
 """Beginnings of files that share what is dear: a browser, which one core can draw; all runs of the course."""
 
@@ -55,6 +59,7 @@ _LONG = (
     "tests/test_site.py",
     "tests/lessons/test_lessons_course.py",
     "tests/lessons/test_lessons_quoted.py",
+    "tests/lessons/test_lessons_interventions.py",
     "tests/commands/test_commands_reproduce.py",
 )
 """What takes long comes first, of that what mostly waits: no worker is left alone with it at the end."""

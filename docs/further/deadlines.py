@@ -99,7 +99,7 @@ FURTHER = Further(
             "A computer needs 0.1 ms for each knot. How many knots can it afford with 1 ms, 2 ms and 5 "
             "ms? And one that needs 0.4 ms, with 1 ms?",
             "⟨a⟩, ⟨b⟩ and ⟨c⟩; the slow one ⟨d⟩. Whether to spend them is another question: *How far "
-            "ahead* found little that a longer horizon gives, and here it costs half of the feedback.",
+            "ahead* found little that a longer horizon gives, and here it halves the rate of the loop.",
             {
                 "a": (1 / 0.1, ".0f"),
                 "b": (2 / 0.1, ".0f"),

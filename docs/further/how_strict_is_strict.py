@@ -93,8 +93,9 @@ FURTHER = Further(
             "The paper's Table I has 6.25 mm with (11) and 3.42 mm with (12) for the hand at high δ. By "
             "how much is (12) better there? Is that what the derivation says?",
             "By ⟨less⟩ %. The derivation says that (12) is the stricter one, so that the hand must be no "
-            "worse; it does not say by how much, nor that the base profits. With the paper's own weights "
-            "we find the hand worse off, since there level 1's best is a compromise with a slope.",
+            "worse; it does not say by how much, nor that the base profits. Under the paper's formulation "
+            "level 1's best is a compromise between error and effort, and the order hangs on $Q$: with 1 we "
+            "find the hand worse off under (12), with 100 better.",
             {"less": (100 * (1 - 3.42 / 6.25), ".0f")},
         ),
     ),

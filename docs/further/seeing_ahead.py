@@ -81,9 +81,9 @@ FURTHER = Further(
         Question(
             "HTIDKC drives the base home with $K = 0.3$ 1/s, from 1.5 m away. How far is it from home "
             "after 8 s, if its wish is always granted?",
-            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m: the lesson sees 16 cm. Limits on speed and acceleration "
-            r"cost the little that "
-            "is missing.",
+            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m: the lesson sees 16 cm. What is missing is not "
+            r"granted: each level also pays $\rho \lVert \dot q \rVert^2$ for its speed. With a thousandth "
+            r"of this $\rho$ the difference goes.",
             {"left": (1.5 * math.exp(-0.3 * 8), ".2f")},
         ),
         Question(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from docs.further.kit import Further, Line, Question, planar
@@ -63,7 +65,7 @@ FURTHER = Further(
         ),
         Line(
             r"Damped inverses have the same form and leave an error where they damp. Here $R$ weighs a "
-            r"*change* of torque, so the step is repeated until nothing is left, for any $R$:",
+            r"*change* of torque, so the step is repeated until nothing of a constant $e$ is left:",
             r"e_{k+1} = \frac{R}{Q g^2 + R}\, e_k \;\to\; 0",
             _unbiased,
             1e-6,
@@ -83,7 +85,7 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"Rounding leaves $e = 10^{-9}$ m/s² along the arm, where $g = 10^{-12}$. What do an inverse "
+            r"A trace of $e = 10^{-9}$ m/s² is left along the arm, where $g = 10^{-12}$. What do an inverse "
             r"and HIMPC ask "
             "for? ($Q = 200$, $R = 10$.)",
             r"The inverse asks for $e/g = ⟨inverse⟩$ N·m, out of nothing. HIMPC asks for $Q g e/R = "
@@ -96,11 +98,13 @@ FURTHER = Further(
             "after one step with $R = 10$, and with $R = 1000$? What does that say about the lesson's ghost?",
             r"$R/(Q g^2 + R)$ is ⟨small⟩ % and ⟨large⟩ %. Both are gone within a few milliseconds, which "
             r"is why the ghost does as well: between the two lies no tuning. At $R = 10^5$ it would be "
-            r"⟨more⟩ %.",
+            r"⟨more⟩ %, and at $10^7$ it takes ⟨slow⟩ ms until a third is left. In so long a time $e$ does "
+            r"not stay as it is, and the run with $R = 10^7$ swings by decimetres.",
             {
                 "small": (100 * 10 / (200 * G**2 + 10), ".3f"),
                 "large": (100 * 1000 / (200 * G**2 + 1000), ".1f"),
                 "more": (100 * 1e5 / (200 * G**2 + 1e5), ".0f"),
+                "slow": (math.log(1 / 3) / math.log(1e7 / (200 * G**2 + 1e7)), ".0f"),
             },
         ),
     ),

@@ -91,9 +91,8 @@ FURTHER = Further(
             "How many times larger than $Q_2$ must $Q_1$ be there for $z$ to stay below 0.001, and below "
             r"$10^{-6}$? What speaks against just taking it so?",
             r"From $z = 50^2 Q_2/(200^2 Q_1 + 50^2 Q_2)$ it is $Q_1/Q_2 > ⟨much⟩$, and ⟨more⟩ for a "
-            r"millionth. Level 2 then weighs little beside $R$, so it is not followed even where it could "
-            r"be, and the Hessian holds "
-            "numbers so far apart that a solver loses digits.",
+            r"millionth. Level 2 then weighs little beside $R$, so it is followed less well even where it "
+            r"could be: the last step of the lesson shows it.",
             {"much": ((1 / 0.001 - 1) / 16, ".0f"), "more": ((1 / 1e-6 - 1) / 16, ",.0f")},
         ),
         Question(

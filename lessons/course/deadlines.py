@@ -39,9 +39,9 @@ ONE_MORE = Step(
     why=r"""
     The error more than doubles, between one knot and the next. Nothing is gained by the longer
     horizon, and every single torque is one tick late. Each $\Delta\tau$ is meant as a change of the
-    torque that acts now; when it arrives, that torque is already the result of another
-    $\Delta\tau$: two corrections start from the same point, and every other one is lost. Late by a
-    thousandth of a second is not a small delay here: it is half of the feedback.
+    torque that acts now; when it arrives, another torque has taken that one's place. So the even and
+    the odd ticks are two sequences of torques, each corrected only once in 2 ms, and neither knows of
+    the other's corrections. None of these is lost: it is a loop of half the rate.
     """,
     prediction=Choice(
         "Eleven knots instead of ten, 0.1 ms too slow: the largest error of this motion …",
@@ -136,7 +136,7 @@ REPAIR = Step(
     why=r"""
     The lost half is back: the errors are the same to the third digit. It was paid for with the
     margin: the cliff is where it was, between 2 and 2.5 times the old $\bar M$, and noise counts
-    double. Time is bought with robustness, never for nothing.
+    double.
     """,
     prediction=Choice(
         "Always one tick late, but M̄ doubled. Compared with an arm in time the error is …",

@@ -62,7 +62,7 @@ FURTHER = Step(
             "at most",
             1.05,
             fails_with=("limits.position=viability",),
-            because="with bounds that are active, predicted Jacobians cost more than they give",
+            because="with this lab's own bounds before the ends of joints a longer horizon does worse",
         ),
     ),
     set=("horizon=20",),

@@ -144,7 +144,8 @@ SUM = Step(
     The quadratic program walks off blindly, the line search cuts the step to a fortieth. The rows of
     (12) have the full Jacobian there. The paper finds the same, (12) "permitting larger step
     sizes", and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
-    (With the paper's own weights, `formulation=paper`, we find the hand worse off under (12).)
+    (Under the formulation as printed, `formulation=paper`, the order hangs on a weight that the paper
+    does not print: with our $Q = 1$ the hand is worse off under (12), with $Q = 100$ better.)
     """,
     prediction=Choice(
         "(11) forbids less than (12). With it, the base's mean error over the 8 s is …",
@@ -194,7 +195,7 @@ EFFORT = Step(
     are softened, as the paper does on the real robot. $Q = 10$, (12) and $\delta = 1$ cm are as
     before.
     """,
-    do="What does the paper's own weight, Q = 1, do? And a Q of 100: is the hand safe then?",
+    do="What does our default, Q = 1, do? And a Q of 100: is the hand safe then?",
     why=r"""
     More than $\delta$. To hold the hand while the base drives, the arm must move, and that now costs level
     1 something: its own best plan lets the hand slip a little. (12) passes this slip on as allowed,

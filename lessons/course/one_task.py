@@ -154,14 +154,18 @@ FREE = Step(
     title="What nobody asks for",
     text=r"""
     Two coordinates of the hand, three joints: one direction of motion is nobody's task. $R$ weighs
-    changes of torque, so in that direction the torque just stays what it is. A short push, 10 N for
-    0.2 s on the middle link, and the last level, `damping`, is switched off.
+    changes of torque, so in that direction the torque stays what it is, as long as no bound changes
+    it. A short push, 10 N for 0.2 s on the middle link, and the last level, `damping`, is switched
+    off.
     """,
-    do="Switch damping on and push again.",
+    do="Take the speed limits away and push again: which way does the elbow go? Then switch damping on.",
     why=r"""
-    Nothing asks that direction to stop. The torque that opposed the push is frozen there and goes
-    on accelerating the elbow, the other way, after the push is over. A last level that wants $\ddot
-    q + K_V \dot q = 0$ brings it to rest and costs the hand nothing.
+    Nothing asks that direction to stop, so the elbow still moves when the hand has long been home.
+    Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and the
+    torques change to hold it there. When the push ends nobody takes that change back, and it turns
+    joint 2 round: 0.2 s later it does 70°/s the other way. Without speed limits joint 2 goes on the
+    way it was pushed, with more than 300°/s. A last level that wants $\ddot q + K_V \dot q = 0$
+    brings it to rest; the hand hardly notices.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",
@@ -186,8 +190,11 @@ FREE = Step(
     set=("damping=false",),
     events=((0.1, Push("joint_2", force=(0.0, 10.0, 0.0), seconds=0.2)),),
     duration=1.5,
-    controls=(Control("damping", "Damp what no level controls", choices=(False, True)),),
-    plots=(Signal("speed share", "%"), HAND),
+    controls=(
+        Control("limits.velocity", "Speed limits on", choices=(False, True)),
+        Control("damping", "Damp what no level controls", choices=(False, True)),
+    ),
+    plots=(Signal("speed share", "%"), Signal("v", "deg/s", column=1), HAND),
 )
 
 CHALLENGE = Challenge(

@@ -35,8 +35,8 @@ ROUNDING = Step(
     do="Make the encoders finer until you cannot see the noise in the torque any more.",
     why=r"""
     $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit,
-    of the 4 N·m there are. The hand hardly moves, its mass is a filter; the gears will not last.
-    The paper finds the same limit (Table VIII) and calls it chattering.
+    of the 4 N·m there are. With finer encoders the noise goes in proportion. The hand hardly moves all
+    the same. The paper finds the same limit (Table VIII) and calls it chattering.
     """,
     prediction=Choice(
         "Without rounding the motion needs 3 % of the torque limit. With it, the largest demand is …",
@@ -83,7 +83,7 @@ SQUARE = Step(
     why=r"""
     $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
     the error grows by little more than half. Faster is not better when sensors are coarse. $\bar M$
-    enters once: it trades noise against accuracy one for one.
+    enters once: half of it leaves half of the noise, and again the error grows by little more than half.
     """,
     prediction=Value(
         "T_s twice as long: the torque changes become how many times as large?",

@@ -43,9 +43,11 @@ PRINTED = Step(
     """,
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
-    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s², more than the motor can
-    do. The problem has no solution, a fallback takes over, the torque hits its limit and the joint
-    overruns its range. The row is true to the letter and comes too late.
+    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². The motor can do less than
+    60, and the rows on speed let it change by even less, 41. So the problem has no solution, a fallback
+    takes over, the torque hits its limit and the joint overruns its range by 0.6°. Three times the
+    torque alone changes nothing; with the rows on speed off as well only 0.1° is left. The row is true
+    to the letter and comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -135,8 +137,8 @@ VIABLE = Step(
     do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""
     Now the very next step already knows the whole braking distance. 5° before the limit $t = T_s$
-    would allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18, since it follows the falling
-    bound at a distance. A stop never takes more than 1.5 of the 20 rad/s², and no QP is without a
+    would allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18, a little late
+    behind the falling bound. A stop never takes more than 1.5 of the 20 rad/s², and no QP is without a
     solution. The price is time: the last degrees are crept. What a short horizon cannot see must be
     put into its bounds. It is this lab's default and a deliberate departure from (32d).
     """,

@@ -16,7 +16,7 @@ from lessons.teaching.prediction import Choice, Option
 
 HAND = Signal("error/position", "mm")
 TORQUE = Signal("torque share", "%")
-CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "tdeosf", "hqp"))
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "osf_damped", "tdeosf", "hqp"))
 SMOOTH = Control("smooth", "Start gently", choices=(False, True))
 
 INVERSE = Step(
@@ -26,12 +26,13 @@ INVERSE = Step(
     columns of $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1} J^\top$
     loses its rank. Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
     """,
-    do="Try TDEOSF, then HQP and HIMPC.",
+    do="Start gently. Then try OSF with a damped inverse, TDEOSF, HQP and HIMPC.",
     why=r"""
-    In the first instant almost no torque would be enough, since the circle runs along what the arm
-    can do. But rounding leaves a trace of error in the direction that cannot be served, and the
-    inverse magnifies it many million times. Motors clip that nonsense, and it depends on luck what
-    is left.
+    Sideways almost no torque would be enough. But a circle also bends: in the first instant this one
+    asks for 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that
+    many million times. Started gently, the circle asks for nothing along the arm at first, and for a
+    tenth of a second the demand is small. A damped inverse, `osf_damped`, asks for a fifth of the
+    limit. Motors clip the nonsense.
     """,
     prediction=Choice(
         "The hand should only move sideways. How much torque does OSF ask for, at most?",
@@ -55,7 +56,7 @@ INVERSE = Step(
     ),
     set=("controller=osf",),
     duration=1.0,
-    controls=(CONTROLLER,),
+    controls=(SMOOTH, CONTROLLER),
     plots=(TORQUE, HAND),
 )
 
@@ -71,8 +72,9 @@ REGULAR = Step(
     why=r"""
     The torque never leaves its bounds, and after a few tenths of a second the hand is on its
     circle, with no case distinction for singular poses. $R$ is a damping factor, too. But it damps
-    the *change* of torque: at rest it costs nothing, so it need not be small to be accurate, nor
-    tuned anew for every pose. The ghost, with a hundred times the $R$, does as well.
+    the *change* of torque: at rest it costs nothing, so it need not be small to be accurate. The
+    ghost, with a hundred times the $R$, does as well; with a million times the hand swings by
+    centimetres and more.
     """,
     claims=(
         Claim(

@@ -21,7 +21,8 @@ SECONDS = 4.0
 PLOTS = (HAND, Q1)
 
 CONTROLLER = Control("controller", "Controller", choices=("himpc", "weighted"))
-WEIGHT = Control("levels.q1.Q", "Q of level 2", 0.01, 1000.0, log=True)
+WEIGHT = Control("levels.q1.Q", "Q of level 2", 1e-5, 1000.0, log=True)
+SWING = Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 60.0)
 
 BOTH = Step(
     title="Enough for both",
@@ -32,8 +33,8 @@ BOTH = Step(
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
     why=r"""
     As long as all wishes can be granted together, priorities hardly matter: the ghost has none, only
-    equal weights. They still do wherever something is not granted *at once*, after a sudden change
-    or at a bound.
+    equal weights. They still do wherever a bound is in the way of one of them: lesson *Torque has a
+    limit*.
     """,
     claims=(
         Claim(
@@ -64,7 +65,7 @@ BOTH = Step(
     set=("q1_amplitude_deg=20",),
     duration=2.5,
     ghost=Ghost("weighted, Q₁ = Q₂", ("controller=weighted",)),
-    controls=(Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 60.0),),
+    controls=(SWING,),
     plots=PLOTS,
 )
 
@@ -173,13 +174,15 @@ LIMIT = Step(
     strict.
     """,
     do=r"""
-    Make Q of level 2 ten and a hundred times smaller still. Then look at level 2 on the easy
-    circle.
+    Make Q of level 2 ten and a hundred times smaller still. Then let joint 1 swing by 20° only, where
+    both wishes can be granted, and go down to the least Q.
     """,
     why=r"""
     Better, and still several times the error of a strict priority. In the limit the weighted
-    solution becomes the strict one, but level 2 then weighs less than $R$ and is not followed any
-    more even where it could be.
+    solution becomes the strict one. But a $Q$ that small has to outweigh $R$ as well. On the easy
+    circle joint 1 is off by 0.02° with $Q_2 = 1$, by 0.05° with 0.01, and at the slider's end, with
+    $10^{-5}$, by 13° of its 20°: there it is not followed any more, although it could be. With a
+    smaller $R$ it would.
     """,
     prediction=Choice(
         "The hand counts 200 times as much as joint 1. Its largest error is …",
@@ -204,7 +207,7 @@ LIMIT = Step(
     set=("controller=weighted", "levels.q1.Q=1"),
     duration=SECONDS,
     ghost=Ghost("himpc: strict priorities", ("controller=himpc",)),
-    controls=(CONTROLLER, WEIGHT),
+    controls=(CONTROLLER, WEIGHT, SWING),
     plots=PLOTS,
 )
 

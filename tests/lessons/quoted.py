@@ -11,6 +11,9 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from interventions_course import COURSE_ROWS
+from interventions_documents import DOCUMENT_ROWS
+
 from lessons.course import COURSE, load_lesson
 from lessons.parallel import one_by_one
 from lessons.recording.run import run
@@ -79,6 +82,18 @@ QUOTED = (
     Quoted("no-model-needed/3", "comes back half as large again", _of(RADIUS, "mean"), 1.4, 1.6),
     Quoted("two-tasks/1", "by a quarter of a metre", _of(HAND), 225, 275),
     Quoted("two-tasks/2", "keeps its circle to a millimetre", _of(HAND), 0.2, 1.25),
+    Quoted("two-tasks/3", "by 0.02° with $Q_2 = 1$", _of(Q1), 0.015, 0.025, ("q1_amplitude_deg=20",)),
+    Quoted(
+        "two-tasks/3",
+        "by 0.05° with 0.01",
+        _of(Q1),
+        0.045,
+        0.055,
+        ("q1_amplitude_deg=20", "levels.q1.Q=0.01"),
+    ),
+    Quoted(
+        "two-tasks/3", "by 13° of its 20°", _of(Q1), 12.5, 14.5, ("q1_amplitude_deg=20", "levels.q1.Q=1e-5")
+    ),
     Quoted("two-tasks/3", "still several times the error", _ratio(HAND), 3, 20),
     Quoted(
         "swap-the-priorities/0",
@@ -119,8 +134,8 @@ QUOTED = (
         0.5,
     ),
     Quoted("stretched-out/2", "an error of some millimetres right at the start", _of(HAND), 2, 10, None),
-    Quoted("torque-has-a-limit/0", "three quarters of the 0.24 N·m", _of(TORQUE), 70, 80),
-    Quoted("torque-has-a-limit/1", "falls behind by ten degrees and more", _of(Q1), 10, 30),
+    Quoted("torque-has-a-limit/0", "nine tenths of the 0.24 N·m", _of(TORQUE), 85, 92),
+    Quoted("torque-has-a-limit/1", "falls behind by half a degree", _of(Q1), 0.45, 0.6),
     Quoted("stopping-takes-distance/0", "it comes at 57°/s", _of(Signal("v", "deg/s", column=1)), 56.5, 57.5),
     Quoted(
         "stopping-takes-distance/2",
@@ -300,7 +315,7 @@ def specs(quoted: Quoted) -> tuple[RunSpec, RunSpec | None]:
 
 
 class CourseRuns(NamedTuple):
-    """What the check says of all lessons, and the numbers of `QUOTED` by their run."""
+    """What the check says of all lessons, and the numbers of `QUOTED` and the interventions by run."""
 
     verdicts: list[Verdict]
     values: dict[RunSpec, dict[Measure, float]]
@@ -316,6 +331,9 @@ def course_runs() -> CourseRuns:
         for spec in specs(each):
             if spec is not None:
                 wanted.setdefault(spec, {})[each.measure.alone] = None
+    for row in (*COURSE_ROWS, *DOCUMENT_ROWS):
+        for spec in row.runs:
+            wanted.setdefault(spec, {})[row.measure] = None
     values: dict[RunSpec, dict[Measure, float]] = {}
 
     def spread(

@@ -11,8 +11,11 @@ import re
 
 import numpy as np
 import pytest
+from interventions_course import COURSE_ROWS
+from interventions_documents import DOCUMENT_ROWS
 from quoted import QUOTED, CourseRuns, Quoted, specs, step_of
 
+from himpc.limits import Limits
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget
 from lessons.papers.printed import printed
@@ -46,6 +49,7 @@ def test_a_number_in_a_sentence_is_measured(quoted: Quoted, course_runs: CourseR
 # -------------------------------------------------- numbers that follow from settings, or are the papers'
 
 
+ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
 WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
 LOOSE = re.compile(rf"(?<![\w.−-])−?\d+(?:\.\d+)?|\b(?:{WORDS})\b")
 """Digits, and words that are numbers."""
@@ -57,7 +61,8 @@ GIVEN: dict[str, tuple[str, ...]] = {
     # Of the step's own text and script.
     "a-redundant-arm/1": ("60",),
     "when-tasks-fight/2": ("2",),
-    "seeing-ahead/2": ("8", "42"),  # and the paper's improvement
+    "seeing-ahead/2": ("8", "0.3", "1", "42"),  # and the paper's improvement
+    "seeing-ahead/3": ("20",),
     "deliveries/2": ("8", "16.5"),
     "sensors-are-coarse/0": ("4",),
     "inside-the-qp/0": ("2",),
@@ -67,16 +72,18 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "no-model-needed/1": ("1", "1", "−1"),
     "no-model-needed/2": ("1",),
     "no-model-needed/3": ("−1", "0.91", "−0.89"),  # eigenvalues: below
-    "the-model-is-wrong/2": ("1",),
+    "the-model-is-wrong/2": ("1", "0.01", "1"),  # and a setting
     # What follows from settings and equations: below.
     "two-tasks/1": ("200", "50"),
-    "stretched-out/0": ("million",),
-    "stopping-takes-distance/0": ("57", "0.3", "100"),
+    "stretched-out/0": ("0.06", "million"),
+    "torque-has-a-limit/1": ("60",),  # settings
+    "torque-has-a-limit/2": ("−30",),
+    "stopping-takes-distance/0": ("57", "0.3", "100", "60", "41"),
     "stopping-takes-distance/1": ("20", "50"),
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
     "inside-the-qp/3": ("half",),  # 5 of 10 cm, 7 of 14 degrees
     # Every other torque counts, or is computed.
-    "deadlines/0": ("half",),
+    "deadlines/0": ("2",),
     "deadlines/1": ("half", "half", "1", "8"),  # and the paper's period and step time
     "deadlines/2": ("half",),
     # The line search halves; a control step is 0.1 s.
@@ -95,8 +102,10 @@ def test_every_number_in_an_explanation_is_measured_or_said_to_be_given() -> Non
     for name in COURSE:
         for place, step in enumerate(load_lesson(name).steps):
             key, why = f"{name}/{place}", " ".join(step.why.split())
-            for each in QUOTED:
-                why = why.replace(each.phrase, "§") if each.step == key else why
+            phrases = [each.phrase for each in QUOTED if each.step == key]
+            phrases += [each.says for each in ROWS if each.at == key]
+            for phrase in phrases:
+                why = why.replace(phrase, "§")
             loose = LOOSE.findall(REFERENCE.sub("§", re.sub(r"\$\$?.+?\$\$?", "§", why)))
             if loose:
                 found[key] = tuple(loose)
@@ -129,6 +138,8 @@ def test_the_inverse_of_a_straight_arm_magnifies_many_million_times() -> None:
     plant.reset(scene.q_0)
     J = plant.jacobian(scene.robot.tip)[:2]
     assert np.linalg.cond(J @ np.linalg.solve(plant.mass_matrix(), J.T)) > 1e7
+    asked = begin(scene).tick()[begin(scene).layout.fields["a_d/position"]]
+    np.testing.assert_allclose(asked, [-0.06, 0.0], atol=5e-3)  # along the arm
 
 
 def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
@@ -138,6 +149,7 @@ def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
     assert math.degrees(d) == pytest.approx(0.3, abs=0.02)
     assert v**2 / (2.0 * d) == pytest.approx(100.0, abs=1.0)
     assert v / 20.0 == pytest.approx(0.05, abs=1e-3)  # the 50 steps of a gentle stop
+    assert Limits().velocity_approach * (math.radians(100.0) + v) == pytest.approx(41.0, abs=0.5)
     scene = torque_scene("planar3-hold")
     plant = Plant(scene.robot, scene.settings.plant)
     q = np.array(scene.q_0)

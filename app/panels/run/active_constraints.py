@@ -18,8 +18,9 @@ class BindingPanel:
     def __init__(self, gui: viser.GuiApi, colours: dict[str, RGB]) -> None:
         self._colours = colours
         gui.add_html(
-            block("A bound <b>binds</b> when the plan stops at it. The multiplier says how much the level "
-                  "would gain if the bound gave way a little; the slack how far it was softened.")
+            block("A bound <b>binds</b> when the plan stops at it. The multiplier is the bound's price: "
+                  "how fast the level's cost would fall if it gave way, twice as fast for costs without a "
+                  "half, such as (31). The slack says how far it was softened.")
         )  # fmt: skip
         with gui.add_folder("Binding now"):
             self._now = gui.add_html("")

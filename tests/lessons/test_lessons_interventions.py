@@ -1,0 +1,99 @@
+"""Explanations: where a text names a cause, a run takes it away, and the effect goes.
+
+`interventions` says what a row is; the rows are in `interventions_course` and `interventions_documents`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from interventions import Intervention
+from interventions_course import COURSE_ROWS
+from interventions_documents import DOCUMENT_ROWS
+from quoted import CourseRuns, step_of
+from test_lessons_quoted import texts
+
+from docs.further import further
+from lessons.course import COURSE, load_lesson
+from lessons.events import Set
+from lessons.session.start import begin
+from lessons.session.torque import TorqueSession
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = {
+    "disagreements": "docs/disagreements.md",
+    "results": "docs/results.md",
+    "house": "docs/house.md",
+    "glossary": "app/html/glossary.toml",
+    "README": "README.md",
+}
+"""Names of documents in `Intervention.at`."""
+ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
+
+
+@cache
+def told(at: str) -> str:
+    """All that is told there, in one line."""
+    kind, _, name = at.partition("/")
+    if kind in COURSE:
+        found = [texts(step_of(at))]
+    elif kind == "further":
+        more = further(name)
+        found = [line.words for line in more.derivation]
+        found += [text for each in more.questions for text in (each.asked, each.answered)]
+    else:
+        found = [(ROOT / DOCUMENTS[kind]).read_text(encoding="utf-8")]
+    return " ".join(" ".join(found).split())
+
+
+def named(each: Intervention) -> str:
+    return f"{each.at} {each.says}"[:70]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=named)
+def test_an_explanation_stands_there(row: Intervention) -> None:
+    assert row.says in told(row.at)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=named)
+def test_a_row_can_fail(row: Intervention) -> None:
+    """With the cause and without it other numbers are asked for; the same ones where it is said not to be
+    the cause."""
+    (low, high), (low_gone, high_gone) = row.there, row.gone
+    assert low < high and low_gone < high_gone
+    apart = high < low_gone or high_gone < low
+    assert apart != row.stays
+    assert row.runs[0] != row.runs[1]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=named)
+def test_without_its_cause_an_effect_goes(row: Intervention, course_runs: CourseRuns) -> None:
+    there, gone = (course_runs.values[spec][row.measure] for spec in row.runs)
+    assert row.there[0] <= there <= row.there[1], there
+    assert row.gone[0] <= gone <= row.gone[1], gone
+
+
+def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
+    """The glossary: for the costs (31), written without a half, the price is twice the multiplier."""
+    scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).prepared()
+
+    def after(ticks: int, change: float) -> TorqueSession:
+        session = begin(scene)
+        assert isinstance(session, TorqueSession)
+        for _ in range(ticks):
+            session.tick()
+        session.post(Set("limits.torque_scale", 0.25 + change))
+        return session
+
+    def cost(ticks: int, change: float) -> float:
+        return float(after(ticks, change).tick()[layout.fields["cost/pose"]][0])
+
+    session = after(231, 0.0)
+    session.tick()
+    layout, (bound,) = session.layout, session.binding()
+    assert (bound.level, bound.kind) == ("pose", "torque")
+    room = 1e-5 * 4.0  # N·m: the motors give 4
+    price = (cost(231, -1e-5) - cost(231, 1e-5)) / (2.0 * room)
+    assert price == pytest.approx(2.0 * bound.multiplier, rel=1e-4)
