@@ -129,8 +129,7 @@ class TorqueFace:
         )
 
     def _tip(self) -> np.ndarray:
-        poses = self._context.poses()
-        return np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
+        return self._context.poses_or_still()[-1]
 
     def _targets_now(self) -> dict[str, np.ndarray]:
         """Where the hand put each target that can be moved, whatever instant is shown."""
@@ -152,12 +151,11 @@ class TorqueFace:
             lambda: bool(self._start.clamp.value),
             self._start.dragged,
         )
-        poses = context.poses()
         self._targets = Targets(
             scene,
             ready,
             context.colours,
-            np.zeros((ready.robot.n + 1, 7)) if poses is None else poses,
+            context.poses_or_still(),
             0.75 * size,
             context.post,
         )
