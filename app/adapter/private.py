@@ -20,6 +20,7 @@ import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
+from app.adapter.late import call
 from app.adapter.plain import plain
 from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.wake import WakeUp
@@ -59,6 +60,7 @@ _OF_A_SERVER = (
     "gui._gui_input_handle_from_uuid",
     "gui._thread_executor",
     "scene._thread_executor",
+    "scene._dispatch_callback",
 )
 
 
@@ -230,34 +232,29 @@ Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
 
 
 def intercept(client: viser.ClientHandle, take: Inlet) -> None:
-    """Every message of this browser goes to `take` first."""
-    connection = client._websock_connection
+    """Every message of this browser goes to `take` first, and what its callbacks raise comes back there: of
+    those of the 3D view viser would print it."""
+    connection, scene = client._websock_connection, client.scene
     plain = connection._handle_incoming_message
 
     async def handle(client_id: Any, message: Any) -> None:
         await take(message, lambda passed: plain(client_id, passed))
 
     connection._handle_incoming_message = handle
+    scene._dispatch_callback = lambda cb, event: call(cb, event, scene._thread_executor)
 
 
-Kind = Literal["write", "upload", "hand", "other"]
+Kind = Literal["write", "upload", "other"]
 
 
 def kind_of(message: Any) -> Kind:
-    """Whether it changes a control (`uuid`, `updates`), begins a file (for `source_component_uuid`), tells
-    what a hand did in the 3D view, or is anything else."""
+    """Whether it changes a control (`uuid`, `updates`), begins a file (for `source_component_uuid`), or is
+    anything else."""
     match message:
         case _messages.GuiUpdateMessage():
             return "write"
         case _messages.FileTransferStartUpload():
             return "upload"
-        case (
-            _messages.TransformControlsUpdateMessage()
-            | _messages.SceneNodeDragMessage()
-            | _messages.SceneNodeClickMessage()
-            | _messages.ScenePointerMessage()
-        ):
-            return "hand"
         case _:
             return "other"
 

@@ -93,6 +93,10 @@ class Page:
         if self._stage is not None:
             self._stage.close()
 
+    def refuse(self, sentence: str) -> None:
+        """Says why something that the browser sent was not taken."""
+        self._inlet.say("Not taken", sentence)
+
     def _theme(self, dark: bool) -> None:
         self._dark = dark
         self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)

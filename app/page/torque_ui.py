@@ -150,6 +150,7 @@ class TorqueFace:
             context.post,
             lambda: bool(self._start.clamp.value),
             self._start.dragged,
+            context.loop.call_later,
         )
         self._targets = Targets(
             scene,
@@ -188,7 +189,8 @@ class TorqueFace:
         context, T_s = self._context, self._context.settings.T_s
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
-        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields)
+        running = moment.status.running or not moment.live
+        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields, running)
         self._hand.look_back(None if moment.live else moment.status.targets)
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
         self._trails.draw(tips, moment.status.path, T_s)

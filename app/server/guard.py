@@ -21,6 +21,7 @@ from app.server.budget import Budget
 from app.server.crowd import Crowd
 from app.server.door import Answer, Door, is_upgrade, secured
 from app.server.uploads import TRANSFER, Uploads
+from app.server.words import refusal
 
 HANDSHAKE = 5.0
 """s for a request to be complete."""
@@ -102,11 +103,13 @@ class Guard:
 
 
 class GuardedConnection(ServerConnection):
-    """Counts before it decodes. `uploads` are those of the page it serves."""
+    """Counts before it decodes, and hands on only what a page says. `uploads` are those of the page it
+    serves, `refuse` tells its user what was not taken."""
 
     def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
         super().__init__(*of, **more)
         self.uploads: Uploads | None = None
+        self.refuse: Callable[[str], object] = _nothing_said
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0
@@ -161,6 +164,10 @@ class GuardedConnection(ServerConnection):
                 await asyncio.sleep(waiting)
             if self._budget.spent:
                 await self._end(CloseCode.POLICY_VIOLATION, "Too many messages.")
+            if (why := refusal(raw)) is not None:
+                if why:
+                    self.refuse(why)
+                continue
             if TRANSFER in raw and not await self._may_upload(raw):
                 continue
             self._guard.crowd.spoke(self)
@@ -174,6 +181,10 @@ class GuardedConnection(ServerConnection):
     async def _end(self, code: CloseCode, reason: str) -> NoReturn:
         await self.close(code, reason)
         raise ConnectionClosedError(None, None)  # what viser takes for an end
+
+
+def _nothing_said(_: str) -> None:
+    """Nobody is there yet."""
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:

@@ -11,6 +11,7 @@ from functools import partial
 import viser
 
 from app.adapter import private
+from app.adapter.late import told
 from app.client.progress import Notebook
 from app.html.text import block
 from app.page.page import Page
@@ -20,7 +21,7 @@ from app.server.classroom import Classroom, Watcher
 from app.server.guard import GuardedConnection
 from app.server.sessions import Sessions
 from app.server.uploads import Uploads
-from app.server.workers import Workers, told
+from app.server.workers import Workers
 from lessons.replay.progress import Progress
 from lessons.replay.progress import found as found_progress
 
@@ -60,6 +61,7 @@ class Visit:
         private.keep_short(server, client)
         connection = private.connection_of(server, client)
         if isinstance(connection, GuardedConnection):
+            connection.refuse = self._refuse_word
             connection.uploads = Uploads(
                 partial(private.unfinished_uploads, client),
                 partial(private.forget_upload, client),
@@ -155,6 +157,11 @@ class Visit:
 
     def _refuse(self, sentence: str) -> None:
         self._client.add_notification("Not steered", sentence, color="orange", auto_close_seconds=4.0)
+
+    def _refuse_word(self, sentence: str) -> None:
+        page = self._page
+        if page is not None:
+            page.refuse(sentence)
 
     def _refuse_upload(self) -> None:
         self._client.add_notification(
