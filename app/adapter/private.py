@@ -11,6 +11,7 @@ import io
 import socket
 import threading
 import uuid
+import warnings
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
@@ -68,6 +69,8 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     """A viser server that listens behind `guard`, opens no tunnel to strangers and never falls asleep. Raises
     InputError if it cannot be guarded; then nothing listens."""
     self_test(guard)
+    # What strangers send wrong is no news for the terminal.
+    warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
     # viser greets with a panel of its own; we promise exactly one line.
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)

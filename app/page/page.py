@@ -20,7 +20,6 @@ from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.messages import Ready
 from app.page.fault import FaultNotice
-from app.page.inlet import Inlet
 from app.panels.widgets.command import add_command
 from lessons.scenes.names import ALL_SCENES
 
@@ -56,7 +55,6 @@ class Page:
         self._on_dark = on_dark
         self._greet = greet
         self._client = client
-        self._inlet = Inlet(client)
         self._fault = FaultNotice(client)
         self._dark = dark
         self._by_path = by_path
@@ -92,10 +90,6 @@ class Page:
             self._thread.join(2.0)
         if self._stage is not None:
             self._stage.close()
-
-    def refuse(self, sentence: str) -> None:
-        """Says why something that the browser sent was not taken."""
-        self._inlet.say("Not taken", sentence)
 
     def _theme(self, dark: bool) -> None:
         self._dark = dark

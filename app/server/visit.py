@@ -14,6 +14,7 @@ from app.adapter import private
 from app.adapter.late import told
 from app.client.progress import Notebook
 from app.html.text import block
+from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.classroom import add_watching
 from app.server.budget import UPLOADS
@@ -59,9 +60,10 @@ class Visit:
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)
         private.keep_short(server, client)
+        inlet = Inlet(client)
         connection = private.connection_of(server, client)
         if isinstance(connection, GuardedConnection):
-            connection.refuse = self._refuse_word
+            connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
                 partial(private.unfinished_uploads, client),
                 partial(private.forget_upload, client),
@@ -157,11 +159,6 @@ class Visit:
 
     def _refuse(self, sentence: str) -> None:
         self._client.add_notification("Not steered", sentence, color="orange", auto_close_seconds=4.0)
-
-    def _refuse_word(self, sentence: str) -> None:
-        page = self._page
-        if page is not None:
-            page.refuse(sentence)
 
     def _refuse_upload(self) -> None:
         self._client.add_notification(

@@ -28,11 +28,7 @@ Modifier = (
 )
 
 
-class _Word(msgspec.Struct, forbid_unknown_fields=True, tag=str, tag_field="type"):
-    """Fields go by viser's names for them."""
-
-
-class ViewerCameraMessage(_Word):
+class ViewerCameraMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """Where the page is looked at from. A canvas that is not laid out yet has no size."""
 
     wxyz: Turn
@@ -51,7 +47,7 @@ class ViewerCameraMessage(_Word):
         _has_direction(self.up_direction)
 
 
-class TransformControlsUpdateMessage(_Word):
+class TransformControlsUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """Arrows or rings were moved."""
 
     name: Name
@@ -63,21 +59,23 @@ class TransformControlsUpdateMessage(_Word):
         _has_direction(self.wxyz)
 
 
-class TransformControlsDragStartMessage(_Word):
+class TransformControlsDragStartMessage(
+    msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"
+):
     """A hand takes hold of arrows or rings."""
 
     name: Name
     owner: Name
 
 
-class TransformControlsDragEndMessage(_Word):
+class TransformControlsDragEndMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """It lets go."""
 
     name: Name
     owner: Name
 
 
-class SceneNodeClickMessage(_Word):
+class SceneNodeClickMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """A click on a thing in the 3D view."""
 
     name: Name
@@ -89,7 +87,7 @@ class SceneNodeClickMessage(_Word):
     owner: Name
 
 
-class SceneNodeDragMessage(_Word):
+class SceneNodeDragMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """A thing in the 3D view is pulled."""
 
     phase: Literal["start", "update", "end"]
@@ -104,20 +102,22 @@ class SceneNodeDragMessage(_Word):
     owner: Name
 
 
-class GuiUpdateMessage(_Word):
+class GuiUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """A control was written or pressed. What may be written depends on the control, see `app.page.values`."""
 
     uuid: Name
     updates: Annotated[dict[str, Any], Meta(max_length=16)]
 
 
-class CommandTriggerMessage(_Word):
+class CommandTriggerMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """A key, or a command of the palette."""
 
     uuid: Name
 
 
-class LocalStorageGetItemResponseMessage(_Word):
+class LocalStorageGetItemResponseMessage(
+    msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"
+):
     """What the browser keeps."""
 
     value: str | None
@@ -125,7 +125,7 @@ class LocalStorageGetItemResponseMessage(_Word):
     request_uuid: Name
 
 
-class FileTransferStartUpload(_Word):
+class FileTransferStartUpload(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """A file will come."""
 
     source_component_uuid: Name
@@ -136,7 +136,7 @@ class FileTransferStartUpload(_Word):
     size_bytes: Whole
 
 
-class FileTransferPart(_Word):
+class FileTransferPart(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
     """A part of it."""
 
     source_component_uuid: Name | None
