@@ -10,8 +10,8 @@ five minutes (of a shorter run for every sixth part): the median and the most of
 time, MB. At the end everybody goes back to the first scene, and what the server holds is compared with what
 it held after a warm-up.
 
-Exit 0 if memory never was more than BASE + K · EACH, in the last period was at most 10 % more than in the
-first, and nothing was left behind.
+Exit 0 if memory never was more than BASE + K · EACH, in the last third of the time was at most 10 % more than
+in the first, and nothing was left behind.
 """
 
 from __future__ import annotations
@@ -181,7 +181,9 @@ def judged(
         for name in ("processes", "blocks", "nodes", "controls")
         if after[name] > before[name]
     ]
-    first, last = (median(period.megabytes) for period in (periods[0], periods[-1]))
+    third = max(1, len(periods) // 3)
+    parts = (periods[:third], periods[-third:])
+    first, last = (median(each for period in part for each in period.megabytes) for part in parts)
     if last > GROWTH * first:
         faults.append(f"Memory grew from {first:.0f} to {last:.0f} MB.")
     peak = max(max(period.megabytes) for period in periods)
