@@ -90,7 +90,7 @@ class History:
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1]
+        self.latest = rows[-1].copy()  # not a view, which would keep all of them
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         for k in range(3):
@@ -120,7 +120,7 @@ class History:
         if self._numbers[slot] != bucket:
             self._numbers[slot] = bucket
             self._bits[slot] = 0
-            self._first = rows[0]
+            self._first = rows[0].copy()
             low, high = rows.min(axis=0), rows.max(axis=0)
         else:
             pair = self._pairs[slot]
