@@ -31,6 +31,13 @@ KINDS = (
     "", 7, None,
 )  # fmt: skip
 
+LOOKS: tuple[dict[str, Any], ...] = (
+    {"image_height": 0},
+    {"look_at": (math.inf, 0.0, 0.0)},
+    {"up_direction": (math.nan, 0.0, 1.0)},
+    {"look_at": camera().position},
+)
+
 
 class HostileUser:
     """One connection, one stream of random numbers."""
@@ -39,10 +46,31 @@ class HostileUser:
         self.actions: Counter[str] = Counter()
         self._url, self._random = url, random.Random(seed)
         self.page = Wire(url)
+        self._due = [each for each, _ in self._actions()]
+        self._random.shuffle(self._due)
+
+    @property
+    def once_all(self) -> bool:
+        """Whether each thing was done."""
+        return sum(self.actions.values()) >= len(self._actions())
 
     def act(self) -> None:
-        """One hostile thing, or one that a learner may do, so that the next meets another page."""
-        actions: Sequence[tuple[Callable[[], None], float]] = (
+        """One hostile thing, or one that a learner may do, so that the next meets another page: each once,
+        then as chance will have it."""
+        actions = self._actions()
+        if not self._due:
+            self._due = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])
+        chosen = self._due.pop()
+        try:
+            chosen()
+            time.sleep(self._random.choice((0.0, 0.0, 0.01, 0.05, 0.3)))
+        except ConnectionClosed:
+            self.reload()
+        self.actions[chosen.__name__.strip("_")] += 1
+
+    def _actions(self) -> Sequence[tuple[Callable[[], None], float]]:
+        """With how likely each is."""
+        return (
             (self._look, 3.0),
             (self._write_odd, 4.0),
             (self._write_fitting, 6.0),
@@ -58,13 +86,6 @@ class HostileUser:
             (self._babble, 2.0),
             (self.reload, 0.1),
         )
-        chosen = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])[0]
-        try:
-            chosen()
-            time.sleep(self._random.choice((0.0, 0.0, 0.01, 0.05, 0.3)))
-        except ConnectionClosed:
-            self.reload()
-        self.actions[chosen.__name__.strip("_")] += 1
 
     def close(self) -> None:
         """The tab is closed."""
@@ -116,10 +137,13 @@ class HostileUser:
 
     def _look_while_built(self) -> None:
         """Another scene is asked for; until it is there the camera looks at where it is, or has no size."""
+        odd, before = self._random.choice(LOOKS), len(self.page.made)
         self._choose_scene()
-        for _ in range(6):
-            self._look()
+        for _ in range(100):
+            self._send("ViewerCameraMessage", vars(camera()) | odd)
             time.sleep(0.05)
+            if len(self.page.made) > before + 20 or self.page.shows("cannot be shown"):
+                return
 
     def _drag(self) -> None:
         name = self._one(self.page.controls_3d)
@@ -262,7 +286,7 @@ class HostileUser:
         for uuid, control in self._labelled("Scene"):
             self._set(uuid, control)
         for uuid, control in list(self.page.controls.items()):
-            if control["props"].get("label") in ("Load", "Load scene") and self._random.random() < 0.7:
+            if control["props"].get("label") == "Load scene":
                 self._send("GuiUpdateMessage", {"uuid": uuid, "updates": {"value": True}})
 
     # ---------------------------------------------------------------- everything else
@@ -332,16 +356,16 @@ class HostileUser:
 
 
 def roam(server: PageServer, seconds: float, seed: int, complaints: Callable[[], str]) -> Findings:
-    """A hostile user for so long; it ends early when something broke. The server has one place.
+    """A hostile user for so long, each thing once at least; it ends early when something broke.
 
     complaints: everything that was written to standard error so far."""
     found = Findings(seed)
     user = HostileUser(server.url, seed)
-    end = time.monotonic() + seconds
     try:
         if not eventually(lambda: user.page.shows("t = ")):
             found.blame("the page does not begin")
-        while time.monotonic() < end and not found.faults:
+        end = time.monotonic() + seconds
+        while (time.monotonic() < end or not user.once_all) and not found.faults:
             user.act()
             _look(server, user.page, found, complaints)
         if not found.faults and not _answers(server, user):

@@ -269,7 +269,7 @@ def main() -> int:
 def hostile(given: argparse.Namespace) -> Findings:
     """Without a browser."""
     with StandardError() as said:
-        server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=2, grace=0.2)
+        server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=4, grace=0.2)
         try:
             return roam(server, 60.0 * given.minutes, given.seed, said.read)
         finally:
