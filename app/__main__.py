@@ -64,7 +64,8 @@ def _call(name: str, arguments: list[str]) -> int:
 
     command: Callable[..., int] = getattr(import_module(f"app.commands.{name}"), name)
     prog = "himpc-lab" if name == "serve" else f"himpc-lab {name}"
-    return tyro.cli(command, prog=prog, args=arguments)
+    # No flag has a twin that takes it back: of --no-browser that would be --no-no-browser.
+    return tyro.cli(command, prog=prog, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
 
 
 def _print_commands() -> None:

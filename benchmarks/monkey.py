@@ -1,8 +1,9 @@
 """A user who tries everything in no order: the page must survive, and the robot must stay inside its bounds.
 
-    python -m benchmarks.monkey --minutes 10 --seed 0
+    python -m benchmarks.monkey [--minutes M] [--seed N] [--scene S] [--hostile]
 
-Prints what was done as JSON; the exit code is 1 if anything broke.
+Uses a browser; with --hostile it speaks the page's protocol instead, and sends what no browser would, see
+benchmarks/hostile.py. Prints what was done as JSON; the exit code is 1 if anything broke.
 """
 
 from __future__ import annotations
@@ -12,13 +13,9 @@ import json
 import os
 import random
 import sys
-import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
-from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -30,6 +27,8 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
+from benchmarks.findings import Findings, StandardError
+from benchmarks.hostile import roam
 from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
@@ -47,34 +46,6 @@ _PATIENCE = 1_500
 """ms for an element to take a click; what is covered or gone by then is not clicked."""
 _HOTKEYS = ("Space", "?", "Escape", "ArrowLeft", "ArrowRight", *"123nbrsdltjk")
 _PANELS = ("Start", "Tasks", "Control", "Plant", "Robot", "Help", "Errors", "Joints", "Who binds")
-
-
-@dataclass
-class Findings:
-    """What a random walk did and what it found."""
-
-    seed: int
-    actions: Counter[str] = field(default_factory=Counter)
-    rows: int = 0
-    scenes: set[str] = field(default_factory=set)
-    lessons: set[str] = field(default_factory=set)
-    worst_leak: float = 0.0
-    faults: list[str] = field(default_factory=list)
-
-    def blame(self, sentence: str) -> None:
-        if sentence not in self.faults:
-            self.faults.append(sentence)
-
-    def as_data(self) -> dict[str, Any]:
-        return {
-            "seed": self.seed,
-            "actions": dict(sorted(self.actions.items())),
-            "rows": self.rows,
-            "scenes": sorted(self.scenes),
-            "lessons": sorted(self.lessons),
-            "worst_leak": self.worst_leak,
-            "faults": self.faults,
-        }
 
 
 class Monkey:
@@ -283,45 +254,38 @@ def walk(
     return monkey.found
 
 
-class StandardError:
-    """What this process and its children write to standard error, kept and passed on."""
-
-    def __enter__(self) -> StandardError:
-        self._file = tempfile.TemporaryFile()
-        self._before = os.dup(2)
-        sys.stderr.flush()
-        os.dup2(self._file.fileno(), 2)
-        return self
-
-    def read(self) -> str:
-        sys.stderr.flush()
-        size = os.fstat(self._file.fileno()).st_size
-        return os.pread(self._file.fileno(), size, 0).decode(errors="replace")
-
-    def __exit__(self, *_: object) -> None:
-        said = self.read()
-        os.dup2(self._before, 2)
-        os.close(self._before)
-        self._file.close()
-        sys.stderr.write(said)
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description="A random user of the page.")
     parser.add_argument("--minutes", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--scene", default="iiwa14-hold")
+    parser.add_argument("--hostile", action="store_true")
     given = parser.parse_args()
+    found = hostile(given) if given.hostile else usual(given)
+    print(json.dumps(found.as_data(), indent=1))
+    return 1 if found.faults else 0
+
+
+def hostile(given: argparse.Namespace) -> Findings:
+    """Without a browser."""
+    with StandardError() as said:
+        server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=4, grace=0.2)
+        try:
+            return roam(server, 60.0 * given.minutes, given.seed, said.read)
+        finally:
+            server.close()
+
+
+def usual(given: argparse.Namespace) -> Findings:
+    """In a browser."""
     with StandardError() as said, sync_playwright() as playwright:
         server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=1)
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
         try:
-            found = walk(browser, server, given.minutes, given.seed, said.read)
+            return walk(browser, server, given.minutes, given.seed, said.read)
         finally:
             browser.close()
             server.close()
-    print(json.dumps(found.as_data(), indent=1))
-    return 1 if found.faults else 0
 
 
 if __name__ == "__main__":

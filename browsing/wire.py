@@ -53,6 +53,7 @@ class Wire:
         commands: by identity, what the palette holds.
         made: every control there ever was, in the order they came.
         controls_3d: by name, to whom arrows and rings in the 3D view belong.
+        meshes: the same of things that can be clicked and pulled.
         notices: (title, body) of every notification.
         standing: by identity, of those that were not taken back.
         eye: m, where the page last told the browser to look from.
@@ -64,6 +65,7 @@ class Wire:
         self.commands: dict[str, dict[str, Any]] = {}
         self.made: list[dict[str, Any]] = []
         self.controls_3d: dict[str, str] = {}
+        self.meshes: dict[str, str] = {}
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
         self.eye: tuple[float, ...] = ()
@@ -145,6 +147,8 @@ class Wire:
                 self.eye = tuple(message["position"])
             case "TransformControlsMessage":
                 self.controls_3d[message["name"]] = message["owner"]
+            case "MeshMessage":
+                self.meshes[message["name"]] = message["owner"]
             case "GuiRemoveMessage":
                 self.controls.pop(message["uuid"], None)
             case "GuiUpdateMessage" if message["uuid"] in self.controls:

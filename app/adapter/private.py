@@ -11,6 +11,7 @@ import io
 import socket
 import threading
 import uuid
+import warnings
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
@@ -20,6 +21,7 @@ import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
+from app.adapter.late import call
 from app.adapter.plain import plain
 from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.wake import WakeUp
@@ -59,6 +61,7 @@ _OF_A_SERVER = (
     "gui._gui_input_handle_from_uuid",
     "gui._thread_executor",
     "scene._thread_executor",
+    "scene._dispatch_callback",
 )
 
 
@@ -66,6 +69,8 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     """A viser server that listens behind `guard`, opens no tunnel to strangers and never falls asleep. Raises
     InputError if it cannot be guarded; then nothing listens."""
     self_test(guard)
+    # What strangers send wrong is no news for the terminal.
+    warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
     # viser greets with a panel of its own; we promise exactly one line.
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
@@ -230,34 +235,29 @@ Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
 
 
 def intercept(client: viser.ClientHandle, take: Inlet) -> None:
-    """Every message of this browser goes to `take` first."""
-    connection = client._websock_connection
+    """Every message of this browser goes to `take` first, and what its callbacks raise comes back there: of
+    those of the 3D view viser would print it."""
+    connection, scene = client._websock_connection, client.scene
     plain = connection._handle_incoming_message
 
     async def handle(client_id: Any, message: Any) -> None:
         await take(message, lambda passed: plain(client_id, passed))
 
     connection._handle_incoming_message = handle
+    scene._dispatch_callback = lambda cb, event: call(cb, event, scene._thread_executor)
 
 
-Kind = Literal["write", "upload", "hand", "other"]
+Kind = Literal["write", "upload", "other"]
 
 
 def kind_of(message: Any) -> Kind:
-    """Whether it changes a control (`uuid`, `updates`), begins a file (for `source_component_uuid`), tells
-    what a hand did in the 3D view, or is anything else."""
+    """Whether it changes a control (`uuid`, `updates`), begins a file (for `source_component_uuid`), or is
+    anything else."""
     match message:
         case _messages.GuiUpdateMessage():
             return "write"
         case _messages.FileTransferStartUpload():
             return "upload"
-        case (
-            _messages.TransformControlsUpdateMessage()
-            | _messages.SceneNodeDragMessage()
-            | _messages.SceneNodeClickMessage()
-            | _messages.ScenePointerMessage()
-        ):
-            return "hand"
         case _:
             return "other"
 

@@ -48,8 +48,9 @@ class History:
         self._t = layout.fields["t"].start
         self._before = self._count = 0
         self._numbers = np.full(_SLOTS, -1)
-        self._pairs = np.full((_SLOTS, 2, layout.size), np.nan)
-        self._lasts = np.full((_SLOTS, layout.size), np.nan)
+        # Not filled, see `Record`: a slot counts only under its number.
+        self._pairs = np.empty((_SLOTS, 2, layout.size))
+        self._lasts = np.empty((_SLOTS, layout.size))
         self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
         self._first = np.full(layout.size, np.nan)  # of the open bucket, for the order of the pair
 
@@ -63,7 +64,8 @@ class History:
 
         new = History(block, layout, *takers)
         new.latest, new._first = moved(self.latest), moved(self._first)
-        new._pairs, new._lasts = moved(self._pairs), moved(self._lasts)
+        known = self._numbers >= 0
+        new._pairs[known], new._lasts[known] = moved(self._pairs[known]), moved(self._lasts[known])
         new.bound_ticks, new.bucket = self.bound_ticks, self.bucket
         new._numbers, new._bits = self._numbers, self._bits
         new._before = self.count
@@ -88,7 +90,7 @@ class History:
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1]
+        self.latest = rows[-1].copy()  # not a view, which would keep all of them
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         for k in range(3):
@@ -118,7 +120,7 @@ class History:
         if self._numbers[slot] != bucket:
             self._numbers[slot] = bucket
             self._bits[slot] = 0
-            self._first = rows[0]
+            self._first = rows[0].copy()
             low, high = rows.min(axis=0), rows.max(axis=0)
         else:
             pair = self._pairs[slot]

@@ -24,9 +24,10 @@ class Record:
         self.layout = layout
         self._t = layout.fields["t"].start
         # Two blocks for good: rows of their own, kept for minutes among what lives for an instant, leave
-        # holes all over the memory. And filled, so that a learner takes now what it will take.
-        self._recent = np.full((round(KEPT * RATE), layout.size), np.nan)
-        self._whole = np.full((MOST, layout.size), np.nan)
+        # holes all over the memory. Not filled: the system gives a page of them when a row is written there,
+        # and most scenes are left before a minute has passed.
+        self._recent = np.empty((round(KEPT * RATE), layout.size))
+        self._whole = np.empty((MOST, layout.size))
         self._clear()
 
     def _clear(self) -> None:
@@ -41,8 +42,11 @@ class Record:
         from himpc.telemetry import relaid
 
         new = Record(layout)
-        new._recent = relaid(self._recent, self.layout, layout)
-        new._whole = relaid(self._whole, self.layout, layout)
+        for rows, before, count in (
+            (new._recent, self._recent, min(self._kept, len(self._recent))),
+            (new._whole, self._whole, self._thinned),
+        ):
+            rows[:count] = relaid(before[:count], self.layout, layout)
         new._every, new._kept, new._thinned = self._every, self._kept, self._thinned
         new._mark, new._last = self._mark, self._last
         return new

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def sweep(
     scene: tyro.conf.Positional[str],
-    out: Path,
+    out: Path | None = None,
     over: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=lo:hi:n")] = (),
     controller: str | None = None,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
@@ -32,7 +32,8 @@ def sweep(
 
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file of your own.
-        out: folder for cells.jsonl, results.json and map.png.
+        out: folder for cells.jsonl, results.json and map.png; by default one in out/sweeps, named by scene,
+            settings and what tells this sweep from others.
         over: a setting and its range, e.g. --over M_bar_scale=0.2:4:20 --over horizon=1:20:20. Ranges of a
             decade and more go in equal ratios; PATH=lo:hi:n:lin and :log decide it.
         controller: which controller, the scene's own by default: a name (see himpc-lab controllers) or a
@@ -44,7 +45,14 @@ def sweep(
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
     from lessons.cluster import on_cluster
-    from lessons.experiments.sweep import carry_on, check_metric, finished_cells, make_sweep, metrics
+    from lessons.experiments.sweep import (
+        carry_on,
+        check_metric,
+        finished_cells,
+        make_sweep,
+        metrics,
+        usual_folder,
+    )
     from lessons.own.resolve import tasks_named
     from lessons.parallel import on_cores
     from lessons.scenes.run_spec import RunSpec
@@ -54,6 +62,8 @@ def sweep(
     definition = make_sweep(base, over)
     choices = metrics(definition)
     shown = check_metric(metric or choices[0], choices)
+    if out is None:
+        out = usual_folder(definition)
     held = len(finished_cells(definition, out))
     total = len(definition.points)
     way = nullcontext(on_cores) if scheduler is None else on_cluster(scheduler)

@@ -1,4 +1,4 @@
-"""Everything a browser says passes here before viser applies it."""
+"""Everything a page says that `app.server.words` knows passes here before viser applies it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import viser
 
 from app.adapter import private
 from app.adapter.late import too_late
-from app.page.values import NotAllowed, allowed, in_reach
+from app.page.values import NotAllowed, allowed
 from app.panels.widgets.in_view import tells_what_is_seen
 
 _OFTEN = 2.0  # s between two notices of one page
 _GONE = "What you just pressed or changed was replaced meanwhile: if it is still there, do it once more."
-_FAR = "That is no place in this scene."
 
 
 class Inlet:
@@ -34,28 +33,26 @@ class Inlet:
                 case "write":
                     await self._write(message, go_on)
                 case "upload" if not private.control_of(self._client, message.source_component_uuid):
-                    self._say("Not taken", _GONE)
-                case "hand" if not in_reach(list(vars(message).values())):
-                    self._say("Not moved", _FAR)
+                    self.say("Not taken", _GONE)
                 case _:
                     await go_on(message)
         except Exception as error:
             if too_late(error):
-                self._say("Not taken", _GONE)
+                self.say("Not taken", _GONE)
                 return
             traceback.print_exc()
-            self._say("That did not work", f"{type(error).__name__}: {error}"[:300])
+            self.say("That did not work", f"{type(error).__name__}: {error}"[:300])
 
     async def _write(self, message: Any, go_on: Callable[[Any], Awaitable[None]]) -> None:
         handle = private.control_of(self._client, message.uuid)
         if handle is None:
             if not tells_what_is_seen(message.updates):
-                self._say("Not taken", _GONE)
+                self.say("Not taken", _GONE)
             return
         try:
             value = allowed(handle, message.updates)
         except NotAllowed as refusal:
-            self._say("Not changed", str(refusal))
+            self.say("Not changed", str(refusal))
             private.send_again(handle)
             return
         typed, message.updates = message.updates["value"], {"value": value}
@@ -63,7 +60,8 @@ class Inlet:
         if isinstance(handle, viser.GuiSliderHandle) and typed != value:
             private.send_again(handle)
 
-    def _say(self, title: str, sentence: str) -> None:
+    def say(self, title: str, sentence: str) -> None:
+        """A notice; of many, one now and then."""
         now = time.monotonic()
         if now >= self._next_notice:
             self._next_notice = now + _OFTEN

@@ -22,7 +22,6 @@ from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.fault import FaultNotice
-from app.page.inlet import Inlet
 from app.panels.widgets.command import add_command
 from lessons.own.folder import Folder
 from lessons.scenes.names import ALL_SCENES
@@ -61,7 +60,6 @@ class Page:
         self._on_dark = on_dark
         self._greet = greet
         self._client = client
-        self._inlet = Inlet(client)
         self._fault = FaultNotice(client)
         self._dark = dark
         self._own_files = own_files
@@ -122,11 +120,13 @@ class Page:
         if ready is not None and ready is not self._built:
             before, self._built = self._built, ready  # also of one that cannot be built: once is enough
             same = ready.again and before is not None and before.choice == ready.choice
-            if same and self._stage is not None:
-                with self._client.atomic():
-                    self._stage.recompose(ready)
-            else:
-                self._build(ready)
+            try:
+                self._show(ready, same)
+            except Exception:
+                if learner.ready is ready:
+                    raise
+                self._drop_stage()  # another scene came in meanwhile: it is built at the next look
+                return
         self._pass_on()
         stage = self._stage
         if stage is None:
@@ -145,6 +145,14 @@ class Page:
             # Another scene may come in at any moment: its rows and poses do not fit this stage.
             if learner.ready is self._built:
                 raise
+
+    def _show(self, ready: Ready, same: bool) -> None:
+        """Builds a scene; same: it is the run on show, under another stack."""
+        if same and self._stage is not None:
+            with self._client.atomic():
+                self._stage.recompose(ready)
+        else:
+            self._build(ready)
 
     def _own_trouble(self) -> Trouble | None:
         """What is wrong with the learner's own code; says also when a saved text took over."""
@@ -205,9 +213,7 @@ class Page:
         from app.page.layout import Stage
         from app.view.robot import aim
 
-        before, self._stage = self._stage, None
-        if before is not None:
-            before.close()
+        self._drop_stage()
         with self._client.atomic():
             self._client.scene.reset()
             self._client.gui.reset()
@@ -235,6 +241,11 @@ class Page:
         for sentence in ready.left_out:
             self._client.add_notification("Opened without a task of yours", sentence, color="orange")
         self._trouble = None
+
+    def _drop_stage(self) -> None:
+        before, self._stage = self._stage, None
+        if before is not None:
+            before.close()
 
     def _frame(self) -> None:
         """The robot as it stands now into the middle of the picture, seen from where it is seen."""

@@ -46,8 +46,16 @@ class Context:
         return self.learner.settings_of(self.ready)
 
     def poses(self) -> np.ndarray | None:
-        """Poses of joints 1 … n and the tip, (n + 1, 7)."""
-        return self.learner.read(lambda block, _: block.poses())
+        """Poses of joints 1 … n and the tip, (n + 1, 7); None if they are another scene's by now, whose robot
+        may have other joints."""
+        learner = self.learner
+        return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
+
+    def poses_or_still(self) -> np.ndarray:
+        """The same, for what is built now and follows later; where nothing is known, frames at the origin."""
+        poses = self.poses()
+        still = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+        return np.tile(still, (self.ready.robot.n + 1, 1)) if poses is None else poses
 
 
 class Face(Protocol):

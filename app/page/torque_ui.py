@@ -129,8 +129,7 @@ class TorqueFace:
         )
 
     def _tip(self) -> np.ndarray:
-        poses = self._context.poses()
-        return np.array([0, 0, 0, 1.0, 0, 0, 0]) if poses is None else poses[-1]
+        return self._context.poses_or_still()[-1]
 
     def _targets_now(self) -> dict[str, np.ndarray]:
         """Where the hand put each target that can be moved, whatever instant is shown."""
@@ -151,13 +150,13 @@ class TorqueFace:
             context.post,
             lambda: bool(self._start.clamp.value),
             self._start.dragged,
+            context.loop.call_later,
         )
-        poses = context.poses()
         self._targets = Targets(
             scene,
             ready,
             context.colours,
-            np.zeros((ready.robot.n + 1, 7)) if poses is None else poses,
+            context.poses_or_still(),
             0.75 * size,
             context.post,
         )
@@ -190,7 +189,8 @@ class TorqueFace:
         context, T_s = self._context, self._context.settings.T_s
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
-        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields)
+        running = moment.status.running or not moment.live
+        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields, running)
         self._hand.look_back(None if moment.live else moment.status.targets)
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
         self._trails.draw(tips, moment.status.path, T_s)

@@ -10,8 +10,6 @@ import viser
 
 LONGEST = 200_000
 """Characters of a text."""
-FARTHEST = 1e6
-"""m: what is dragged further has left every scene."""
 
 
 class NotAllowed(Exception):
@@ -82,14 +80,3 @@ def _each(value: Any) -> Iterable[Any]:
 
 def _ends(end: Any) -> Iterable[Any]:
     return end if isinstance(end, tuple) else (end,) * 4
-
-
-def in_reach(value: Any, depth: int = 0) -> bool:
-    """Whether all numbers in what a hand did in the 3D view are places in a scene."""
-    if isinstance(value, bool) or value is None or isinstance(value, str):
-        return True
-    if isinstance(value, (int, float)):
-        return abs(value) <= FARTHEST  # false for what is not a number
-    if isinstance(value, (list, tuple)):
-        return depth < 4 and len(value) <= 64 and all(in_reach(each, depth + 1) for each in value)
-    return False

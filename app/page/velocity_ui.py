@@ -94,7 +94,7 @@ class VelocityFace:
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         del robot  # velocity servos do not feel a pull
         context, ready = self._context, self._context.ready
-        size, poses = gizmo_size(ready.robot), context.poses()
+        size = gizmo_size(ready.robot)
         self._frames = Frames(scene)
         self._obstacles = Obstacles(scene, self._put)
         self._people = People(scene)
@@ -103,7 +103,7 @@ class VelocityFace:
             scene,
             ready,
             context.colours,
-            np.zeros((ready.robot.n + 1, 7)) if poses is None else poses,
+            context.poses_or_still(),
             size,
             context.post,
             self._status,

@@ -22,6 +22,7 @@ from app.server.crowd import Crowd
 from app.server.door import Answer, Door, is_upgrade, secured
 from app.server.peers import ends_of
 from app.server.uploads import TRANSFER, Uploads
+from app.server.words import refusal
 
 HANDSHAKE = 5.0
 """s for a request to be complete."""
@@ -109,12 +110,14 @@ class Guard:
 
 
 class GuardedConnection(ServerConnection):
-    """Counts before it decodes. `uploads` are those of the page it serves; `is_owners` says whether who
-    started the server opened it."""
+    """Counts before it decodes, and hands on only what a page says. `uploads` are those of the page it
+    serves, `refuse` tells its user what was not taken, `is_owners` says whether who started the server
+    opened it."""
 
     def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
         super().__init__(*of, **more)
         self.uploads: Uploads | None = None
+        self.refuse: Callable[[str], object] = _nothing_said
         self.is_owners = False
         self._guard = guard
         self._budget = Budget(self.loop.time)
@@ -170,6 +173,10 @@ class GuardedConnection(ServerConnection):
                 await asyncio.sleep(waiting)
             if self._budget.spent:
                 await self._end(CloseCode.POLICY_VIOLATION, "Too many messages.")
+            if (why := refusal(raw)) is not None:
+                if why:
+                    self.refuse(why)
+                continue
             if TRANSFER in raw and not await self._may_upload(raw):
                 continue
             self._guard.crowd.spoke(self)
@@ -188,6 +195,10 @@ class GuardedConnection(ServerConnection):
 def _user(connection: ServerConnection) -> str:
     ends = ends_of(connection.transport)
     return "" if ends is None else ends.user
+
+
+def _nothing_said(_: str) -> None:
+    """Nobody is there yet."""
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:

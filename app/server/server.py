@@ -17,7 +17,7 @@ import viser
 
 from app.adapter import private
 from app.link.choice import SceneChoice
-from app.server.arenas import few_arenas
+from app.server.arenas import few_arenas, large_arrays_apart
 from app.server.classroom import Classroom
 from app.server.door import Door, as_origin, names_of_this_machine
 from app.server.greeting import greeting
@@ -123,6 +123,7 @@ class PageServer:
         _check_choice(choice)
         _check_address(host, port)
         few_arenas()
+        large_arrays_apart()
         # A tab may close between two lines of ours; that is no news for the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         local = host in _LOOPBACK

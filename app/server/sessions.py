@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.link.spares import Spares
+from app.server.arenas import give_back
 
 WORKER = "app.worker.entry"
 """What a simulation's process runs; by name, because the server never loads it."""
@@ -19,6 +20,8 @@ Refuse = Callable[[str], object]
 
 GRACE = 10.0  # s a session outlives its tab: the time of a reload
 _PERIOD = 0.5  # s between looks at who has left
+_TIDY = 10.0
+"""s between two times that free memory is given back, if scenes came and went meanwhile."""
 
 
 class Sessions:
@@ -65,6 +68,7 @@ class Sessions:
         learner.attached = False
 
     def _keep(self) -> None:
+        tidied, scenes = time.monotonic(), 0
         while not self._closed.wait(_PERIOD):
             now = time.monotonic()
             with self._lock:
@@ -78,6 +82,10 @@ class Sessions:
                 room = len(self._learners) < self.max_sessions
             for learner in ended:
                 learner.close()
+            changed = sum(learner.changed for learner in self.learners)
+            if changed != scenes and now - tidied > _TIDY:
+                tidied, scenes = now, changed
+                give_back()
             if room:
                 self._spares.refill()
 

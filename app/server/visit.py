@@ -11,8 +11,10 @@ from functools import partial
 import viser
 
 from app.adapter import private
+from app.adapter.late import told
 from app.client.progress import Notebook
 from app.html.text import block
+from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.classroom import add_watching
 from app.server.budget import UPLOADS
@@ -20,7 +22,7 @@ from app.server.classroom import Classroom, Watcher
 from app.server.guard import GuardedConnection
 from app.server.sessions import Sessions
 from app.server.uploads import Uploads
-from app.server.workers import Workers, told
+from app.server.workers import Workers
 from lessons.own.folder import Folder
 from lessons.replay.progress import Progress
 from lessons.replay.progress import found as found_progress
@@ -59,10 +61,12 @@ class Visit:
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)
         private.keep_short(server, client)
+        inlet = Inlet(client)
         connection = private.connection_of(server, client)
         if not (isinstance(connection, GuardedConnection) and connection.is_owners):
             self._own_files = None
         if isinstance(connection, GuardedConnection):
+            connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
                 partial(private.unfinished_uploads, client),
                 partial(private.forget_upload, client),

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import threading
-import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-from app.adapter.late import too_late
+from app.adapter.late import in_time
 
 THREADS = 4
 WAITING = 64
@@ -28,28 +26,12 @@ class Workers(ThreadPoolExecutor):
         if not self._room.acquire(blocking=False):
             return _dropped()
         try:
-            future = super().submit(_in_time, fn, *args, **kwargs)
+            future = super().submit(in_time, fn, *args, **kwargs)
         except RuntimeError:  # shut down: its page has been closed
             self._room.release()
             return _dropped()
         future.add_done_callback(lambda _: self._room.release())
         return future
-
-
-def told(future: Future[Any]) -> None:
-    """Done-callback: an exception in a thread of its own is not lost."""
-    if not future.cancelled() and (error := future.exception()) is not None:
-        traceback.print_exception(error, file=sys.stderr)
-
-
-def _in_time(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    """What it gives; None if what it wrote to is gone meanwhile."""
-    try:
-        return fn(*args, **kwargs)
-    except RuntimeError as error:
-        if not too_late(error):
-            raise
-        return None
 
 
 def _dropped() -> Future[Any]:

@@ -11,6 +11,10 @@ _SHARE = 0.74
 """Of the picture's width and height that what is looked at may take: a target has to be dragged somewhere."""
 _NARROW = 0.75
 """Width over height of a desktop's scene once the panels are docked beside it, as a rule."""
+_SLIM = 0.2
+"""Width over height below which no more is made of it: the camera would go far away."""
+_ASIDE = np.array([1.0, 0.75, 0.55])
+"""From where to look if nothing else is known."""
 _THICK = 0.07
 """How far links reach around their joints, as a share of the robot's size."""
 _SHEET = 0.6
@@ -48,15 +52,27 @@ def fit(
 
 def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction: np.ndarray | None) -> None:
     """Turns the camera to all points (k, 3), m; direction: from there to it, None: as it is now."""
-    here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
-    level = float(np.linalg.norm(here[:2]))
     if direction is None:
+        here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
+        level = float(np.linalg.norm(here[:2]))
         # Straight from above there is no up; so far down it is nearly the same.
-        direction = (
-            here if level > 0.02 * abs(float(here[2])) else here - np.array([0.0, 0.05 * abs(here[2]), 0.0])
-        )
-    aspect = camera.aspect if phone else min(camera.aspect, _NARROW)
-    eye, at = fit(points, np.asarray(direction), camera.fov, aspect, phone)
+        below = np.array([0.0, 0.05 * abs(here[2]), 0.0])
+        direction = here if level > 0.02 * abs(float(here[2])) else here - below
+    if not np.linalg.norm(direction) > 0.0:
+        direction = _ASIDE
+    # A page that is folded away, or not laid out yet, has no height or no width.
+    aspect = max(max(camera.image_width, 1) / max(camera.image_height, 1), _SLIM)
+    eye, at = fit(points, np.asarray(direction), camera.fov, aspect if phone else min(aspect, _NARROW), phone)
     camera.up_direction = (0.0, 0.0, 1.0)
+    turn(camera, eye, at)
+
+
+def turn(camera: viser.CameraHandle, eye: np.ndarray, at: np.ndarray) -> None:
+    """Puts the camera to `eye` and lets it look at `at`, two places, (3,) m."""
+    position, back = np.asarray(camera.position, float), eye - at
+    if np.array_equal(camera.look_at, eye):
+        # viser moves one after the other, and refuses a camera that looks at where it is between the two.
+        aims = (position + share * back for share in (1.0, 2.0))
+        camera.look_at = next(each for each in aims if not np.array_equal(each, eye))
     camera.position = eye
     camera.look_at = at

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import viser.transforms as vtf
 
@@ -30,11 +32,19 @@ def raw(task: TaskView) -> np.ndarray:
 
 
 def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
-    """A point in space from the coordinates under control."""
+    """A point in space from the coordinates under control. Values that have other coordinates, from before
+    the task's axes were changed, say nothing about it."""
     point = np.array(else_, float)
-    if values is not None:
+    if values is not None and values.shape == (len(task.axes),):
         point[["xyz".index(axis) for axis in task.axes]] = values
     return point
+
+
+def of_task(task: TaskView, targets: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Where a draggable task's target is; None if there is none, or one of other coordinates: what is shown
+    may be from before its axes, its kind or the stack were changed."""
+    found = targets.get(task.name)
+    return None if found is None or found.shape != raw(task).shape else found
 
 
 def xyzw(rotation: np.ndarray) -> tuple[float, ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.view.camera import turn
+
 _STEP = 0.02
 """m: a base that moved less is not followed yet; a camera that trembles with it is hard to look through."""
 _REST = 30
@@ -40,5 +42,4 @@ class FollowBase:
             self._ahead = self._camera.look_at - self._at
         self._at, self._rests = base.copy(), 0
         point = base + self._ahead
-        self._camera.position = point - look
-        self._camera.look_at = point
+        turn(self._camera, point - look, point)

@@ -15,11 +15,13 @@ from robots.reach import ReachJudge
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Where the hand holds a target: position (3,), m; rotation (3, 3) or None; frame: a link's name."""
+    """Where the hand holds a target: position (3,), m; rotation (3, 3) or None; frame: a link's name; number:
+    which move of the hand it was."""
 
     position: np.ndarray
     rotation: np.ndarray | None
     frame: str
+    number: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +42,16 @@ class Verdict:
 class Judge:
     """A thread with placo on it."""
 
-    def __init__(self, robot: Robot, answer: Callable[[Verdict], None]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        place: Callable[[Question, np.ndarray], None],
+        answer: Callable[[Verdict], None],
+    ) -> None:
+        """place: hears the accepted position, (3,) m, as soon as it is known; answer: then all of the
+        verdict. Both are called on the judge's thread."""
         self._robot = robot
-        self._answer = answer
+        self._place, self._answer = place, answer
         self._wake = threading.Condition()
         self._question: Question | None = None
         self._closed = False
@@ -78,6 +87,7 @@ class Judge:
                 frame = self._robot.frame_id(question.frame)
                 accepted = pin.updateFramePlacement(self._robot.model, data, frame).translation.copy()
                 missing = found.position_error
+            self._place(question, accepted)
             turned = 0.0
             if question.rotation is not None:
                 pose = judge.solve(accepted, question.rotation, q, question.frame)

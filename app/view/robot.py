@@ -10,7 +10,7 @@ import viser
 
 from app.adapter import private
 from app.html.palette import RGB
-from app.view.camera import look
+from app.view.camera import look, turn
 from robots import Robot
 from robots.shapes import link_shapes
 
@@ -121,12 +121,10 @@ def aim(
         down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])
         eye, at = eye - down, at - down
     camera.up_direction = (0.0, 0.0, 1.0)
-    camera.position = eye
-    camera.look_at = at
+    turn(camera, eye, at)
 
 
 def look_at(camera: viser.CameraHandle, robot: Robot, base: np.ndarray) -> None:
     """Turns the camera to a robot whose base is at (3,), m."""
     eye, at, _ = camera_for(robot)
-    camera.position = eye + base
-    camera.look_at = at + base
+    turn(camera, eye + base, at + base)

@@ -72,7 +72,8 @@ class TargetGizmo:
             "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False
         )
         self._label = scene.add_label("/target/label", _INVITATION, position=(0.0, 0.0, size + 0.05))
-        self._invites = True
+        self._said = _INVITATION
+        self._invites, self._missing, self._paused = True, 0.0, ""
         self._accepted = scene.add_icosphere(
             "/accepted", radius=_BALL, color=colour, opacity=0.6, visible=False, cast_shadow=False
         )
@@ -87,6 +88,7 @@ class TargetGizmo:
         @self._turn.on_update
         async def _(_: viser.TransformControlsEvent) -> None:
             self._invites = False
+            self._say()
             moved(self.raw, self.rotation if self._rings else None)
 
     @property
@@ -116,12 +118,30 @@ class TargetGizmo:
         out = missing > 0.0
         for handle in (self._ghost, self._accepted, self._gap):
             handle.visible = out
-        self._label.visible = out or self._invites
         self._ball.visible = not out
+        self._missing = missing
         if out:
             self._accepted.position = accepted
             self._gap.points = np.array([[self.raw, accepted]], np.float32)
-            self._label.text = f"out of reach by {100 * missing:.0f} cm"
+        self._say()
+
+    def pause(self, words: str) -> None:
+        """words: how to go on, where nothing would follow the target; empty while the simulation runs."""
+        if words != self._paused:
+            self._paused = words
+            self._say()
+
+    def _say(self) -> None:
+        if self._missing > 0.0:
+            words = f"out of reach by {100 * self._missing:.0f} cm"
+        else:
+            words = self._paused or (_INVITATION if self._invites else "")
+        if words == self._said:
+            return
+        self._said = words
+        self._label.visible = bool(words)
+        if words:
+            self._label.text = words
 
     def remove(self) -> None:
         """Takes it out of the scene."""

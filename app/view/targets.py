@@ -12,7 +12,7 @@ import viser.transforms as vtf
 from app.client.wish import HOLD, Send
 from app.html.palette import BOUND, RGB
 from app.link.messages import Ready, TaskView
-from app.view.coordinates import draggable, full, xyzw
+from app.view.coordinates import draggable, full, of_task, xyzw
 from lessons.events import MoveTarget
 from robots import Robot
 
@@ -48,7 +48,7 @@ class Targets:
         """poses (n + 1, 7) of the instant that is shown; raw: where the session has each target that there
         is; live: whether it is now, so that they can be dragged."""
         for target in self._targets:
-            target.follow(poses, raw.get(target.name), live)
+            target.follow(poses, of_task(target.task, raw), live)
 
     def remove(self) -> None:
         """Takes them out of the scene."""
@@ -70,7 +70,7 @@ class _Target:
         size: float,
         post: Send,
     ) -> None:
-        self.name, self._task, self._robot, self._post = task.name, task, robot, post
+        self.name, self.task, self._robot, self._post = task.name, task, robot, post
         self._touched = -float("inf")
         self._home = np.array(pin.centerOfMass(robot.model, robot.model.createData(), robot.home))
         node = f"/targets/{task.name}"
@@ -109,7 +109,7 @@ class _Target:
 
     def _value(self) -> tuple[float, ...]:
         """What the task's target is where the hand has it."""
-        task, at = self._task, np.array(self._control.position, float)
+        task, at = self.task, np.array(self._control.position, float)
         if task.kind in _TURNING:
             return xyzw(vtf.SO3(np.array(self._control.wxyz, float)).as_matrix())
         if task.kind == "plane_distance":
@@ -118,7 +118,7 @@ class _Target:
         return tuple(float(at["xyz".index(axis)]) for axis in axes)
 
     def follow(self, poses: np.ndarray, raw: np.ndarray | None, live: bool) -> None:
-        task = self._task
+        task = self.task
         frame = frame_pose(self._robot, poses, task.frame)
         base = pin.SE3.Identity()
         if task.kind.startswith("relative"):
@@ -144,7 +144,7 @@ class _Target:
 
     def _reach(self, point: np.ndarray, goal: np.ndarray) -> None:
         """Draws the line from the frame to what is asked of it."""
-        if self._task.kind == "com":
+        if self.task.kind == "com":
             return
         ends = np.array([[point, goal]], np.float32)
         shown = bool(np.linalg.norm(point - goal) > _BALL)

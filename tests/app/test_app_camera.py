@@ -54,7 +54,8 @@ def test_what_the_hand_will_follow_is_in_the_picture(phone: bool) -> None:
     (way,) = [task.path for task in body.ready().tasks if task.kind == "position"]
     body.close()
     assert way is not None
-    camera: Any = SimpleNamespace(position=np.ones(3), look_at=np.zeros(3), fov=0.9, aspect=0.46)
+    size = {"image_width": 460, "image_height": 1000, "aspect": 0.46}
+    camera: Any = SimpleNamespace(position=np.ones(3), look_at=np.zeros(3), fov=0.9, **size)
     aim(camera, load_robot("iiwa14"), phone, np.zeros((0, 3)), [way])
     seen = on_picture(way, camera.position, camera.look_at, camera.fov, camera.aspect)
     assert np.abs(seen).max() < 1.0 and (seen[:, 1].min() > SHEET or not phone)

@@ -108,6 +108,20 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return (out / "results.json").read_bytes()
 
 
+def test_a_sweep_without_a_folder_has_one_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is told, the same sweep carries on there, and another one does not."""
+    monkeypatch.chdir(tmp_path)
+    for over, held in (("Q=100:200:2", 0), ("Q=100:200:2", 2), ("Q=100:300:2", 0)):
+        assert main(["sweep", "planar3-circle", "--over", over, "--duration", "0.02"]) == 0
+        said = capsys.readouterr()
+        assert f"2 cells, {held} of them already in out/sweeps/planar3-circle-Q-" in said.err
+        assert "results: out/sweeps/planar3-circle-Q-" in said.out
+    folders = list((tmp_path / "out" / "sweeps").iterdir())
+    assert len(folders) == 2 and all((each / "results.json").exists() for each in folders)
+
+
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals, whole: bytes) -> None:
     """Interrupted like from a terminal, or told to end: it says how far it got, leaves no process

@@ -9,6 +9,7 @@ from functools import partial
 
 import viser
 
+from app.adapter.late import in_time
 from app.client.learner import Learner
 from app.client.trouble import Trouble
 from app.client.wish import HOLD, Wish
@@ -112,7 +113,7 @@ class PlaybackPanel:
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
-        self._loop.call_soon_threadsafe(self._show_speed, status.speed)
+        self._loop.call_soon_threadsafe(in_time, self._show_speed, status.speed)
         state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
         if status.capped:
             why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."

@@ -9,6 +9,7 @@ from functools import partial
 
 import viser
 
+from app.adapter.late import in_time
 from app.client.learner import Learner
 from app.html.text import block
 from app.panels.widgets.command import add_command
@@ -84,13 +85,13 @@ class TimeLine:
     def _enter(self, first: float, last: float) -> None:
         self.past, self._paused_at = None, last
         self._slider.min = round(-math.floor((last - first) / _STEP) * _STEP, 3)
-        self._loop.call_soon_threadsafe(self._set, 0.0)
+        self._loop.call_soon_threadsafe(in_time, self._set, 0.0)
         self._slider.visible = True
 
     def _leave(self) -> None:
         self.past = self._paused_at = None
         self._slider.visible = False
-        self._loop.call_soon_threadsafe(self._set, 0.0)
+        self._loop.call_soon_threadsafe(in_time, self._set, 0.0)
 
     def _say(self) -> None:
         past, at = self.past, self._paused_at

@@ -10,6 +10,7 @@ from typing import Any, Generic, TypeVar
 
 import viser
 
+from app.adapter.late import in_time
 from app.adapter.private import send_again
 from app.client.wish import HOLD, Send
 from lessons.events import Event
@@ -65,7 +66,7 @@ class Bindings(Generic[S]):
 
     def refresh(self, present: S) -> None:
         """Shows what the session has. Returns at once; the event loop does it."""
-        self._loop.call_soon_threadsafe(self._write, present)
+        self._loop.call_soon_threadsafe(in_time, self._write, present)
 
     def close(self) -> None:
         """The controls are about to be removed: writes nothing any more."""

@@ -1,7 +1,7 @@
 """A grid of runs over one or more settings. A run that fails or loses control is a cell, not the end."""
 
 from lessons.experiments.sweep.cells import Cell, best_cell, check_metric, metrics
-from lessons.experiments.sweep.folder import carry_on, finished_cells
+from lessons.experiments.sweep.folder import carry_on, finished_cells, usual_folder
 from lessons.experiments.sweep.grid import Axis, Sweep, make_sweep
 from lessons.experiments.sweep.picture import draw_sweep
 
@@ -16,4 +16,5 @@ __all__ = [
     "finished_cells",
     "make_sweep",
     "metrics",
+    "usual_folder",
 ]

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,14 @@ from lessons.experiments.sweep.cells import Cell, perform_cell
 from lessons.experiments.sweep.grid import Sweep
 from lessons.parallel import Failed, Spread
 from robots import InputError
+
+
+def usual_folder(sweep: Sweep) -> Path:
+    """Where a sweep goes if nobody says: of its own for each, so that the same one carries on there."""
+    wanted = json.dumps(sweep.as_data(), sort_keys=True)
+    names = "-".join([Path(sweep.base.scene).stem, *(axis.path for axis in sweep.axes)])
+    readable = re.sub(r"[^\w.-]+", "_", names, flags=re.ASCII)[:80]
+    return Path("out", "sweeps", f"{readable}-{sha256(wanted.encode()).hexdigest()[:8]}")
 
 
 def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:

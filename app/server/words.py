@@ -1,0 +1,181 @@
+"""What a browser may say: each message's fields, their kinds and their bounds. Nothing else reaches viser."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+LONGEST = 2_000_000
+"""B of a message that carries no part of a file; a text of the page has at most 200,000 characters."""
+_FILE = b"FileTransfer"  # in every message that begins or carries a file
+_CAMERA = b"ViewerCamera"  # in every message that nobody sends on purpose
+_LEAST = 1e-9  # m, or of a quaternion: below it there is no direction
+
+Name = Annotated[str, Meta(max_length=1000)]
+Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
+"""What is dragged further has left every scene. Not a number is neither above nor below."""
+Share = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Place = tuple[Metres, Metres, Metres]
+Turn = tuple[Share, Share, Share, Share]
+Whole = Annotated[int, Meta(ge=0, le=2**53)]
+Pixels = Annotated[int, Meta(ge=0, le=100_000)]
+Modifier = (
+    Literal["cmd/ctrl", "alt", "shift", "cmd/ctrl+alt", "cmd/ctrl+shift", "alt+shift", "cmd/ctrl+alt+shift"]
+    | None
+)
+
+
+class ViewerCameraMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """Where the page is looked at from. A canvas that is not laid out yet has no size."""
+
+    wxyz: Turn
+    position: Place
+    fov: Annotated[float, Meta(gt=0.0, lt=math.pi)]
+    near: Annotated[float, Meta(gt=0.0, le=1e9)]
+    far: Annotated[float, Meta(gt=0.0, le=1e9)]
+    image_height: Pixels
+    image_width: Pixels
+    look_at: Place
+    up_direction: Place
+
+    def __post_init__(self) -> None:
+        if math.dist(self.position, self.look_at) < _LEAST:
+            raise ValueError("it looks at where it is")
+        _has_direction(self.up_direction)
+
+
+class TransformControlsUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """Arrows or rings were moved."""
+
+    name: Name
+    wxyz: Turn
+    position: Place
+    owner: Name
+
+    def __post_init__(self) -> None:
+        _has_direction(self.wxyz)
+
+
+class TransformControlsDragStartMessage(
+    msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"
+):
+    """A hand takes hold of arrows or rings."""
+
+    name: Name
+    owner: Name
+
+
+class TransformControlsDragEndMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """It lets go."""
+
+    name: Name
+    owner: Name
+
+
+class SceneNodeClickMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """A click on a thing in the 3D view."""
+
+    name: Name
+    instance_index: Whole | None
+    ray_origin: Place
+    ray_direction: Place
+    screen_pos: tuple[float, float]
+    modifier: Modifier
+    owner: Name
+
+
+class SceneNodeDragMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """A thing in the 3D view is pulled."""
+
+    phase: Literal["start", "update", "end"]
+    name: Name
+    instance_index: Whole | None
+    start_position: Place
+    start_screen_pos: tuple[float, float]
+    end_position: Place
+    end_screen_pos: tuple[float, float]
+    button: Literal["left", "middle", "right"]
+    modifier: Modifier
+    owner: Name
+
+
+class GuiUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """A control was written or pressed. What may be written depends on the control, see `app.page.values`."""
+
+    uuid: Name
+    updates: Annotated[dict[str, Any], Meta(max_length=16)]
+
+
+class CommandTriggerMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """A key, or a command of the palette."""
+
+    uuid: Name
+
+
+class LocalStorageGetItemResponseMessage(
+    msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"
+):
+    """What the browser keeps."""
+
+    value: str | None
+    error: str | None
+    request_uuid: Name
+
+
+class FileTransferStartUpload(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """A file will come."""
+
+    source_component_uuid: Name
+    transfer_uuid: Name
+    filename: Name
+    mime_type: Name
+    part_count: Annotated[int, Meta(ge=0, le=100_000)]
+    size_bytes: Whole
+
+
+class FileTransferPart(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
+    """A part of it."""
+
+    source_component_uuid: Name | None
+    transfer_uuid: Name
+    part_index: Whole
+    content: bytes
+
+
+Small = (
+    ViewerCameraMessage
+    | TransformControlsUpdateMessage
+    | TransformControlsDragStartMessage
+    | TransformControlsDragEndMessage
+    | SceneNodeClickMessage
+    | SceneNodeDragMessage
+    | GuiUpdateMessage
+    | CommandTriggerMessage
+    | LocalStorageGetItemResponseMessage
+)
+File = FileTransferStartUpload | FileTransferPart
+
+_SMALL, _FILES = msgspec.msgpack.Decoder(Small | File), msgspec.msgpack.Decoder(File)
+
+
+def refusal(raw: bytes) -> str | None:
+    """Why a message is not taken, a sentence, empty where nobody need be told; None if it is a word that a
+    page says."""
+    decoder = _SMALL if len(raw) <= LONGEST else _FILES if _FILE in raw else None
+    if decoder is None:
+        return f"A page says at most {LONGEST // 1000} kB at once."
+    try:
+        decoder.decode(raw)
+    except msgspec.ValidationError as error:
+        return "" if _CAMERA in raw else f"That is nothing a page says: {error}."[:300]
+    except (msgspec.DecodeError, RecursionError):
+        return "That is nothing a page says."
+    return None
+
+
+def _has_direction(vector: tuple[float, ...]) -> None:
+    if math.hypot(*vector) < _LEAST:
+        raise ValueError("it has no direction")

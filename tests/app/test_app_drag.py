@@ -1,0 +1,179 @@
+"""A target that is dragged: position and orientation go together, at once or after a short wait."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.link.choice import SceneChoice
+from app.link.messages import Ready
+from app.view import drag
+from app.view.drag import Hand
+from app.view.reachability import Question, Verdict
+from app.worker.simulation import Body
+from lessons.events import Event, MoveTarget
+from lessons.scenes.run_spec import RunSpec
+
+FAR = np.array([5.0, 0.0, 0.0])
+TIP = np.array([0.4, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0])
+
+
+class Scene:
+    """Keeps nodes by name, each with what it was made with, and the callbacks of controls."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[str, Any] = {}
+        self.moved: Callable[[], None] = lambda: None
+
+    def __getattr__(self, _: str) -> Any:
+        def add(name: str, *given: Any, **made: Any) -> Any:
+            text = given[0] if given and isinstance(given[0], str) else ""
+            made = {"wxyz": np.array([1.0, 0, 0, 0]), "visible": True, "text": text, **made}
+            node = SimpleNamespace(**made, remove=lambda: None, on_update=self._listen)
+            self.nodes[name] = node
+            return node
+
+        return add
+
+    def _listen(self, back: Any) -> Any:
+        def moved() -> None:
+            with pytest.raises(StopIteration):
+                back(None).send(None)
+
+        self.moved = moved
+        return back
+
+
+class Judge:
+    """Answers when it is told to."""
+
+    made: list[Judge]
+
+    def __init__(
+        self,
+        _: object,
+        place: Callable[[Question, np.ndarray], None],
+        answer: Callable[[Verdict], None] | None = None,
+    ) -> None:
+        self.asked: list[Question] = []
+        self.place, self.close = place, lambda: None
+        self.made.append(self)
+
+    def ask(self, question: Question) -> None:
+        self.asked.append(question)
+
+
+class Held:
+    """A hand, its scene, and what it posted."""
+
+    def __init__(self, ready: Ready, clamp: bool) -> None:
+        self.posted: list[Event] = []
+        self.waiting: list[tuple[float, Callable[[], None]]] = []
+        self.scene: Any = Scene()
+        self.targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
+        self.start = self.targets["position"]
+        colours = {task.level: (1, 2, 3) for task in ready.tasks}
+        self.hand = Hand(
+            self.scene,
+            ready,
+            colours,
+            self.targets,
+            TIP,
+            0.2,
+            self.posted.append,
+            lambda: clamp,
+            lambda: None,
+            lambda seconds, then: self.waiting.append((seconds, then)),
+        )
+        (self.judge,) = Judge.made
+
+    def drag(self, place: np.ndarray) -> None:
+        self.scene.nodes["/target"].position = place
+        self.scene.nodes["/target/turn"].wxyz = np.array([0.0, 1.0, 0.0, 0.0])
+        self.scene.moved()
+
+    def take(self) -> dict[str, tuple[float, ...]]:
+        """What was posted since, by task."""
+        posted = {each.task: each.value for each in self.posted if isinstance(each, MoveTarget)}
+        assert len(posted) == len(self.posted)
+        self.posted.clear()
+        return posted
+
+
+@pytest.fixture(scope="module")
+def ready() -> Iterator[Ready]:
+    body = Body(SceneChoice(RunSpec("iiwa14-hold")))
+    yield body.ready()
+    body.close()
+
+
+@pytest.fixture
+def held(ready: Ready, monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], Held]:
+    Judge.made = []
+    monkeypatch.setattr(drag, "Judge", Judge)
+    return lambda clamp: Held(ready, clamp)
+
+
+def test_without_the_clamp_nothing_waits(held: Callable[[bool], Held]) -> None:
+    one = held(False)
+    one.drag(FAR)
+    assert one.take() == {"position": (5.0, 0.0, 0.0), "orientation": pytest.approx((1.0, 0.0, 0.0, 0.0))}
+    one.judge.place(one.judge.asked[-1], np.ones(3))
+    assert one.take() == {} and one.waiting == []
+
+
+def test_within_reach_both_come_when_the_judge_answers(held: Callable[[bool], Held]) -> None:
+    one = held(True)
+    one.drag(FAR)
+    assert one.take() == {}
+    one.judge.place(one.judge.asked[-1], 0.1 * FAR)
+    assert one.take() == {"position": (0.5, 0.0, 0.0), "orientation": pytest.approx((1.0, 0.0, 0.0, 0.0))}
+    one.waiting[-1][1]()
+    assert one.take() == {}
+
+
+def test_a_slow_judge_is_not_waited_for_long_and_the_target_stays_within_reach(
+    held: Callable[[bool], Held],
+) -> None:
+    """The orientation goes on with the position that the controller has; the judge's follows."""
+    one = held(True)
+    one.drag(FAR)
+    seconds, then = one.waiting[-1]
+    assert seconds <= 0.05
+    then()
+    assert one.take() == {
+        "position": pytest.approx(tuple(one.start)),
+        "orientation": pytest.approx((1.0, 0.0, 0.0, 0.0)),
+    }
+    one.judge.place(one.judge.asked[-1], 0.1 * FAR)
+    assert one.take() == {"position": (0.5, 0.0, 0.0)}
+
+
+def test_what_the_judge_says_after_a_reset_moves_nothing(held: Callable[[bool], Held]) -> None:
+    one = held(True)
+    one.drag(FAR)
+    one.hand.after_reset(one.targets)
+    one.judge.place(one.judge.asked[-1], 0.1 * FAR)
+    one.waiting[-1][1]()
+    assert one.take() == {}
+
+
+def test_a_drag_that_arrives_while_the_panel_is_rebuilt_is_dropped(held: Callable[[bool], Held]) -> None:
+    one = held(True)
+    one.hand.remove()
+    one.drag(FAR)
+    assert one.take() == {}
+
+
+def test_targets_from_before_the_axes_were_changed_are_not_drawn(held: Callable[[bool], Held]) -> None:
+    """A status from before it, and a moment that is looked back to."""
+    one = held(True)
+    before = {"position": np.array([0.3]), "orientation": np.eye(3)}
+    one.hand.after_reset(before)
+    assert one.scene.nodes["/target"].position == pytest.approx(one.start)
+    one.hand.look_back(before)
+    assert one.scene.nodes["/target"].visible
