@@ -170,7 +170,7 @@ WAIT = Step(
     It goes to the edge of what the arm allows and waits there, stretched like somebody with one
     foot out of the door. The moment the ball is gone the window moves on, and the rest of the way is
     short: three seconds to the second person, where the ghost, which had nothing but the hand to
-    think of, needs nearly ten. Nobody had to plan for the duration of the wait: there is none in the
+    think of, needs nearly seven. Nobody had to plan for the duration of the wait: there is none in the
     problem.
     """,
     prediction=Choice(

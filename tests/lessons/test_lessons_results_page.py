@@ -94,8 +94,11 @@ def expected() -> dict[str, str]:
         "HTMPC, formulation A, over HTIDKC with the authors' gains, part 2": (
             f"{of('htmpc-fig-6', authors):.0%} better".replace("%", " %")
         ),
-        "Delivery, formulation C, single-task time over hierarchical": (
-            f"{of('htmpc-fig-9', 'ST/HT execution time, mean over the layouts'):.1f}"
+        "Delivery, single-task time over hierarchical, one rule: base within 80 cm; within 5 cm and at rest": (
+            "; ".join(
+                f"{of('htmpc-fig-9', f'ST/HT execution time, mean over the layouts, both within {rule}'):.1f}"
+                for rule in ("80 cm", "5 cm and at rest")
+            )
         ),
     }
 

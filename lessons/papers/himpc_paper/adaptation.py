@@ -64,11 +64,11 @@ CASES = (
 @final
 @dataclass(frozen=True)
 class EigenvalueJob(Work):
-    """A run during which the eigenvalues of M⁻¹M̄, M the plant's, are computed at every tick. A target that can
-    be dragged jumps by up to 10 cm along each axis every half second.
+    """A run during which the eigenvalues of M⁻¹M̄, M the plant's, are computed at every tick. A target that
+    can be dragged jumps by up to 10 cm along each axis every half second.
 
-    Its summary has `rms_mm`, the distance of the TCP from its reference after the first second; `largest`, the
-    largest eigenvalue; `beyond_2`, for how many ticks on end one was above 2; `factor`, on M̄ at the end.
+    Its summary has `rms_mm`, the distance of the TCP from its reference after the first second; `largest`,
+    the largest eigenvalue; `beyond_2`, for how many ticks on end one was above 2.
     """
 
     def do(self) -> Run:
@@ -97,7 +97,6 @@ class EigenvalueJob(Work):
             "rms_mm": 1e3 * float(np.sqrt((distance**2).mean())) if len(distance) else math.nan,
             "largest": max(largest),
             "beyond_2": longest(np.array(largest) > 2.0),
-            "factor": float(session.M_bar[0] / session.settings.M_bar[0]),
         }
         return Run(self, told, {"t": t[:, None], "largest": np.array(largest)[:, None]})
 
@@ -129,7 +128,6 @@ FIGURES = {
     "RMS distance of the TCP after 1 s": ("rms_mm", "mm"),
     "largest eigenvalue of M⁻¹M̄": ("largest", "1"),
     "ticks on end beyond 2": ("beyond_2", "1"),
-    "factor at the end": ("factor", "1"),
 }
 
 
