@@ -102,10 +102,8 @@ def test_waypoints_have_one_rule(rule: tuple[str, ...]) -> None:
 def test_nothing_but_the_architecture_differs(name: str) -> None:
     """Settings, robot, start, script, and what the controller is told but for the levels in the window."""
     one, two = (scene_of(name, f"architecture={a}") for a in ("single_task", "hierarchical"))
-    values = [
-        {path: scene.settings.value_at(path) for path in scene.settings.paths()} for scene in (one, two)
-    ]
-    assert [path for path in values[0] if values[0][path] != values[1][path]] == ["architecture"]
+    own, other = (scene.settings for scene in (one, two))
+    assert [path for path in own.paths() if own.value_at(path) != other.value_at(path)] == ["architecture"]
     assert one.events == two.events and one.duration == two.duration
     for attribute in ("q_lower", "q_upper", "v_limit", "a_max", "tau_limit"):
         np.testing.assert_array_equal(getattr(one.robot, attribute), getattr(two.robot, attribute))
