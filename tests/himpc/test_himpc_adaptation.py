@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.adaptation import EVERY, LARGEST, RISE, Adaptation, LoadModel, adapted, wanted
 from lessons.events import Event, MoveTarget, Set
-from lessons.papers.himpc_paper.adaptation import EigenvalueJob
+from lessons.experiments.eigenvalues import EigenvalueJob
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
@@ -132,9 +132,8 @@ def test_a_payload_costs_no_error(name: str) -> None:
 )
 def test_no_eigenvalue_passes_2(setting: str, later: float | None) -> None:
     """Heavy, changed during the run, dropped, or seen by coarse encoders: λ_max(M⁻¹M̄) at every tick."""
-    events = () if later is None else ((2.0, Set("plant.payload_kg", later)),)
-    spec = RunSpec("iiwa14-circle", set=(setting, "M_bar_adapt=true"), events=events)
-    told = EigenvalueJob(spec).do().summary
+    spec = RunSpec("iiwa14-circle", set=(setting, "M_bar_adapt=true"))
+    told = EigenvalueJob(spec, payload_later=later).do().summary
     assert told["largest"] < 2.0
     assert told["rms_mm"] < 3.0
 

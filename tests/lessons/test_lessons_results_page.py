@@ -99,7 +99,7 @@ def expected() -> dict[str, str]:
         ),
         "Delivery, single-task time over hierarchical: base within 80 cm; within 5 cm and at rest": (
             "; ".join(
-                f"{of('htmpc-fig-9', f'ST/HT execution time, mean over the layouts, both within {rule}'):.1f}"
+                f"{of('htmpc-fig-9', f'ST/HT execution time, mean over the layouts completed, both within {rule}'):.1f}"
                 for rule in ("80 cm", "5 cm and at rest")
             )
         ),

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from lessons.events import MoveTarget, Set
-from lessons.experiments.jobs import Results, Run, Work
+from lessons.experiments.eigenvalues import EigenvalueJob
+from lessons.experiments.jobs import Results
 from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.words import trouble
 from lessons.scenes.run_spec import RunSpec
-from lessons.session.start import begin
-from lessons.session.torque import TorqueSession
-
-Array = NDArray[np.float64]
 
 _ADAPTED = "M_bar_adapt=true"
 _SETTINGS = {"as set": (), _ADAPTED: (_ADAPTED,)}
 _HOLD = "iiwa14-hold"
-_SECONDS = 4.0
 
 
 class Case(NamedTuple):
@@ -61,63 +51,9 @@ CASES = (
 )
 
 
-@final
-@dataclass(frozen=True)
-class EigenvalueJob(Work):
-    """A run during which the eigenvalues of M⁻¹M̄, M the plant's, are computed at every tick. A target that
-    can be dragged jumps by up to 10 cm along each axis every half second.
-
-    Its summary has `rms_mm`, the distance of the TCP from its reference after the first second; `largest`,
-    the largest eigenvalue; `beyond_2`, for how many ticks on end one was above 2.
-    """
-
-    def do(self) -> Run:
-        """The run; see `Work.do`."""
-        session = begin(self.spec.prepared(), self.spec.seed)
-        assert isinstance(session, TorqueSession)
-        target, rng = session.target("position"), np.random.default_rng(0)
-        start = None if target is None else np.array(target.raw)
-        largest: list[float] = []
-        errors: list[Array] = []
-        for tick in range(round(_SECONDS / session.settings.T_s)):
-            if start is not None and tick % 500 == 250:
-                session.post(MoveTarget("position", tuple((start + rng.uniform(-0.1, 0.1, 3)).tolist())))
-            # The M of the state in which the torque of this tick acts.
-            M = session.plant.mass_matrix()
-            row = session.tick()
-            largest.append(_largest_eigenvalue(M, session.M_bar))
-            errors.append(row[session.layout.fields["error/position"]].copy())
-            if session.diverged_at is not None:
-                break
-        t = session.settings.T_s * np.arange(len(errors))
-        distance = np.linalg.norm(errors, axis=1)[t >= 1.0]
-        told: dict[str, Any] = {
-            "diverged": session.diverged_at is not None,
-            "diverged_at_s": session.diverged_at,
-            "rms_mm": 1e3 * float(np.sqrt((distance**2).mean())) if len(distance) else math.nan,
-            "largest": max(largest),
-            "beyond_2": longest(np.array(largest) > 2.0),
-        }
-        return Run(self, told, {"t": t[:, None], "largest": np.array(largest)[:, None]})
-
-
-def longest(flags: NDArray[np.bool_]) -> int:
-    """How many in a row are true, at most."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
-
-
-def _largest_eigenvalue(M: Array, M_bar: Array) -> float:
-    root = np.sqrt(M_bar)
-    return float(1.0 / np.linalg.eigvalsh(M / root[:, None] / root)[0])
-
-
 def _job(case: Case, extra: tuple[str, ...]) -> EigenvalueJob:
-    later = case.payload_later
-    events = None if later is None else ((2.0, Set("plant.payload_kg", later)),)
-    return EigenvalueJob(
-        RunSpec(case.scene, controller=case.controller, set=(*case.set, *extra), events=events)
-    )
+    spec = RunSpec(case.scene, controller=case.controller, set=(*case.set, *extra))
+    return EigenvalueJob(spec, payload_later=case.payload_later)
 
 
 def _jobs(quick: bool) -> tuple[EigenvalueJob, ...]:
