@@ -18,6 +18,7 @@ from app.panels.velocity.plant import add_servo_plant
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
+from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import Snapshot
 from app.view.coordinates import full
 from app.view.follow import FollowBase
@@ -29,6 +30,7 @@ from app.view.target import Frames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Appear, Set
+from lessons.settings.missions import ArchitectureOptions
 from lessons.settings.velocity import VelocitySettings
 from robots.stretch import horizontal_reach
 
@@ -65,6 +67,8 @@ class VelocityFace:
                 context.post,
                 self._status,
                 lambda: self._goals.places,
+                Controls(gui, bindings, context.settings),
+                isinstance(context.settings.options, ArchitectureOptions),
             )
         with tabs.add_tab("Tasks"):
             self._roles = RolesPanel(gui, bindings, context.settings, colours, self._settings)

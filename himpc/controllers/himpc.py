@@ -9,7 +9,7 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.adaptation import Adaptation, measured
+from himpc.adaptation import Adaptation, LoadModel, adapted
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
@@ -35,7 +35,8 @@ _FAINTEST = 1e-8
 
 
 class HIMPC(TorqueController):
-    """Reads geometry and limits of the robot, never a mass: time-delay estimation is the model.
+    """Reads geometry and limits of the robot, never a mass: time-delay estimation is the model. (Only with
+    `M_bar_adapt` the nominal one tells how large M̄ may be.)
 
     One `step` per period T_s. What it remembers between steps is the torque that was applied (τ₀), the
     previous velocities (for q̈ and ẍ by backward difference) and the previous plan (for the Jacobians
@@ -86,6 +87,7 @@ class HIMPC(TorqueController):
         # No joint gives more: a reading beyond it is wrong, and must not pass for a bound to come down from.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings = settings
+        self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         self.kernel = self._compile() if settings.route == "compiled" else None
 
     def _compile(self) -> CompiledTick:
@@ -114,7 +116,7 @@ class HIMPC(TorqueController):
         if not usable(q) or not usable(v):
             return self._hold(q, started)
         if settings.M_bar_adapt:
-            self._adapt(v)
+            self._adapt(q)
         if self.kernel is not None:
             return self._step_compiled(self.kernel, q, v, previews, started)
         memory = self._memory or Memory.start(q, v, T_s)
@@ -172,11 +174,13 @@ class HIMPC(TorqueController):
         self._tau_0 = plan.tau
         return plan
 
-    def _adapt(self, v: Array) -> None:
-        """M̄ from what the last period's torque did."""
-        before = self._adaptation or Adaptation.start(v, self._tau_0)
-        self._adaptation = measured(before, v, self._tau_0, self._settings.T_s, self._M_bar_set)
-        self._M_bar = self._adaptation.factor * self._M_bar_set
+    def _adapt(self, q: Array) -> None:
+        """M̄ from the torque that was needed."""
+        settings = self._settings
+        assert self._load is not None
+        before = self._adaptation or Adaptation(self._M_bar_set)
+        self._adaptation = adapted(before, self._load, q, self._tau_0, settings.T_s, self._M_bar_set)
+        self._M_bar = self._adaptation.M_bar
         if self.kernel is not None:
             self.kernel.take_M_bar(self._M_bar)
 

@@ -26,15 +26,15 @@ class Settings:
         horizon: N ≥ 1 knots; 1 is HIQP.
         T_s: control period, s.
         M_bar: diagonal of M̄, one per joint, kg·m².
-        M_bar_adapt: himpc, hiqp, nhimpc and weighted raise M̄ by a factor that they find from measured Δτ and
-            Δq̈, see `himpc.adaptation`.
+        M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they find from the applied
+            torques, see `himpc.adaptation`.
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (all rows as printed).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
         R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ (HQP:
             with its model's M_n).
         damping: add the damping level whenever the enabled levels leave freedom.
-        nominal: the dynamic model that model-based controllers use; incremental ones never read it.
+        nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; nothing else reads it.
     """
 
     stack: Stack

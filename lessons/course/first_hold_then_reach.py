@@ -100,7 +100,7 @@ REACH = Step(
     The base stops exactly where the arm is stretched, 1.63 m before its target, and the hand does
     not notice. Nobody computed where that is: it is where no plan is left that makes $\mathcal J_2$
     smaller and leaves $\mathcal J_1$ alone. There the arm is singular, its manipulability
-    $w = \sqrt{\det J J^\top}$ all but zero, and yet nothing blows up.
+    $w = \sqrt{\det J J^\top}$ all but zero.
     """,
     prediction=Choice(
         "The base's target cannot be reached while the hand stays. What happens to the hand?",

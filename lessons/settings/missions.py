@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -60,11 +61,18 @@ class MissionOptions(ABC):
 class ArchitectureOptions(MissionOptions):
     """Scenes that compare architectures.
 
+    All but the tasks in the window is the same for each: the HTMPC paper does not print when a task counts as
+    completed, so it is a choice, and one for all of them.
+
     Attributes:
         architecture: one of ARCHITECTURES.
+        base_tolerance: a task of the base is completed within this distance of its place, m.
+        base_at_rest: and slower than REST; otherwise at any speed.
     """
 
     architecture: Architecture = "hierarchical"
+    base_tolerance: Annotated[float, Range(0.0, above=True)] = 0.8
+    base_at_rest: bool = False
 
     def __post_init__(self) -> None:
         """Raises InputError for choices that cannot be."""
@@ -77,6 +85,11 @@ class ArchitectureOptions(MissionOptions):
     @property
     def decoupled(self) -> bool:
         return self.architecture == "decoupled"
+
+    def drive(self, name: str, place: Go) -> MissionTask:
+        """A task of the base."""
+        rest = REST if self.base_at_rest else math.inf
+        return MissionTask(name, "base", place, self.base_tolerance, rest=rest)
 
 
 @dataclass(frozen=True)
@@ -162,6 +175,12 @@ def random_peaks(seed: int, count: int, ee_home: Array) -> list[tuple[float, flo
 
 CRUISE = 0.5
 """m/s, of the planned base and EE paths."""
+HAND_TOLERANCE = 0.02
+"""m: a task of the EE is completed within this distance of its goal, whatever the architecture."""
+REST = 0.02
+"""m/s: what is slower is at rest."""
+_ANYWHERE = 100.0
+"""m: more than a scene is wide."""
 
 
 @dataclass(frozen=True)
@@ -182,14 +201,14 @@ class WaypointOptions(ArchitectureOptions):
     def mission(self, home: Home) -> Mission:
         first, second = (2.4, 2.2, self.height), (6.0, 0.5, 0.8)
         base = Go((4.8, 0.0), CRUISE)
-        ee_1 = MissionTask("ee 1", "ee", Go(first, CRUISE), 0.02, self.hold_s)
-        ee_2 = MissionTask("ee 2", "ee", Go(second, CRUISE), 0.02, self.hold_s)
+        ee_1 = MissionTask("ee 1", "ee", Go(first, CRUISE), HAND_TOLERANCE, self.hold_s)
+        ee_2 = MissionTask("ee 2", "ee", Go(second, CRUISE), HAND_TOLERANCE, self.hold_s)
         if self.architecture != "hierarchical":
-            beside = MissionTask("base 1", "base", Go((2.0, 1.4), CRUISE), 0.05, rest=0.02)
-            return (beside, ee_1, MissionTask("base 2", "base", base, 0.05, rest=0.02), ee_2)
-        # With nothing below it the last EE task would take the base along.
-        stay = MissionTask("stay", "base", base, 0.8)
-        return (ee_1, MissionTask("base 2", "base", base, 0.8), ee_2, stay)
+            return (self.drive("base 1", Go((2.0, 1.4), CRUISE)), ee_1, self.drive("base 2", base), ee_2)
+        # With nothing below it the last EE task would take the base along. It asks for nothing more: the
+        # mission ends with that task, as with one task at a time.
+        stay = MissionTask("stay", "base", base, _ANYWHERE)
+        return (ee_1, self.drive("base 2", base), ee_2, stay)
 
 
 SEATS: tuple[tuple[tuple[float, float, float], tuple[float, float]], ...] = (
@@ -237,12 +256,8 @@ class DeliveryOptions(ArchitectureOptions):
         tasks: list[MissionTask] = []
         for visit, seat in enumerate([int(seat) for seat in self.seats] * self.rounds, start=1):
             hand, place = SEATS[seat]
-            motion = Go(place, self.cruise)
-            if self.architecture != "hierarchical":
-                tasks.append(MissionTask(_visit("base", visit), "base", motion, 0.05, rest=0.02))
-            else:
-                tasks.append(MissionTask(_visit("base", visit), "base", motion, 0.8))
-            tasks.append(MissionTask(_visit("ee", visit), "ee", Go(hand), 0.02, self.hold_s))
+            tasks.append(self.drive(_visit("base", visit), Go(place, self.cruise)))
+            tasks.append(MissionTask(_visit("ee", visit), "ee", Go(hand), HAND_TOLERANCE, self.hold_s))
         return tuple(tasks)
 
 

@@ -23,8 +23,8 @@ TORQUE_ENTRIES = (
     Entry("M_bar_scale", "M̄ scale", "One factor on the whole diagonal of M̄", "", 0.1, 5.0, 0.05,
           tries=("4", "2", "1", "0.5")),
     Entry("M_bar_adapt", "M̄ looks after itself",
-          "The controller multiplies M̄ by 1 to 4, by what its torques did to the accelerations. An arm that "
-              "has long run away it does not bring back: reset.",
+          "The controller finds the payload from the torque that gravity asks for, and sets M̄ as large as "
+              "the nominal model with that payload allows",
           tries=("true", "false"), name="M̄ adapts"),
     Entry("M_bar", "M̄", "The diagonal of M̄, one number per joint, before scaling", "kg·m²"),
     Entry("limits.position", "Position",

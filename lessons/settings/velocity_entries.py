@@ -74,6 +74,11 @@ VELOCITY_ENTRIES = (
           tries=("false", "true"), name="torque bound of the motors"),
     Entry("order", "Order", "The roles, highest priority first: ee,base; takes effect when a run starts"),
     Entry("architecture", "Architecture", _CARRIED_OUT),
+    Entry("base_tolerance", "Base is there within", "Of its place: then its task is completed, whatever the "
+          "architecture; from the next start on. decoupled needs 0.05 m and rest", "m", 0.02, 1.0, 0.01,
+          tries=("0.05", "0.25", "0.5"), name="base is there within, m"),
+    Entry("base_at_rest", "and at rest", "Slower than 0.02 m/s, for the task of the base to be completed",
+          tries=("true",), name="base must come to rest"),
     Entry("peak", "Peak", "Where the base is sent, x and y in the world", "m"),
     Entry("half_period", "Half period", "Length of each part", "s", 1.0, 20.0, 0.5),
     Entry("height", "Height", "Of the first waypoint of the hand", "m", 0.3, 1.5, 0.05),

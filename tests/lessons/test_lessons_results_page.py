@@ -7,8 +7,11 @@ from pathlib import Path
 
 from himpc.limits import POSITION_MARGIN, Limits
 from himpc.limits.rows import REACTION
-from lessons.papers.himpc_paper.adaptation import CASES
+from lessons.papers.himpc_paper.adaptation import CASES, FIGURES, Case, quantity
 from lessons.papers.stored import stored
+from lessons.recording.run import run
+from lessons.recording.summary import summary
+from lessons.scenes.run_spec import RunSpec
 
 DOCS = Path(__file__).parents[2] / "docs"
 TEXT = (DOCS / "results.md").read_text(encoding="utf-8")
@@ -19,6 +22,11 @@ def of(item: str, row: str) -> float:
     """A stored number: of a row, or of a check."""
     memory = MEMORY[item]
     return memory.rows[row][0] if row in memory.rows else memory.checks[row][0]
+
+
+def factor(rule: str) -> float:
+    """By how much one task at a time takes longer than two."""
+    return of("htmpc-fig-9", f"ST/HT execution time, mean over the layouts completed, {rule}")
 
 
 def power(value: float) -> str:
@@ -94,8 +102,8 @@ def expected() -> dict[str, str]:
         "HTMPC, formulation A, over HTIDKC with the authors' gains, part 2": (
             f"{of('htmpc-fig-6', authors):.0%} better".replace("%", " %")
         ),
-        "Delivery, formulation C, single-task time over hierarchical": (
-            f"{of('htmpc-fig-9', 'ST/HT execution time, mean over the layouts'):.1f}"
+        "Delivery, single-task time over hierarchical: base within 80 cm; within 5 cm and at rest": (
+            "; ".join(f"{factor(f'both within {rule}'):.1f}" for rule in ("80 cm", "5 cm and at rest"))
         ),
     }
 
@@ -106,22 +114,33 @@ def test_the_table_is_what_was_measured() -> None:
 
 
 def test_the_payloads_are_what_was_measured() -> None:
-    """M̄ that looks after itself: three digits each, and the two other controllers in the text."""
+    """M̄ that looks after itself: the whole table, three digits each."""
 
-    def rms(controller: str, payload: float, words: str) -> float:
-        return of(
-            "himpc-adaptation", f"{controller}, {payload:g} kg, {words}: RMS distance of the TCP after 1 s"
-        )
+    def cell(case: Case, words: str, what: str) -> str:
+        value = of("himpc-adaptation", quantity(case, words, what))
+        return f"{value:.0f}" if what.startswith("ticks") or value >= 100 else f"{value:.3g}"
 
-    payloads = [payload for controller, payload in CASES if controller == "himpc"]
-    for words, cell in (("as set", "as set"), ("M_bar_adapt=true", "`M_bar_adapt=true`")):
-        found = (rms("himpc", payload, words) for payload in payloads)
-        told = " | ".join(f"{mm:.2f}" if mm < 10 else f"{mm:.3g}" for mm in found)
-        assert f"| {cell} | {told} |" in TEXT
-    others = [(c, p) for c, p in CASES if c != "himpc"]
-    with_it = " and ".join(f"{rms(*case, 'M_bar_adapt=true'):.0f}" for case in others)
-    without = " and ".join(f"{rms(*case, 'as set'):.0f}" for case in others)
-    assert f"({with_it} mm instead of {without})" in " ".join(TEXT.split())
+    for case in CASES:
+        cells = [cell(case, words, what) for words in ("as set", "M_bar_adapt=true") for what in FIGURES]
+        assert f"| {case.words} | {' | '.join(cells)} |" in TEXT
+
+
+def test_one_round_is_what_the_table_says() -> None:
+    """Deliveries: seconds by rule and architecture."""
+    rules = {"within 80 cm": (), "within 5 cm and at rest": ("base_tolerance=0.05", "base_at_rest=true")}
+    for words, rule in rules.items():
+        times = []
+        for architecture in ("hierarchical", "single_task", "decoupled"):
+            asked = ("rounds=1", f"architecture={architecture}", *rule)
+            told = summary(run(RunSpec("ridgeback-ur10-delivery", set=asked).prepared()))
+            times.append(told["completion_time_s"])
+        factors = (f"{time / times[0]:.2f}" for time in times[1:])
+        cells = (*(f"{time:.1f}" for time in times), *factors)
+        assert f"| {words} | {' | '.join(cells)} |" in TEXT
+    text = " ".join(TEXT.split())
+    first, second = (f"{factor(f'both within {rule}'):.2f} times" for rule in ("80 cm", "5 cm and at rest"))
+    assert f"{first} as long within 80 cm and {second} within 5 cm and at rest" in text
+    assert f"it would be {factor('ST within 5 cm and at rest, HT within 80 cm'):.2f}" in text
 
 
 def test_the_departures_from_the_printed_limits_are_the_ones_that_run() -> None:

@@ -133,7 +133,7 @@ def test_delay_compensation_holds_the_hand_stiller() -> None:
 
 
 def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
-    """One round of the delivery: the single-task architecture needs at least 1.9 times as long."""
+    """One round of the delivery, one rule: the single-task architecture needs at least 1.5 times as long."""
     both = [
         result("ridgeback-ur10-delivery", "rounds=1", f"architecture={architecture}")
         for architecture in ("hierarchical", "single_task")
@@ -141,7 +141,7 @@ def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
     for told in both:
         assert_sound(told)
         assert told["completed"] is True
-    assert both[1]["completion_time_s"] >= 1.9 * both[0]["completion_time_s"]
+    assert both[1]["completion_time_s"] >= 1.5 * both[0]["completion_time_s"]
     assert both[0]["base_path_m"] < both[1]["base_path_m"]
 
 

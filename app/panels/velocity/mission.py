@@ -12,6 +12,7 @@ from app.html.palette import GOOD, RGB, css
 from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import Status, TaskView
 from app.link.mission_view import MissionRow
+from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import Snapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
 from lessons.settings.velocity import VelocitySettings
@@ -32,15 +33,20 @@ class MissionPanel:
         post: Send,
         status: Callable[[], Status | None],
         places: Callable[[], dict[str, np.ndarray]],
+        controls: Controls[VelocitySettings],
+        architectures: bool,
     ) -> None:
         """points: what can be sent somewhere; colours: by role; status: the newest one; places: where each
-        role's goal is drawn, (3,) m."""
+        role's goal is drawn, (3,) m; architectures: whether the scene has several."""
         self._points = {task.name: task for task in points}
         self._colours, self._post, self._status, self._places = colours, post, status, places
         self._filled = False
         self._list = gui.add_html("")
         self._swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         self._release = gui.add_button("Release", visible=False, color=GOOD)
+        if architectures:
+            with gui.add_folder("How it is carried out, from the next Reset", expand_by_default=False):
+                controls.add("architecture", "base_tolerance", "base_at_rest")
         with gui.add_folder("Change a task"):
             self._task = gui.add_dropdown("Task", _options())
             self._change = gui.add_button_group("Change", (_EARLIER, _LATER, _REMOVE))

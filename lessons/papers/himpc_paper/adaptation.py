@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.eigenvalues import EigenvalueJob
+from lessons.experiments.jobs import Results
 from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.words import trouble
@@ -12,38 +13,75 @@ from lessons.scenes.run_spec import RunSpec
 
 _ADAPTED = "M_bar_adapt=true"
 _SETTINGS = {"as set": (), _ADAPTED: (_ADAPTED,)}
+_HOLD = "iiwa14-hold"
+
+
+class Case(NamedTuple):
+    """A run with and without.
+
+    Attributes:
+        words: what is unusual about it.
+        controller: which.
+        scene: where.
+        set: assignments.
+        payload_later: kg at the flange from 2 s on; None: as before.
+    """
+
+    words: str
+    controller: str = "himpc"
+    scene: str = RT4_DATA_SHEET
+    set: tuple[str, ...] = ()
+    payload_later: float | None = None
+
+
+def _payload(kg: float) -> tuple[str, ...]:
+    return (f"plant.payload_kg={kg:g}",) if kg else ()
+
+
 CASES = (
-    *(("himpc", payload) for payload in (0.0, 0.5, 2.0, 4.0)),
-    ("hiqp", 4.0),
-    ("weighted", 2.0),
+    *(Case(f"{kg:g} kg", set=_payload(kg)) for kg in (0.0, 0.5, 2.0, 4.0, 6.0)),
+    Case("2 kg, 4 kg from 2 s on", set=_payload(2.0), payload_later=4.0),
+    *(
+        Case(f"2 kg, encoders of {deg}°", set=(*_payload(2.0), f"plant.encoder_resolution_deg={deg}"))
+        for deg in ("0.00001", "0.0001", "0.001")
+    ),
+    *(Case(f"{_HOLD}, {kg:g} kg", scene=_HOLD, set=_payload(kg)) for kg in (0.0, 2.0, 4.0)),
+    Case("hiqp, 4 kg", "hiqp", set=_payload(4.0)),
+    Case("weighted, 2 kg", "weighted", set=_payload(2.0)),
 )
-"""(controller, payload in kg)."""
 
 
-def _job(controller: str, payload: float, extra: tuple[str, ...]) -> Job:
-    load = () if payload == 0.0 else (f"plant.payload_kg={payload:g}",)
-    return Job(RunSpec(RT4_DATA_SHEET, controller=controller, set=(*load, *extra)))
+def _job(case: Case, extra: tuple[str, ...]) -> EigenvalueJob:
+    spec = RunSpec(case.scene, controller=case.controller, set=(*case.set, *extra))
+    return EigenvalueJob(spec, payload_later=case.payload_later)
 
 
-def _jobs(quick: bool) -> tuple[Job, ...]:
-    return () if quick else tuple(_job(*case, extra) for case in CASES for extra in _SETTINGS.values())
+def _jobs(quick: bool) -> tuple[EigenvalueJob, ...]:
+    return () if quick else tuple(_job(case, extra) for case in CASES for extra in _SETTINGS.values())
 
 
-def distance(run: Run) -> float:
-    """RMS distance of the TCP from its path after the first second, m; NaN for a run that failed."""
-    return math.hypot(*(run.error_of("position", k) for k in range(3)))
+FIGURES = {
+    "RMS distance of the TCP after 1 s": ("rms_mm", "mm"),
+    "largest eigenvalue of M⁻¹M̄": ("largest", "1"),
+    "ticks on end beyond 2": ("beyond_2", "1"),
+}
+
+
+def quantity(case: Case, words: str, what: str) -> str:
+    """The name of a row. Args: words: "as set" or the setting; what: of FIGURES."""
+    return f"{case.words}, {words}: {what}"
 
 
 def _section(results: Results, quick: bool) -> Section:
     if quick:
         return Section(notes=("Only in the whole version.",))
     rows = []
-    for controller, payload in CASES:
+    for case in CASES:
         for words, extra in _SETTINGS.items():
-            run = results[_job(controller, payload, extra)]
-            quantity = f"{controller}, {payload:g} kg, {words}: RMS distance of the TCP after 1 s"
+            run = results[_job(case, extra)]
             why = trouble(run) or "not in the paper"
-            rows.append(Row(quantity, "mm", None, 1e3 * distance(run), why))
+            for what, (key, unit) in FIGURES.items():
+                rows.append(Row(quantity(case, words, what), unit, None, run.figure(key), why))
     return Section(rows=tuple(rows))
 
 
