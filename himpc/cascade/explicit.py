@@ -21,6 +21,8 @@ _BINDING = 1e-9
 """N·m: a row closer than this to its bound is binding."""
 _NOISE = 1e-11
 """A row of which no larger share is left by (33) is rounding noise: its joint is not free any more."""
+_ROOM = 1e-9
+"""N·m by which bounds give way for a last attempt; the rows that then bind are tried without."""
 _ACCURATE = 1e-9
 """Points that miss their optimality conditions by more are polished."""
 
@@ -78,6 +80,11 @@ def solve_explicit(
         if again is not None and best.kkt_residual > _ACCURATE:
             better = again(best, level.c, A, low, high)
             best = best if better is None else min(best, judged(better), key=lambda one: one.kkt_residual)
+    if not best.solved and iterations is None:
+        room = _ROOM / length
+        wider = judged(solve_qp(np.eye(level.c.size), level.c, A, low - room, high + room, solver))
+        better = polished(wider, level.c, A, low, high)
+        best = wider if better is None else judged(better)
     if not best.solved:
         return None
     U = U_above.copy()

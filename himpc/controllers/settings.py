@@ -29,7 +29,7 @@ class Settings:
         M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they find from the applied
             torques, see `himpc.adaptation`.
         limits: bounds to impose.
-        route: "compiled" (the kernel of `himpc.tick`) or "explicit" (all rows as printed).
+        route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
         R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ (HQP:
             with its model's M_n).

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy
 
 from himpc import qp
+from himpc.cascade import explicit
 from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.rows import least_slack
@@ -87,12 +88,14 @@ NONSENSE = {
 
 
 def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution."""
+    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution; and the method that
+    starts from the point above finds nothing."""
 
     def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
         return NONSENSE[kind](f, A)
 
     monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(qp.SOLVERS, (nonsense,)))
+    monkeypatch.setattr(explicit, "descended", lambda *_: None)
 
 
 def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:

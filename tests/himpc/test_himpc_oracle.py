@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,13 +57,13 @@ def test_where_nothing_binds_it_is_the_closed_form() -> None:
 
 def by_fractions(problem: LevelProblem) -> Array:
     """The optimum of a level alone and without bounds, by Gaussian elimination of rational numbers."""
-    exact = np.frompyfunc(Fraction, 1, 1)
+    exact: Any = np.frompyfunc(Fraction, 1, 1)
     (N, m, n), K = problem.B.shape, problem.knots
     B, C, R = exact(problem.B), exact(problem.C), exact(problem.R)
     Q, free = exact(problem.root_Q) ** 2, exact(problem.free)
     G = [[np.concatenate([C[k, i, j] * B[j, i] for j in range(K)]) for i in range(m)] for k in range(K)]
-    H = np.diag(np.tile(R, K))
-    f = np.full(K * n, Fraction(0))
+    H: Any = np.diag(np.tile(R, K))
+    f: Any = exact(np.zeros(K * n))
     for k in range(K):
         for i in range(m):
             H = H + Q[i] * np.outer(G[k][i], G[k][i])
