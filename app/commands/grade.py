@@ -73,6 +73,8 @@ def _show(found: Grade, hints: int) -> None:
 
     if found.error:
         print(f"{found.error}\n0 of 10 points")
+        if found.protection:
+            print(_kept(found.protection))
         return
     rows = [
         [
@@ -87,7 +89,15 @@ def _show(found: Grade, hints: int) -> None:
     columns = ("points", "what is checked", "measured", "wanted", "why it is missed")
     print_table(f"{found.file} · {found.exercise}", columns, rows)
     print(f"{found.points} of {found.of} points")
+    print(_kept(found.protection))
     _hints(load_exercise(found.exercise).hints, hints)
+
+
+def _kept(protection: tuple[str, ...]) -> str:
+    """What kept a submission to itself."""
+    if not protection:
+        return "files, network and processes were refused by Python alone, which is politeness and no prison"
+    return f"files, network and processes were refused by {' and '.join(protection)}, and by Python"
 
 
 def _hints(all_hints: tuple[str, ...], count: int) -> None:
@@ -121,7 +131,7 @@ def _list(exercise: str | None, hints: int, json: str | None) -> int:
         card = each.card
         print(f"{each.name}: {card.title} ({card.minutes} minutes; belongs to lesson {each.lesson})")
         print(f"  {card.question}")
-        print(f"  {each.equation}")
+        print(f"  {each.plain}")
         print(f"  begin: {each.commands()[0]}")
         for check in each.checks(0):
             print(f"    {check.points} points: {check.text} {check.condition}")
@@ -144,6 +154,8 @@ def _folder(
         return 0
     print_table(str(folder), ("file", "exercise", "points", "what is missing"), [_short(row) for row in rows])
     print(f"{len(rows)} files, table: {out}")
+    if any(row["exercise"] and not row["protection"] for row in rows):
+        print(_kept(()))
     return 0
 
 

@@ -64,6 +64,7 @@ class Exercise:
         name: its name in `lessons.exercises.EXERCISES`.
         card: the docstring of its file.
         equation: LaTeX.
+        plain: the same as plain text, for a terminal.
         hints: that open one by one.
         lesson: the lesson it belongs to.
         checks: for a seed, which decides the disturbances.
@@ -73,6 +74,7 @@ class Exercise:
     name: str
     card: Card
     equation: str
+    plain: str
     hints: tuple[str, ...]
     lesson: str
     checks: Callable[[int], tuple[Check, ...]]

@@ -15,7 +15,9 @@ from lessons.parallel import Failed, Spread
 from robots import InputError
 from robots.isolation import Allowance
 
-COLUMNS: tuple[str, ...] = ("file", "exercise", "points", "of", "missed", "error", "seed", "asked", "sha256")
+COLUMNS: tuple[str, ...] = (
+    *("file", "exercise", "points", "of", "missed", "error", "seed", "asked", "sha256", "protection"),
+)
 Row = dict[str, str]
 
 
@@ -56,7 +58,7 @@ def grade_folder(
         except InputError as error:
             done[path] = row_of(Grade(str(path), "", exercise or "", error=str(error)), seed, exercise)
             continue
-        row = held.get((path.name, source.digest, str(seed), exercise or ""))
+        row = held.get((_text(path.name), source.digest, str(seed), exercise or ""))
         if row is None:
             left.append(source)
         else:
@@ -89,12 +91,31 @@ def row_of(found: Grade, seed: int, asked: str | None) -> Row:
         str(seed),
         asked or "",
         found.digest,
+        " ".join(found.protection),
     )
-    return dict(zip(COLUMNS, values, strict=True))
+    return dict(zip(COLUMNS, map(_text, values), strict=True))
 
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
+
+
+def _text(name: str) -> str:
+    """What UTF-8 can say: names of files may be any bytes."""
+    return name.encode(errors="replace").decode()
+
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+"""How a cell begins that a spreadsheet would compute."""
+
+
+def _cell(text: str) -> str:
+    """As a spreadsheet shows it, and does not compute it."""
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def _of_cell(text: str) -> str:
+    return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text
 
 
 def _rows(out: Path) -> Iterator[Row]:
@@ -106,7 +127,8 @@ def _rows(out: Path) -> Iterator[Row]:
             reader = csv.DictReader(file)
             if tuple(reader.fieldnames or ()) != COLUMNS:
                 raise InputError(f"{out}: is no table of himpc-lab grade; give another file for --out")
-            yield from reader
+            for row in reader:
+                yield {name: _of_cell(value or "") for name, value in row.items()}
     except (OSError, UnicodeDecodeError, csv.Error):
         raise InputError(f"{out}: cannot be read; give another file for --out") from None
 
@@ -118,7 +140,7 @@ def _write(out: Path, rows: list[Row]) -> None:
         with beside.open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, COLUMNS)
             writer.writeheader()
-            writer.writerows(rows)
+            writer.writerows({name: _cell(value) for name, value in row.items()} for row in rows)
         os.replace(beside, out)
     except OSError as error:
         raise InputError(f"{out}: cannot be written ({error.strerror}); give another file") from None

@@ -62,7 +62,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             "A new posture is reached, where gravity pulls otherwise.",
             "the error is not taken towards the target q_d, or gravity is not that of where the arm is",
             sent,
-            1.0,
+            2.0,
             measure=Measure(ERROR, "last"),
             points=3,
         ),
@@ -102,6 +102,7 @@ EXERCISE = Exercise(
     name="joint-pd",
     card=card_of(__doc__),
     equation=r"\tau = g(q) + \bar M \left(\ddot q_d - K_v (\dot q - \dot q_d) - K_p (q - q_d)\right)",
+    plain="τ = g(q) + M̄ (q̈_d − K_v (q̇ − q̇_d) − K_p (q − q_d))",
     hints=(
         "`now.level('posture').error` is q − q_d, and `.x_dot` is q̇.",
         "A spring pulls back: minus K_p times the error. A damper brakes: minus K_v times q̇ − q̇_d.",

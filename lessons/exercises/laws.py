@@ -78,7 +78,8 @@ def hierarchy(
         H, linear = _quadratic(now, level, ahead, Q, R, M_bar)
         rows, lower, upper = _bounds(now, limits)
         if first is not None and equality != "none":
-            B = chosen[0].J if equality == "without M̄" else chosen[0].J / now.M_bar
+            above = now.levels[0] if equality == "about the first" else chosen[0]
+            B = above.J if equality == "without M̄" else above.J / now.M_bar
             kept = rows @ first
             lower, upper = np.minimum(lower, kept), np.maximum(upper, kept)
             value = 0.0 * (B @ first) if equality == "zero" else B @ first

@@ -8,6 +8,8 @@ You need: Jacobians; exercise "joint-pd"; lesson "two-tasks"
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from lessons.exercises.exercise import Check, Exercise, pushed
 from lessons.exercises.laws import osf
 from lessons.exercises.mistakes import Mistake, wrong
@@ -32,7 +34,7 @@ HOLD = RunSpec(
     ),
     duration=1.2,
 )
-ROUGH = RunSpec("planar3-circle", set=("q1_amplitude_deg=20",), duration=0.5)
+ROUGH = replace(HOLD, set=HOLD.set[:1], duration=0.5)
 
 
 def checks(seed: int) -> tuple[Check, ...]:
@@ -49,7 +51,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             "Joint 1 swings as asked: the second level gets the freedom there is.",
             "the second level does not close (4) with what it gets",
             CIRCLE,
-            2.0,
+            1.5,
             measure=Measure(Signal("error/q1", "deg"), "rms", after=0.6),
             points=2,
         ),
@@ -97,6 +99,7 @@ EXERCISE = Exercise(
     card=card_of(__doc__),
     equation=r"\tau = N_n + J_1^\top \Lambda_1 (\ddot x_1 - \dot J_1 \dot q) + "
     r"(J_2 N_1)^\top \Lambda_{2|1} (\ddot x_2 - \dot J_2 \dot q - J_2 M^{-1} \tau_1)",
+    plain="τ = N_n + J₁ᵀ Λ₁ (ẍ₁ − J̇₁q̇) + (J₂N₁)ᵀ Λ₂ (ẍ₂ − J̇₂q̇ − J₂M⁻¹τ₁)",
     hints=(
         "Λ is the inertia felt at a task: (J M⁻¹ Jᵀ)⁻¹, with the projected Jacobian J N for lower levels.",
         "The projector is N = I − M⁻¹ Jᵀ Λ J: it takes out of q̈ what the level above uses.",

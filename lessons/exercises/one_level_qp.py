@@ -22,7 +22,7 @@ M_BAR = ("M_bar=[0.06,0.03,0.02]", "T_s=0.002")
 ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false", *M_BAR)
 FREE = RunSpec("planar3-circle", set=ALONE, duration=1.0)
 WEAK = RunSpec("planar3-circle", set=(*ALONE, "limits.torque_scale=0.02"), duration=1.0)
-SLOW = RunSpec("planar3-circle", set=(*ALONE, "limits.velocity_scale=0.02"), duration=1.0)
+SLOW = RunSpec("planar3-circle", set=(*ALONE, "limits.velocity_scale=0.01"), duration=1.0)
 HEAVY = RunSpec(
     "planar3-circle", set=(*ALONE, "levels.position.Q=[100,400]", "levels.position.R=2000"), duration=0.4
 )
@@ -117,6 +117,7 @@ EXERCISE = Exercise(
     equation=r"\min_{\Delta\tau} \lVert e^0 + G \Delta\tau \rVert_Q^2 + \lVert \Delta\tau \rVert_R^2"
     r"\quad \text{s.t. } \tau_0 + \Delta\tau,\ \dot q + T_s(\ddot q_0 + \bar M^{-1}\Delta\tau) "
     r"\text{ within bounds}",
+    plain="min ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R, with τ₀ + Δτ and q̇ + T_s (q̈₀ + M̄⁻¹Δτ) within bounds",
     hints=(
         "One knot on: ẍ = ẍ₀ + J M̄⁻¹Δτ, ẋ = ẋ₀ + T_s ẍ, x̃ = x̃₀ + T_s ẋ₀ (explicit Euler).",
         "e = (ẍ − ẍ_d) + K_v (ẋ − ẋ_d) + K_p x̃, all desired values one knot ahead: index 1.",

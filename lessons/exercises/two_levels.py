@@ -66,6 +66,12 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("J₁ stands where J₁M̄⁻¹ belongs in the equality (33)", hierarchy, equality="without M̄"),
     wrong("J₁M̄⁻¹Δτ₂ is set to zero: it must be what it is for Δτ₁", hierarchy, equality="zero"),
     wrong("the levels are in reverse order: the first one comes first", hierarchy, order=-1),
+    wrong(
+        "the levels are in reverse order: the first one comes first",
+        hierarchy,
+        order=-1,
+        equality="about the first",
+    ),
     wrong("the second level is left out", hierarchy, levels=1),
     wrong("f has the wrong sign: f = GᵀQe⁰", hierarchy, f=-1.0),
     wrong("R is missing: it weighs the increments, and stands in H", hierarchy, R=False),
@@ -92,6 +98,7 @@ EXERCISE = Exercise(
     card=card_of(__doc__),
     equation=r"\min_{\Delta\tau_2} \lVert e_2 \rVert_Q^2 + \lVert \Delta\tau_2 \rVert_R^2 "
     r"\quad \text{s.t. bounds, } J_1 \bar M^{-1} \Delta\tau_2 = J_1 \bar M^{-1} \Delta\tau_1",
+    plain="min ‖e₂‖²_Q + ‖Δτ₂‖²_R, within bounds and with J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁",
     hints=(
         "Solve level 1 as before. Level 2 is the same QP with rows that say: J₁M̄⁻¹ stays as it is.",
         "In `solve_qp` a row with lower = upper is an equality.",

@@ -30,8 +30,8 @@ class Watch:
     """Ends calls that take too long, in the main thread of a POSIX system.
 
     One that computed all the time does; one that did not may have slept or, on a busy machine, waited for a
-    core, which does not count. How long it waited is asked from the first alarm on, since asking costs as much
-    as a short call.
+    core, which does not count. How long it waited is asked from the first alarm on, since asking costs as
+    much as a short call.
     """
 
     def __init__(self, seconds: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
@@ -43,7 +44,7 @@ class Source:
     @property
     def module(self) -> str:
         """The name under which Python knows it."""
-        place = hashlib.sha256(str(Path(self.path).absolute()).encode()).hexdigest()[:12]
+        place = hashlib.sha256(os.fsencode(Path(self.path).absolute())).hexdigest()[:12]
         return f"himpc_lab_own_{place}"
 
 

@@ -228,7 +228,7 @@ class Controller:
 MISTAKES: dict[str, dict[str, Mistake]] = {
     "joint-pd": {
         "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 2, "K_p has the wrong sign"),
-        "no K_p": Mistake("level.K_p *", "0.0 *", 4, "K_p is missing"),
+        "no K_p": Mistake("level.K_p *", "0.0 *", 7, "K_p is missing"),
         "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 2, "K_v has the wrong sign"),
         "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
         "no gravity": Mistake("now.gravity +", "", 5, "g(q) is missing"),
@@ -248,12 +248,12 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "not consistent": Mistake(
             "M_inv @ J.T @ L @ J", "np.linalg.pinv(J) @ J", 6, "not dynamically consistent"
         ),
-        "asks twice": Mistake("- level.J @ M_inv @ tau", "", 6, "asked for twice"),
+        "asks twice": Mistake("- level.J @ M_inv @ tau", "", 7, "asked for twice"),
         "reverse order": Mistake(
             "in now.levels:", "in now.levels[::-1]:", 3, "the levels are in reverse order"
         ),
         "only one level": Mistake("in now.levels:", "in now.levels[:1]:", 4, "the second level is left out"),
-        "no bias": Mistake("now.bias +", "", 5, "C q̇ + g is missing"),
+        "no bias": Mistake("now.bias +", "", 7, "C q̇ + g is missing"),
         "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 3, "K_p has the wrong sign"),
         "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 3, "K_v has the wrong sign"),
     },
@@ -284,7 +284,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
             "cut off afterwards",
         ),
         "no velocity bound": Mistake("- now.q_dot)", ") * 1e6", 8, "the velocity bound (32e) is missing"),
-        "bound on Δτ": Mistake("_lower - now.tau_0", "_lower", 7, "is on Δτ alone"),
+        "bound on Δτ": Mistake("- now.tau_0, (share", ", (share", 7, "is on Δτ alone"),
         "approached at once": Mistake("min(1.0, now.bounds.approach * now.T_s or 1.0)", "1.0", 8, "at once"),
         "sign of f": Mistake("G.T @ (level.Q * e)", "-G.T @ (level.Q * e)", 2, "f has the wrong sign"),
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 9, "R is missing"),
@@ -328,11 +328,6 @@ class Submission:
         return f'EXERCISE = "{self.exercise}"\n{self.text}'
 
 
-def _wrong(exercise: str, good: str, bad: str, points: int, words: str) -> Submission:
-    assert good in RIGHT[exercise], good
-    return Submission(exercise, RIGHT[exercise].replace(good, bad), points, words)
-
-
 def _bad(line: str, points: int, words: str) -> Submission:
     """A joint PD that is none, and does something else."""
     return Submission("joint-pd", f"def torque(now):\n    {line}\n    return now.gravity\n", points, words)
@@ -342,28 +337,8 @@ _LOG = ", ".join(f"[{0.02 * k:g}, {-0.01 * k:g}, {0.005 * k:g}]" for k in range(
 
 SUBMISSIONS: dict[str, Submission] = {
     **{f"right_{name.replace('-', '_')}": Submission(name, text, 10) for name, text in RIGHT.items()},
-    "right_pd_class": Submission("joint-pd", _PD_CLASS, 10),
-    "right_osf_one_by_one": Submission("null-space", _OSF_ONE_BY_ONE, 10),
-    "right_tde_estimate": Submission("time-delay", _TDE_ESTIMATE, 10),
-    "right_qp_of_torques": Submission("one-level-qp", _QP_OF_TORQUES, 10),
-    "right_two_by_basis": Submission("two-levels", _TWO_BY_BASIS, 10),
-    "wrong_sign": _wrong("joint-pd", "- level.K_p", "+ level.K_p", 2, "comes back"),
-    "wrong_no_curvature": _wrong("null-space", "- level.J_dot_q_dot", "", 7, "J̇q̇, the order"),
-    "wrong_no_projection": _wrong("null-space", "level.J @ N", "level.J", 2, "reaches the hand"),
-    "wrong_weighted": _wrong("two-levels", "if torques:", "if False:", 0, "a weighted sum is not strict"),
-    "wrong_no_bound": _wrong(
-        "two-levels",
-        "= bounds(now)",
-        "= bounds(now)\n        lower, upper = lower - 1e3, upper + 1e3",
-        5,
-        "bounds must stand in the QP of both levels",
-    ),
-    "wrong_cut_off": _wrong(
-        "one-level-qp",
-        "solve_qp(H, f, rows, lower, upper).x",
-        "np.clip(np.linalg.solve(H, -f), lower[: now.n], upper[: now.n])",
-        6,
-        "cutting the torque afterwards is not the same",
+    "wrong_sign": Submission(
+        "joint-pd", MISTAKES["joint-pd"]["sign of K_p"].text("joint-pd"), 2, "wrong sign"
     ),
     "wrong_constant": Submission("time-delay", "def torque(now):\n    return [0.1] * now.n\n", 0, "sag"),
     "wrong_copied_log": Submission(
@@ -375,7 +350,7 @@ SUBMISSIONS: dict[str, Submission] = {
     ),
     "wrong_sleeps": _bad("import time; time.sleep(0.7)", 0, "takes longer than 0.5 s"),
     "wrong_exits": _bad("raise SystemExit", 0, "it ends the program"),
-    "wrong_leaves": _bad("import os; os._exit(0)", 0, "was ended by the program itself"),
+    "wrong_leaves": _bad("import os; os._exit(0)", 0, "it ends its own process"),
     "wrong_prints": _bad("print('x' * 10**5)", 2, "comes back"),
     "wrong_opens": _bad("open('/etc/hostname').read()", 0, "may not do that (open /etc/hostname)"),
     "wrong_kills": _bad("import os; os.kill(os.getppid(), 9)", 0, "may not do that (os.kill)"),

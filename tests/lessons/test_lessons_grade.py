@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from submissions import PD, RIGHT, SUBMISSIONS
+from submissions import MISTAKES, PD, STYLES, SUBMISSIONS
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.view import View
@@ -22,34 +22,11 @@ from lessons.exercises.grade import WITHIN, Grade, Line, Submission, grade, grad
 from lessons.own.files import Source, execute, sentence
 from lessons.own.kinds import law_of
 from lessons.parallel import on_cores, one_by_one
+from lessons.scenes.catalog import as_torque_scene
+from lessons.session.torque import TorqueSession
 from robots import InputError
 
-WRONG: dict[str, tuple[str, str, str, str]] = {
-    "pd: sign of K_p": ("joint-pd", "- level.K_p", "+ level.K_p", "comes back"),
-    "pd: no gravity": ("joint-pd", "now.gravity +", "", "stays where it is"),
-    "pd: no damping": ("joint-pd", "level.K_v *", "0.0 *", "calm"),
-    "pd: never moves": ("joint-pd", "return now.gravity", "return now.tau_0", "calm"),
-    "osf: missing J̇q̇": ("null-space", "- level.J_dot_q_dot", "", "OSF's"),
-    "osf: no projection": ("null-space", "level.J @ N", "level.J", "reaches the hand"),
-    "osf: transposed projector": ("null-space", "M_inv @ J.T @ L @ J", "J.T @ L @ J @ M_inv", "OSF's"),
-    "osf: asks twice": ("null-space", "- level.J @ M_inv @ tau", "", "OSF's"),
-    "tde: no q̈₀": ("time-delay", "- now.q_ddot", "", "that of the equation"),
-    "tde: sign of q̈₀": ("time-delay", "- now.q_ddot", "+ now.q_ddot", "that of the equation"),
-    "tde: the model instead": ("time-delay", "now.tau_0 +", "now.gravity +", "does not sag"),
-    "qp: no bounds": ("one-level-qp", "solve_qp(H, f, rows,", "solve_qp(H, f, 0 * rows,", "stays within"),
-    "qp: bound afterwards": (
-        "one-level-qp",
-        "solve_qp(H, f, rows, lower, upper).x",
-        "np.clip(np.linalg.solve(H, -f), lower[: now.n], upper[: now.n])",
-        "not a cut-off one",
-    ),
-    "qp: no velocity bound": ("one-level-qp", "- now.q_dot)", ") * 1e6", "At the velocity bound"),
-    "qp: sign of f": ("one-level-qp", "G.T @ (level.Q * e)", "-G.T @ (level.Q * e)", "With room to spare"),
-    "qp: no R": ("one-level-qp", "np.diag(level.R)", "1e-3 * np.eye(now.n)", "weights count"),
-    "two: weighted, not strict": ("two-levels", "if torques:", "if False:", "Nothing leaks"),
-    "two: no bound": ("two-levels", "now.tau_0, (share", "1e3, (share", "gives way"),
-    "two: reference of this tick": ("two-levels", "displacement_d[1]", "displacement_d[0]", "With room"),
-}
+CASES = [(exercise, name) for exercise, known in MISTAKES.items() for name in known]
 
 
 @pytest.fixture
@@ -133,18 +110,35 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
     assert sum(line.of for line in lines) == 10
 
 
-@pytest.mark.parametrize("what", WRONG)
-def test_wrong_solution_loses_the_grade_points_of_its_mistake(what: str, thirty: Graded) -> None:
-    exercise, good, bad, missed = WRONG[what]
-    assert good in RIGHT[exercise]
-    text = RIGHT[exercise].replace(good, bad)
-    # Five of them are among the thirty.
-    graded = [name for name, each in SUBMISSIONS.items() if (each.exercise, each.text) == (exercise, text)]
-    if graded:
-        lines = [line for line in thirty.grades[graded[0]].lines if missed in line.check]
-    else:
-        lines = here(text, exercise, missed)
-    assert [line.points for line in lines] == [0], lines
+@pytest.mark.parametrize("exercise", EXERCISES)
+def test_a_right_solution_in_any_style_gets_every_grade_point(exercise: str) -> None:
+    assert len(STYLES[exercise]) >= 3
+    for text in STYLES[exercise]:
+        assert [line.check for line in here(text, exercise) if line.why] == []
+
+
+@pytest.mark.parametrize(("exercise", "name"), CASES)
+def test_a_known_mistake_costs_grade_points_and_is_named(exercise: str, name: str) -> None:
+    known = MISTAKES[exercise][name]
+    lines = here(known.text(exercise), exercise)
+    assert sum(line.points for line in lines) <= known.most
+    whys = [line.why for line in lines if line.why]
+    named = [why for why in whys if known.words in why]
+    assert named, whys
+    # The others say where the code itself failed, e.g. with a number that is not finite.
+    assert all(why.startswith("mine.py") for why in whys if why not in named), whys
+
+
+@pytest.mark.parametrize("exercise", EXERCISES)
+def test_every_grade_check_is_told_apart_by_a_mistake(exercise: str) -> None:
+    """There are eight mistakes at least, and what pushes the robot is there."""
+    assert len(MISTAKES[exercise]) >= 8
+    for check in load_exercise(exercise).checks(0):
+        session = TorqueSession(as_torque_scene(check.run.prepared(), "it"))
+        for _, event in check.run.events or ():
+            session.post(event)
+        session.drain()
+        assert session.notices == []
 
 
 @pytest.mark.parametrize("exercise", EXERCISES)
@@ -158,11 +152,8 @@ def test_the_file_with_the_hole_runs_and_its_grade_is_not_full(exercise: str) ->
 MISBEHAVING = {
     "syntax": ("def torque(now)\n", "expected ':'"),
     "no exercise": ("def torque(now):\n    return now.bias\n", "does not say which exercise"),
-    "leaves": (
-        "import os\nEXERCISE = 'joint-pd'\ndef torque(now):\n    os._exit(0)\n",
-        "ended by",
-    ),
-    "crashes": ("import os\nEXERCISE = 'joint-pd'\ndef torque(now):\n    os.abort()\n", "SIGABRT"),
+    "leaves": ("import os\nEXERCISE = 'joint-pd'\nos._exit(0)\n", "ends its own process (exit code 0)"),
+    "crashes": ("import os\nEXERCISE = 'joint-pd'\nos.abort()\n", "ends its own process (signal 6)"),
 }
 
 
@@ -238,7 +229,7 @@ def folder_of(place: Path, names: Sequence[str]) -> Path:
 
 def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path: Path, marked) -> None:
     """Nobody loses anything through a neighbour, and twice it is the same table."""
-    assert len(thirty.rows) == 30
+    assert len(thirty.rows) == len(SUBMISSIONS)
     found = {row["file"].removesuffix(".py"): row for row in thirty.rows}
     assert {name: int(row["points"]) for name, row in found.items()} == {
         name: each.points for name, each in SUBMISSIONS.items()
@@ -250,7 +241,7 @@ def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path
     def one_process(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
         yield from one_by_one(partial(marked, function), items)
 
-    few = ["right_time_delay", "wrong_kills", "wrong_leaves", "wrong_sign", "wrong_weighted"]
+    few = ["wrong_kills", "wrong_leaves", "wrong_sign"]
     beside = tmp_path / "again.csv"
     grade_folder(folder_of(tmp_path / "few", few), None, 0, beside, one_process, lambda _: None)
     assert len(beside.read_text().splitlines()) == 1 + len(few)

@@ -75,3 +75,12 @@ def load_in_a_daemon(text: str, answers: Any) -> None:
 
 def leave() -> None:
     os._exit(0)
+
+
+def multiply() -> int:
+    """Leaves a process behind, and says which."""
+    child = os.fork()
+    if child == 0:
+        time.sleep(3600.0)
+        os._exit(0)
+    return child

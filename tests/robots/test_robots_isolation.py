@@ -121,6 +121,15 @@ def test_it_dies_with_its_parent(tmp_path: Path, copied: bool) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems make no copies")
+def test_what_it_starts_ends_with_it(alone: ProcessPoolExecutor) -> None:
+    left = alone.submit(misbehaving.apart, misbehaving.multiply).result(60)
+    end = time.monotonic() + 5.0
+    while psutil.pid_exists(left) and psutil.Process(left).status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < end, "what was started outlived what started it by 5 s"
+        time.sleep(0.02)
+
+
 def test_a_daemonic_process_may_load() -> None:
     """A simulation is one, and may not have children of `multiprocessing`."""
     context = multiprocessing.get_context("spawn")

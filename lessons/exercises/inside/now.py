@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from math import prod
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,16 +44,22 @@ def shape_of(now: Any) -> dict[str, Any]:
     }
 
 
+def _read_only(_: object, name: str, __: Any) -> None:
+    raise AttributeError(f"what a controller sees is read-only: {name} cannot be set")
+
+
+@final
 class Part(SimpleNamespace):
     """A level, or the bounds: names and numbers, in the symbols of the HIMPC paper."""
 
-    def __setattr__(self, name: str, _: Any) -> None:
-        raise AttributeError(f"what a controller sees is read-only: {name} cannot be set")
+    __setattr__ = _read_only
 
 
-class Now(Part):
+@final
+class Now(SimpleNamespace):
     """What `himpc.controllers.view.View` shows, in a process that does not have it."""
 
+    __setattr__ = _read_only
     q: Array
     levels: tuple[Part, ...]
 

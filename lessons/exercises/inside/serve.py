@@ -81,11 +81,14 @@ def serve(parent: int, memory: int, kernel: bool) -> None:
             else:
                 answer = _answered(law(rebuilt(shape, data, ask)))
         except InputError as error:
-            answer = wire.FAULT, str(error).encode()
+            answer = wire.FAULT, str(error).encode(errors="replace")
         except BaseException as error:
-            answer = wire.FAULT, sentence(source.path, error).encode()
+            answer = wire.FAULT, sentence(source.path, error).encode(errors="replace")
         if refused:
-            answer = wire.FAULT, f"{source.path}: a submission may not do that ({refused[0]})".encode()
+            answer = (
+                wire.FAULT,
+                f"{source.path}: a submission may not do that ({refused[0]})".encode(errors="replace"),
+            )
         wire.write(told, *answer)
 
 

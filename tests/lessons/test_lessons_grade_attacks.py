@@ -1,0 +1,267 @@
+"""What a submission must not be able to do: with the system's own means, and where there are none."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from submissions import PD
+
+from himpc.controllers.answers import OwnFault
+from himpc.controllers.own import OwnController
+from himpc.controllers.view import Bounds, LevelView, View
+from lessons.exercises.apart import Apart, Exhausted
+from lessons.exercises.folder import grade_folder
+from lessons.exercises.inside import now as told
+from lessons.exercises.inside.now import rebuilt, shape_of
+from lessons.own.files import Source
+from lessons.parallel import one_by_one
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
+from lessons.settings.torque import TorqueSettings
+from robots import InputError, Robot
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="Landlock and seccomp are Linux's")
+
+
+@pytest.fixture(scope="module")
+def now() -> View:
+    """What a controller is shown at the first tick of a scene."""
+    seen: list[View] = []
+    scene = torque_scene("planar3-hold")
+
+    def make(settings: TorqueSettings, robot: Robot) -> OwnController:
+        def call(_: object, view: View) -> object:
+            seen.append(view)
+            return view.tau_0
+
+        return OwnController(robot, settings.for_controller(), lambda: lambda view: view.tau_0, call, "here")
+
+    TorqueSession(scene, controllers=make).tick()
+    return seen[0]
+
+
+def apart(text: str, kernel: bool = True, seconds: float = 30.0, memory: int = 2_000_000_000) -> Apart:
+    return Apart(
+        Source("mine.py", f"{PD.replace('def torque', 'def right')}\n{text}\n"), seconds, memory, kernel
+    )
+
+
+def once(line: str) -> str:
+    return f"def torque(now):\n    {line}\n    return right(now)"
+
+
+def said(text: str, now: View, kernel: bool = True, **limits) -> str:
+    """What is said of a submission, at its load or at its first tick; "" if it got through."""
+    try:
+        with apart(text, kernel, **limits) as one:
+            one.fresh()(now)
+    except (InputError, OwnFault, Exhausted) as fault:
+        return str(fault)
+    return ""
+
+
+def test_a_grade_is_made_of_the_same_numbers_on_both_sides(now: View) -> None:
+    names = {each.name for each in dataclasses.fields(View)} | {"M", "bias", "gravity"}
+    assert names == {*told.OF_TICK, "T_s", "N", "levels", "bounds", "nominal"}
+    assert {each.name for each in dataclasses.fields(Bounds)} == {*told.OF_BOUNDS, "approach"}
+    assert {each.name for each in dataclasses.fields(LevelView)} == {
+        *told.OF_LEVEL,
+        *("name", "tasks", "x", "jacobian"),
+    }
+    data = b"".join(each.tobytes() for each in told.numbers_of(now))
+    again = rebuilt(shape_of(now), data, lambda *_: now.M)
+    for ours, theirs in zip(told.numbers_of(now), told.numbers_of(again), strict=True):
+        assert (ours == theirs).all()
+        assert not theirs.flags.writeable
+
+
+def test_a_grade_needs_what_a_solution_may_use(now: View) -> None:
+    """Packages, the lab's QP, and the model at other places."""
+    text = """
+import dataclasses, pinocchio, scipy.linalg, scipy.optimize
+from himpc.qp import solve_qp
+def torque(now):
+    level = now.level("posture")
+    assert abs(level.jacobian(now.q) - level.J).max() < 1e-12
+    assert abs(now.nominal.mass_matrix(now.q) - now.M).max() < 1e-12
+    assert abs(now.nominal.bias(now.q, now.q_dot) - now.bias).max() < 1e-12
+    return right(now)
+"""
+    assert said(text, now) == ""
+
+
+CHEATS = {
+    "patches the grader": "import lessons.exercises.grade as g\ng.judged_by = lambda *_: ()\n" + once("pass"),
+    "asks the lab's controller": "from himpc.controllers import make_controller\n" + once("pass"),
+    "climbs to the plan": once(
+        "import sys; f = sys._getframe(); names = []\n"
+        "    while f: names += [str(type(v)) for v in f.f_locals.values()]; f = f.f_back\n"
+        "    assert not [n for n in names if 'himpc' in n or 'session' in n or 'Plan' in n], names"
+    ),
+    "looks among all objects": once(
+        "import gc, sys\n"
+        "    found = {str(type(o).__module__) for o in gc.get_objects()} | set(sys.modules)\n"
+        "    assert not [n for n in found if n.split('.')[0] in ('app', 'mujoco')\n"
+        "                or n.startswith(('lessons.session', 'lessons.exercises.grade', 'himpc.controllers',"
+        " 'robots.plant'))]"
+    ),
+}
+
+
+@pytest.mark.parametrize("cheat", CHEATS)
+def test_a_grade_cannot_be_taken_from_the_grader(cheat: str, now: View) -> None:
+    """There is nothing of it in the process of a submission."""
+    refused = not CHEATS[cheat].startswith("def")
+    assert ("is not there when it is graded" in said(CHEATS[cheat], now)) == refused
+    assert refused or said(CHEATS[cheat], now) == ""
+
+
+ATTACKS = {
+    "a thread runs a program": "import os, threading\n"
+    "threading.Thread(target=os.system, args=('touch {0}/hi',)).start()\n" + once("pass"),
+    "a thread reads a file": "import threading\nt = threading.Thread(target=open, args=('/etc/passwd',))\n"
+    "t.start(); t.join()\n" + once("pass"),
+    "kills its parent": once("import os; os.kill(os.getppid(), 9)"),
+    "forks": once("import os; os.fork()"),
+    "writes a file": once("open('{0}/hi', 'w').write('x')"),
+    "reads what others hand in": once("open('{0}/theirs.txt').read()"),
+    "network": once("import socket; socket.socket()"),
+}
+
+
+@pytest.mark.parametrize("kernel", [True, False])
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_a_grade_is_not_for_those_who_attack(attack: str, kernel: bool, now: View, tmp_path: Path) -> None:
+    """Whatever the thread: it is refused, and it is told."""
+    (tmp_path / "theirs.txt").write_text("def torque")
+    answer = said(ATTACKS[attack].format(tmp_path), now, kernel)
+    assert "a submission may not do that" in answer
+    assert not (tmp_path / "hi").exists()
+
+
+SPAWN = """
+import _posixsubprocess, os
+def spawn():
+    r, w = os.pipe()
+    line, name = [b'/bin/sh', b'-c', b'{0}'], [b'/bin/sh']
+    files = (-1, -1, -1, -1, -1, -1, r, w)
+    return _posixsubprocess.fork_exec(
+        line, name, True, (w,), None, None, *files, True, False, -1, None, None, None, -1, None, False)
+"""
+"""What Python's hook is not asked about: only the system can refuse it."""
+
+
+@linux
+def test_a_grade_is_not_for_those_who_go_below_python(now: View) -> None:
+    with apart(once("pass")) as one:
+        if one.protection != ("Landlock", "seccomp"):
+            pytest.skip("this system has not both")
+    text = SPAWN.format("sleep 100") + once("spawn()")
+    assert "Operation not permitted" in said(text, now) or "PermissionError" in said(text, now)
+
+
+@linux
+@pytest.mark.parametrize("how", ["sleep 100", "setsid sleep 100"])
+def test_a_grade_leaves_no_process_behind_without_the_systems_help(how: str, now: View) -> None:
+    """Children, and those that moved to a session of their own."""
+    text = SPAWN.format(how) + once("spawn()")
+    one = apart(text, kernel=False)
+    try:
+        one.fresh()(now)
+        end = time.monotonic() + 20.0
+        mark = psutil.Process(one.pid).environ()["HIMPC_LAB_SUBMISSION"]
+        while len(marked_with(mark)) < 2:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        one.close()
+    assert marked_with(mark) == []
+
+
+def marked_with(mark: str) -> list[int]:
+    found = []
+    for each in psutil.process_iter():
+        try:
+            if each.environ().get("HIMPC_LAB_SUBMISSION") == mark and each.status() != psutil.STATUS_ZOMBIE:
+                found.append(each.pid)
+        except psutil.Error:
+            continue
+    return found
+
+
+@linux
+def test_a_grade_counts_the_memory_of_all_its_processes(now: View) -> None:
+    eats = f"{sys.executable} -c \"x = b'x' * 5 * 10**8; import time; time.sleep(100)\"".replace("'", "\\'")
+    text = SPAWN.format(eats) + "spawn()\nspawn()\n" + once("import time; time.sleep(0.2)")
+    with apart(text, kernel=False, memory=800_000_000) as one:
+        law = one.fresh()
+        with pytest.raises(OwnFault, match=r"needs more memory than 0\.8 GB"):
+            for _ in range(60):
+                law(now)
+        assert one.pid is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("while True: pass", "one call takes longer than 0.5 s"),
+        ("import time; time.sleep(100)", "one call takes longer than 0.5 s"),
+        ("import os; os.closerange(3, 50)", "leave that out"),
+        ("import os; os._exit(0)", "ends its own process (exit code 0)"),
+        ("return 'abc'", "it returned a str where numbers are needed"),
+        ("return None", "it returned nothing"),
+        ("now.q[0] = 1", "read-only"),
+        ("now.q = 1", "read-only"),
+        ("held = [bytes(10**9) for _ in range(9)]", "memory"),
+        ("now.levels[0].jacobian('x')", "line"),
+        ("import os; [os.write(f, b'U' + b'\\xff' * 8) for f in range(3, 9) if os.fstat(f)]", "mine.py"),
+    ],
+)
+def test_a_grade_process_that_answers_badly_is_one_sentence(text: str, words: str, now: View) -> None:
+    answer = said(once(text), now)
+    assert words in answer
+    assert "\n" not in answer
+    assert len(answer) < 1200
+
+
+@linux
+def test_a_grade_process_ends_with_the_lab(now: View) -> None:
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        one = apart(once("pass"))
+        os.write(write, str(one.pid).encode())
+        time.sleep(100.0)
+        os._exit(0)
+    pid = int(os.read(read, 20))
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    end = time.monotonic() + 20.0
+    while psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_table_of_grades_is_no_program_of_a_spreadsheet(tmp_path: Path) -> None:
+    """Nor does a file in another encoding, or with another name, end the run of a folder."""
+    folder, out = tmp_path / "all", tmp_path / "grades.csv"
+    folder.mkdir()
+    for name in ("=1+cmd|calc", "+1", "-1", "@x"):
+        (folder / f"{name}.py").write_text("x = (")
+    (folder / "latin.py").write_bytes("# é\ndef torque(now): return now.q\n".encode("latin-1"))
+    Path(os.fsdecode(os.fsencode(folder) + b"/n\xe9.py")).write_text("x = (")
+    rows = grade_folder(folder, None, 0, out, one_by_one, lambda _: None)
+    assert {row["points"] for row in rows} == {"0"}
+    cells = [line.split(",")[0] for line in out.read_text().splitlines()[1:]]
+    assert sorted(cells)[:4] == ["'+1.py", "'-1.py", "'=1+cmd|calc.py", "'@x.py"]
+    assert any("is no text in UTF-8" in row["error"] for row in rows)
+    before = out.read_text()
+    grade_folder(folder, None, 0, out, one_by_one, lambda _: None)
+    assert out.read_text() == before
