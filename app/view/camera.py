@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 
 import numpy as np
@@ -69,10 +70,12 @@ def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction:
 
 def turn(camera: viser.CameraHandle, eye: np.ndarray, at: np.ndarray) -> None:
     """Puts the camera to `eye` and lets it look at `at`, two places, (3,) m."""
-    position, back = np.asarray(camera.position, float), eye - at
-    if np.array_equal(camera.look_at, eye):
-        # viser moves one after the other, and refuses a camera that looks at where it is between the two.
-        aims = (position + share * back for share in (1.0, 2.0))
-        camera.look_at = next(each for each in aims if not np.array_equal(each, eye))
-    camera.position = eye
-    camera.look_at = at
+    for share in (1.0, 2.0, 3.0):
+        with contextlib.suppress(ValueError):
+            camera.position = eye
+            camera.look_at = at
+            return
+        # viser moves one after the other, and refuses a camera that looks at where it is between the two;
+        # what the browser tells of its own camera may come in at any moment.
+        with contextlib.suppress(ValueError):
+            camera.look_at = np.asarray(camera.position, float) + share * (eye - at)

@@ -250,7 +250,8 @@ class Camera:
 
     @position.setter
     def position(self, value: np.ndarray) -> None:
-        assert np.isfinite(value).all() and not np.array_equal(value, self._look_at)
+        if not np.isfinite(value).all() or np.array_equal(value, self._look_at):
+            raise ValueError
         self._position = np.asarray(value, float)
 
     @property
@@ -259,7 +260,8 @@ class Camera:
 
     @look_at.setter
     def look_at(self, value: np.ndarray) -> None:
-        assert np.isfinite(value).all() and not np.array_equal(value, self._position)
+        if not np.isfinite(value).all() or np.array_equal(value, self._position):
+            raise ValueError
         self._look_at = np.asarray(value, float)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.__main__ import main
+from app.__main__ import COMMANDS, main
 from lessons.experiments.jobs import TIMING_KEYS
 from lessons.replay.state import State, encode
 from lessons.scenes.run_spec import RunSpec
@@ -245,3 +245,15 @@ def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
         given = ["--set", "deadline_ms=1", "--set", "solve_ms_per_knot=0.3", "--set", f"horizon={horizon}"]
         assert main(["run", "planar3-hold", *given, "--duration", "0.05", "--json", "-"]) == 0
         assert json.loads(capfd.readouterr().out)["late_ticks"] == late
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_flag_says_no_twice(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nor is there a second flag that takes one back: it would be the default."""
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    told = capsys.readouterr().out
+    assert ended.value.code == 0 and "--help" in told
+    flags = set(re.findall(r"--[a-z][a-z-]*", told))
+    assert not {each for each in flags if each.startswith("--no-no-")}
+    assert not re.search(r"--([a-z-]+), --no-\1", told)
