@@ -96,7 +96,8 @@ FURTHER = Further(
             "Joint 1 swings by 30°, one round in 8 s, a cosine. What is its largest acceleration, and "
             "which torque does it take for the inertia alone that the arm has about joint 1 where the "
             "circle begins?",
-            r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With $M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m, before "
+            r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With "
+            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m, before "
             r"friction, the "
             "circle and the other joints want anything. Three per cent of 4 N·m are ⟨three⟩.",
             {
