@@ -10,7 +10,7 @@ from docs.further.kit import Further, Line, Question, measured, null_space
 from lessons.scenes.catalog import torque_scene
 from robots import Plant
 
-PEAK = math.radians(30) * (2 * math.pi / 8) ** 2
+PEAK = math.radians(15) * (2 * math.pi / 8) ** 2
 NEED = measured("torque-has-a-limit", "prediction: Which share of the reduced limit")
 
 
@@ -96,10 +96,12 @@ FURTHER = Further(
             "Joint 1 swings by 30°, one round in 8 s, a cosine. What is its largest acceleration, and "
             "which torque does it take for the inertia alone that the arm has about joint 1 where the "
             "circle begins?",
-            r"$30° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With $M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m, before "
+            r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With "
+            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m, before "
             r"friction, the "
             "circle and the other joints want anything. Three per cent of 4 N·m are ⟨three⟩.",
             {
+                "half": (30 / 2, ".0f"),
                 "a": (PEAK, ".2f"),
                 "M": (_inertia(), ".2f"),
                 "tau": (_inertia() * PEAK, ".2f"),

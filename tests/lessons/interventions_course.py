@@ -251,7 +251,31 @@ COURSE_ROWS = (
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
         of=("M_bar_scale=4",), seconds=0.5,
     ),
+    # ---------------------------------------- first-hold-then-reach
+    Intervention(
+        "first-hold-then-reach/1", "it is where no plan is left that makes $\\mathcal J_2$ smaller",
+        of("error/base", "m", "mean", 7.0), (1.55, 1.7), ("order=base,ee",), (0, 0.05),
+    ),
     # ---------------------------------------- how-strict-is-strict
+    Intervention(
+        "how-strict-is-strict/0", "with $\\delta = 0$ the line search halves and halves",
+        of("way of the base", "m"), (0, 0.01), ("delta_m=0.001",), (1.0, 3.0),
+    ),
+    Intervention(
+        "how-strict-is-strict/1", "a tenth of a second later the next plan starts afresh",
+        EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
+    ),
+    Intervention(
+        "how-strict-is-strict/2", "its gradient says nothing about which way is harmful",
+        of("step/base", "", "mean"), (0.015, 0.03), ("formulation=paper",), (0.045, 0.2),
+    ),
+    Intervention(
+        "how-strict-is-strict/3", "its own best plan lets the hand slip a little",
+        EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
+    ),
+    Intervention(
+        "how-strict-is-strict/3", "$\\delta$ comes on top", EE, (12, 20), ("delta_m=0.001",), (2, 9),
+    ),
     # ---------------------------------------- seeing-ahead
     Intervention(
         "seeing-ahead/0", "it cannot leave for a place that it does not know of",
