@@ -1,4 +1,4 @@
-"""When a level has no sound solution: softened rows, the previous plan, damping, and torque bounds always."""
+"""When a level has no sound solution: softened rows, the previous plan, braking, within all bounds if any."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy
 
 from himpc import qp
+from himpc.cascade.last_resort import containing
 from himpc.catalog import Route
 from himpc.limits import Rows
-from himpc.limits.rows import least_slack
+from himpc.limits.braking import least_slack
 from himpc.references import Outlook
 from himpc.tick import ladder, problems
 from himpc.tick.kernel.solve import BUDGET
@@ -110,7 +111,11 @@ def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> N
 @pytest.fixture(scope="module")
 def pressed() -> Hierarchy:
     """Three levels whose bounds all bind, solved once in good health."""
-    hierarchy = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
+    tight = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
+    rows = containing(tight.rows, np.zeros(tight.shape))
+    hierarchy = Hierarchy(tight.problems, rows.widened(np.full(rows.lower.shape, 0.01)))
+    assert not least_slack(hierarchy.rows).any()
+    assert hierarchy.solve()[0].rung == "solve"
     assert len(hierarchy.solve()[0].active)
     return hierarchy
 
@@ -121,8 +126,8 @@ def pressed() -> Hierarchy:
 def test_a_broken_solver_falls_to_the_previous_plan(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, solver: qp.Solver
 ) -> None:
-    """Level 1 goes on with its shifted plan, lower levels inherit, and the torque rows hold."""
-    previous = {s.name: s._replace(U=0.01 * s.U) for s in pressed.solve()}
+    """Level 1 goes on with its shifted plan, lower levels inherit, and all rows hold."""
+    previous = {s.name: s._replace(U=1e-4 * s.U) for s in pressed.solve()}
     break_solver(monkeypatch, kind)
     solutions = pressed.solve("explicit", solver, previous)
     assert solutions[0].rung == "previous"
@@ -130,26 +135,50 @@ def test_a_broken_solver_falls_to_the_previous_plan(
     shifted = np.vstack([previous[solutions[0].name].U[1:], np.zeros((1, pressed.shape[1]))])
     np.testing.assert_array_equal(solutions[0].U, shifted)
     for solution in solutions:
-        assert_within(pressed.rows.torque_only(), solution.U)
+        assert_within(pressed.rows, solution.U)
+
+
+@pytest.mark.parametrize("stale", ["outside", "rung"])
+def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
+    monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, stale: str
+) -> None:
+    """A shifted plan that meets the torque rows and no velocity row, or that was a fallback itself, would let
+    the joints go on as they went: they are braked."""
+    rows, (N, n) = pressed.rows, pressed.shape
+    sound = {s.name: s._replace(U=np.zeros((N, n))) for s in pressed.solve()}
+    if stale == "rung":
+        sound = {name: s._replace(rung="previous") for name, s in sound.items()}
+        moved = pressed
+    else:
+        lower = rows.lower.copy()
+        lower[2 * N - 1] = 0.5 * np.minimum(
+            rows.upper[2 * N - 1], (rows.L @ np.full((N, n), 1e-3))[2 * N - 1]
+        )
+        moved = Hierarchy(pressed.problems, rows._replace(lower=lower))
+        assert not least_slack(moved.rows).any()
+        assert_within(moved.rows.torque_only(), np.zeros((N, n)))
+    break_solver(monkeypatch, "unsolved")
+    solutions = moved.solve("explicit", "daqp", sound)
+    assert solutions[0].rung == "brake"
+    for solution in solutions:
+        assert_within(moved.rows, solution.U)
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("kind", NONSENSE)
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
-def test_a_broken_solver_without_a_plan_damps_or_holds(
+def test_a_broken_solver_without_a_plan_brakes(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, route: Route
 ) -> None:
-    """Without a previous plan the damping level is tried under torque rows, and at last the torque stays."""
+    """Without a previous plan the joints are braked within all rows, which some increments meet here."""
     break_solver(monkeypatch, kind)
     if route == "compiled":
         break_kernel(monkeypatch)
     solutions = pressed.solve(route)
-    assert solutions[0].rung in ("damping", "hold")
-    if route == "explicit" and kind in ("garbage", "nan", "infinite"):
-        assert solutions[0].rung == "hold"
+    assert solutions[0].rung == "brake"
     for solution in solutions:
         assert np.isfinite(solution.U).all()
-        assert_within(pressed.rows.torque_only(), solution.U)
+        assert_within(pressed.rows, solution.U)
         np.testing.assert_array_equal(solution.U, solutions[0].U)
 
 
@@ -179,7 +208,7 @@ def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, posit
     shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
     contradictory = boxed(Hierarchy(hierarchy.problems, shifted), past=float(rng.choice([0.0, 0.3])))
     solutions = contradictory.solve()
-    assert solutions[0].rung in ("solve", "soften", "damping", "hold")
+    assert solutions[0].rung in ("solve", "soften", "feasible", "brake")
     for solution in solutions:
         assert np.isfinite(solution.U).all()
         assert solution.kkt_residual <= 1e-6

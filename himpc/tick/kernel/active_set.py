@@ -23,6 +23,12 @@ _NOISE = 1e-12
 _ROUNDED = 1e-7
 """N·m: a row that nothing can move any more and that is violated by less is met, up to rounding."""
 
+_ROUGH = 1e-6
+"""N·m: a point that is not refined may seem to miss a row by as much. Where many rows meet, rows taken for
+that come and go, the same ones again and again, until the budget is spent."""
+_HARD = 0.5
+"""Share of the hardest pull from which a row is let go together with that one."""
+
 FAILED = -1.0
 
 
@@ -76,17 +82,26 @@ def warm_rows(
 
 @piece
 def release(level: Level, taken: Taken, k: int, ideal: Array, budget: Array) -> int:
-    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay."""
-    D = level.rest[len(level.start)]
+    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay.
+
+    Those that pull hardest go first: where a row goes, the multipliers of its neighbours often turn, and rows
+    that all go at once have to be taken again one by one.
+    """
+    d, D = level.offset[len(level.start)], level.rest[len(level.start)]
     while True:
+        wrong = -1.0
+        for p in range(k):
+            wrong = max(wrong, -taken.pull[p] * taken.side[p])
         kept = k
         for p in range(k - 1, -1, -1):
-            if not taken.pull[p] * taken.side[p] > 0.0:
+            push = taken.pull[p] * taken.side[p]
+            if not push > 0.0 and not push > -_HARD * wrong:
                 without(taken, p, kept, D, budget)
                 kept -= 1
         if kept == k:
             return k
         k = kept
+        budget[0] -= k * (d + float(k))
         balance(level, taken, k, ideal)
 
 
@@ -99,6 +114,7 @@ def take(level: Level, taken: Taken, k: int, excess: float, budget: Array) -> tu
     taken.pull[k] = 0.0
     while True:
         length = resolve(taken, k, D, budget)
+        budget[0] -= float(k) * k
         change = taken.change
         for q in range(k):
             change[q] = taken.corner[k, q]
@@ -147,7 +163,7 @@ def optimum(
     budget: Array,
 ) -> tuple[float, int]:
     """The level's optimum under low ≤ L U ≤ high: its KKT residual and how many rows hold it; FAILED if none
-    was found within the budget.
+    was found, and how many rows it got to within the budget, 0 if more of it would be of no help.
 
     Args:
         level: prepared.
@@ -169,7 +185,9 @@ def optimum(
     while True:
         budget[0] -= 3.0 * look + 4.0 * k * D
         kkt = refine(level, taken, k)
-        if kkt < 0.0 or budget[0] < 0.0:
+        if budget[0] < 0.0:
+            return FAILED, k
+        if kkt < 0.0:
             return FAILED, 0
         kept = release(level, taken, k, ideal, budget)
         if kept < k:
@@ -182,7 +200,7 @@ def optimum(
         if not excess > TOLERANCE:
             return kkt, k
         exact = True
-        while excess > TOLERANCE:
+        while excess > (TOLERANCE if exact else _ROUGH):
             if not excess < math.inf:
                 return FAILED, 0
             taken.row[k], taken.joint[k], taken.side[k] = r, a, side
@@ -190,7 +208,9 @@ def optimum(
             normal_of(level, taken, k, L, low, high)
             met, k = take(level, taken, k, excess, budget)
             if not met:
-                if budget[0] < 0.0 or (exact and excess > _ROUNDED):
+                if budget[0] < 0.0:
+                    return FAILED, k
+                if exact and excess > _ROUNDED:
                     return FAILED, 0
                 if exact and side > 0:
                     high[r, a] += excess

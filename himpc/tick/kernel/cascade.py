@@ -15,6 +15,8 @@ FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
 """Columns of the table of levels: its rows; how many knots it counts; whether its efforts are measured unlike
 those of the level above, so that directions must be found anew; whether (33) does not bind it; and the rows
 and knots that its evidence is about, which are its own also where priorities are left out."""
+SOFTENED = 1.0
+"""The last of `RUNGS` that applies an optimum."""
 
 
 @piece
