@@ -8,6 +8,7 @@ from typing import Any
 import daqp
 import numpy as np
 import pytest
+from broken_solver import NONSENSE, break_kernel, break_solver
 from cascade_checks import assert_within, largest_difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,7 +21,7 @@ from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.braking import least_slack
 from himpc.references import Outlook
-from himpc.tick import ladder, problems
+from himpc.tick import ladder
 from himpc.tick.kernel.solve import BUDGET
 from himpc.tick.tables import budget_of
 from lessons.scenes.catalog import torque_scene
@@ -77,35 +78,6 @@ def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
     lower[:N], upper[:N] = -size, size
     upper[:N, 0], lower[:N, 0] = upper[:N, 0] - past, lower[:N, 0] - past
     return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
-
-
-NONSENSE = {
-    "garbage": lambda f, A: (np.full(f.size, 1e3), np.zeros(len(A)), "optimal"),
-    "nan": lambda f, A: (np.full(f.size, np.nan), np.full(len(A), np.nan), "optimal"),
-    "infinite": lambda f, A: (np.full(f.size, np.inf), np.zeros(len(A)), "optimal"),
-    "unsolved": lambda f, A: (np.zeros(f.size), np.zeros(len(A)), "daqp -4"),
-}
-
-
-def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution."""
-
-    def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
-        return NONSENSE[kind](f, A)
-
-    monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(qp.SOLVERS, (nonsense,)))
-
-
-def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
-    """The kernel finds no optimum, at one level or at all, and the printed QP is of no help."""
-    healthy = ladder.solve
-
-    def broken(*arguments: Any) -> bool:
-        return arguments[4] != place and place is not None and healthy(*arguments)
-
-    monkeypatch.setattr(ladder, "solve", broken)
-    monkeypatch.setattr(ladder, "solve_explicit", lambda *_: None)
-    monkeypatch.setattr(problems, "solve", broken)
 
 
 @pytest.fixture(scope="module")

@@ -20,10 +20,10 @@ from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.taken import Taken
 from himpc.tick.kernel.views import matrices, matrix, vector
 
-BUDGET = 18e6
-"""Multiplications that the changes of active rows may cost in one tick: fifteen milliseconds on a slow core.
-A count, not a clock: the same seed gives the same run."""
-_SHARE = 0.6
+BUDGET = 36e6
+"""Multiplications that the changes of active rows may cost in one tick: some twelve milliseconds, less than
+twenty on a slower core. A count, not a clock: the same seed gives the same run."""
+_SHARE = 0.75
 """What one attempt at a level may take of what is left, so that levels below it get theirs; the last one may
 take all."""
 
@@ -130,6 +130,7 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         low,
         high,
         value,
+        matrix(data, where[AT.length], b, n),
         vector(data, where[AT.ideal], w),
         vector(data, where[AT.budget], 1),
         room,
