@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate, pairwise
 from time import perf_counter_ns
 
@@ -25,7 +25,6 @@ def solve_cascade(
     problems: Sequence[LevelProblem],
     rows: Rows,
     previous: Mapping[str, LevelSolution],
-    damping: Callable[[], LevelProblem],
     route: Route,
     solver: Solver,
 ) -> list[LevelSolution]:
@@ -33,19 +32,20 @@ def solve_cascade(
 
     The ladder, each rung counted by the caller: "solve" the printed problem; "soften" the state rows by the
     least slack that makes them feasible, and pass the widened rows down (else Theorem 2 breaks);
-    level 1 then falls to the shifted "previous" plan of that level if it meets the torque rows, or to the
-    "damping" level alone under torque rows; a lower level "inherit"s U_{i−1}, which keeps every priority.
+    level 1 then falls to the shifted "previous" plan of that level if that was an optimum and meets all rows,
+    or "brake"s as the rows allow; a lower level "inherit"s U_{i−1}, which keeps every priority. Where the
+    compiled route has got somewhere before its time was over, it goes as far that way as the rows allow
+    ("feasible"). So the increments meet all rows whenever any do.
 
     Args:
         problems: the levels, highest priority first; at least one.
         rows: all bounds of this tick.
         previous: last tick's solutions by level name: warm starts and the "previous" rung.
-        damping: makes the damping problem for the last rung, which is hardly ever needed.
         route: compiled or explicit.
         solver: QP solver.
     """
     if route == "compiled":
-        return solve_problems(problems, rows, previous, damping)
+        return solve_problems(problems, rows, previous)
     N, _, n = problems[0].B.shape
     upper = [problem.B for problem in problems[:-1]]
     U, above = np.zeros((N, n)), []
@@ -57,7 +57,7 @@ def solve_cascade(
             point, rung = Point(U, NO_ROWS, 0.0, "empty"), "solve"
         else:
             before = previous.get(problem.name)
-            point, rung, rows = _climb_down(problem, rows, U, above, Z, before, damping, solver)
+            point, rung, rows = _climb_down(problem, rows, U, above, Z, before, solver)
         U = point.U
         above.append((problem.B, U))
         points.append(point._replace(time_us=(perf_counter_ns() - started) / 1e3))
@@ -88,7 +88,6 @@ def _climb_down(
     above: list[tuple[Array, Array]],
     Z: Array,
     before: LevelSolution | None,
-    damping: Callable[[], LevelProblem],
     solver: Solver,
 ) -> tuple[Point, Rung, Rows]:
     point = solve_explicit(problem, rows, U, above, Z, solver)
@@ -101,11 +100,8 @@ def _climb_down(
     if widened is not None and point is not None:
         return point, "soften", widened
 
-    def damped(torque: Rows) -> Array | None:
-        found = solve_explicit(damping(), torque, U, above, Z, solver)
-        return None if found is None else found.U
-
-    rung, held = last_resort(rows, None if before is None else before.U, damped)
+    optimal = before is not None and before.rung in ("solve", "soften")
+    rung, held = last_resort(widened or rows, before.U if before is not None and optimal else None)
     return Point(held, NO_ROWS, 0.0, "unsolved"), rung, containing(rows, held)
 
 

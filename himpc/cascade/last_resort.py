@@ -1,14 +1,13 @@
-"""What is left where a level has no optimum: bounds that give way, and increments that keep to the torque."""
+"""What is left where a level has no optimum: bounds that give way, and increments that keep to the bounds."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import Rung
-from himpc.limits.rows import Rows, least_slack
+from himpc.limits.braking import braking, least_slack, missed
+from himpc.limits.rows import Rows
 
 Array = NDArray[np.float64]
 
@@ -22,32 +21,35 @@ def softened(rows: Rows) -> Rows | None:
     return rows.widened(np.where(slack > 0, slack + _ROOM, 0.0)) if slack.any() else None
 
 
-def last_resort(
-    rows: Rows, before: Array | None, damped: Callable[[Rows], Array | None]
-) -> tuple[Rung, Array]:
-    """The last rungs: the shifted "previous" plan if it meets the torque rows, the "damping" level alone
-    under torque rows, or "hold", the torque as it is.
+def last_resort(rows: Rows, before: Array | None) -> tuple[Rung, Array]:
+    """The last rungs: the shifted "previous" plan if it meets all rows, else "brake": increments that meet
+    all rows whenever any do, and bring the joints to rest.
 
     Args:
         rows: all bounds.
-        before: the level's increments a tick ago, if there are any.
-        damped: the increments of the damping level alone under torque rows, None if they are not found.
+        before: the level's increments a tick ago, if they were an optimum.
 
     Returns:
         the rung and the increments, (N, n) N·m.
     """
-    torque, shape = rows.torque_only(), (rows.L.shape[1], rows.lower.shape[1])
+    shape = rows.L.shape[1], rows.lower.shape[1]
     if before is not None and before.shape == shape:
         shifted = np.vstack([before[1:], np.zeros((1, shape[1]))])
-        value = torque.L @ shifted
-        if ((value >= torque.lower) & (value <= torque.upper)).all():
+        if np.isfinite(shifted).all() and not missed(rows, shifted).any():
             return "previous", shifted
-    U = damped(torque)
-    if U is not None:
-        return "damping", U
-    held = np.zeros(shape)
-    held[0] = np.clip(held[0], torque.lower[0], torque.upper[0])
-    return "hold", held
+    return "brake", braking(rows)
+
+
+def towards(rows: Rows, U: Array, wanted: Array) -> Array | None:
+    """The last increments that meet the rows on the way from U, which meets them, to `wanted`, (N, n) each;
+    None where there is no way to go."""
+    if not np.isfinite(wanted).all():
+        return None
+    here, change = rows.L @ U, rows.L @ (wanted - U)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(change > 0, rows.upper - here, here - rows.lower) / np.abs(change)
+    share = min(1.0, float(np.min(room, where=change != 0, initial=1.0)))
+    return U + share * (wanted - U) if share > 0 else None
 
 
 def containing(rows: Rows, U: Array) -> Rows:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from himpc.limits.rows import Kind, Rows
 
 Array = NDArray[np.float64]
-Rung = Literal["solve", "soften", "previous", "inherit", "damping", "hold"]
+Rung = Literal["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from time import perf_counter_ns
 
 import numpy as np
@@ -14,16 +14,15 @@ from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.configuration import Configuration
 from himpc.controllers.base import TorqueController
-from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, stack_form, usable
+from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.controllers.memory import Memory
 from himpc.controllers.period import Found, Tick
 from himpc.controllers.settings import Settings
-from himpc.limits import LimitsInForce, Rows, build_rows, in_force, ramp
+from himpc.limits import LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL, about
-from himpc.tick.problems import increments_of
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 
@@ -162,13 +161,7 @@ class HIMPC(TorqueController):
             for place, level in enumerate(self._form.levels):
                 tick.fade(place, self._faded(level))
 
-        def damped(torque: Rows) -> Array | None:
-            form = stack_form(self.robot, (DAMPING_LEVEL,), self._settings)
-            here = Configuration(self.robot, self._data, q, v, np.tile(q, (self._settings.horizon - 1, 1)))
-            problems, _ = self._problems(form, here, Memory.start(q, v, self._settings.T_s), previews, {}, {})
-            return None if problems is None else increments_of(problems[0], torque)
-
-        plan = tick.step(q, v, previews, self._tau_0, self._limits, damped, started)
+        plan = tick.step(q, v, previews, self._tau_0, self._limits, started)
         if plan is None:
             return self._hold(q, started)
         self._tau_0 = plan.tau
@@ -202,21 +195,14 @@ class HIMPC(TorqueController):
             # With no level on and damping off nothing is asked for: the torque stays.
             return Found([], x_dot, predict_positions(state, self._still, self._M_bar, settings.T_s))
 
-        def last_rung() -> LevelProblem:
-            form = stack_form(self.robot, (DAMPING_LEVEL,), settings)
-            found, _ = self._problems(form, configuration, memory, tick.previews, {}, {})
-            return (found or problems)[0]
-
         self._asked = problems
-        solutions = self._cascade(problems, tick, last_rung)
+        solutions = self._cascade(problems, tick)
         return Found(solutions, x_dot, predict_positions(state, solutions[-1].U, self._M_bar, settings.T_s))
 
-    def _cascade(
-        self, problems: list[LevelProblem], tick: Tick, damping: Callable[[], LevelProblem]
-    ) -> list[LevelSolution]:
-        """Problem 1 to Problem r; `damping` makes the last rung's problem."""
+    def _cascade(self, problems: list[LevelProblem], tick: Tick) -> list[LevelSolution]:
+        """Problem 1 to Problem r."""
         previous, settings = tick.memory.solutions, self._settings
-        return solve_cascade(problems, tick.rows, previous, damping, settings.route, settings.solver)
+        return solve_cascade(problems, tick.rows, previous, settings.route, settings.solver)
 
     def _problems(
         self,

@@ -74,7 +74,7 @@ class HQP(OneStepController):
             if not found.usable:
                 # Staying where the levels above are keeps every priority; below nothing, come to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
-                rung = "inherit" if i else "damping"
+                rung = "inherit" if i else "brake"
                 found = Found(y if i else braking, status=found.status, qp_us=found.qp_us)
             y = found.y
             if i + 1 < len(demands):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter_ns
 
@@ -63,13 +63,11 @@ class Weighted(HIMPC):
         compiled = self.kernel is not None and level.name == DAMPING_LEVEL.name
         return math.sqrt(DAMPING_SHARE) * share if compiled else share
 
-    def _cascade(
-        self, problems: list[LevelProblem], tick: Tick, damping: Callable[[], LevelProblem]
-    ) -> list[LevelSolution]:
+    def _cascade(self, problems: list[LevelProblem], tick: Tick) -> list[LevelSolution]:
         problems = _calmed(problems)
 
         def solve(count: int) -> LevelSolution:
-            return super(Weighted, self)._cascade([sum_of_costs(problems[:count])], tick, damping)[0]
+            return super(Weighted, self)._cascade([sum_of_costs(problems[:count])], tick)[0]
 
         applied = solve(len(problems))
         started = perf_counter_ns()

@@ -28,6 +28,8 @@ class Rows(NamedTuple):
         kinds: kind of each block of N rows.
         stopping: (2, n) where the lower, upper velocity row is the position limit's: below the joint's own
             limit, the velocity from which it can still stop. None where no row is.
+        rest: (N, n) N·m, what the velocity rows come to when the joints come to rest, see `coming_to_rest`;
+            None stands for zeros: the velocities stay.
     """
 
     L: Array
@@ -35,6 +37,7 @@ class Rows(NamedTuple):
     upper: Array
     kinds: tuple[Kind, ...]
     stopping: NDArray[np.bool_] | None = None
+    rest: Array | None = None
 
     def kind(self, row: int, joint: int, upper: bool) -> Kind:
         """Which limit a joint meets at the upper or lower end of a row."""
@@ -56,6 +59,9 @@ class Rows(NamedTuple):
         N = self.L.shape[1]
         return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
 
+
+BRAKING = 20.0
+"""1/s: what brakes loses its velocity at this rate, and is all but at rest after a quarter of a second."""
 
 REACTION = 5.0
 """Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
@@ -122,36 +128,11 @@ def build_rows(
     if paper:
         q = np.array((force.q_lower, force.q_upper))[:, None]
         bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)
-    return Rows(toeplitz(N, kinds), bounds[0], bounds[1], kinds, stopping)
+    rest = coming_to_rest(state, M_bar, N, T_s)
+    return Rows(toeplitz(N, kinds), bounds[0], bounds[1], kinds, stopping, rest)
 
 
-def least_slack(rows: Rows) -> Array:
-    """How far the state rows must give way so that some increments satisfy all rows.
-
-    The rows couple no two joints and the torque of each knot is free within its box, so a greedy walk
-    finds increments that come closest: at every knot the torque that brings the velocity nearest to
-    where the velocity row wants it now and the position row at the next knot. What these increments
-    violate is the slack; they prove that the widened rows can be met.
-
-    Returns:
-        slack, (r, n) ≥ 0 N·m (in the rows' scaling), zero on torque rows.
-    """
-    N = rows.L.shape[1]
-    walk = np.zeros((N, rows.lower.shape[1]))
-    paper = len(rows.kinds) == 3
-    for j in range(N):
-        so_far = walk[:j]
-        # State rows at knot j+1 are linear in walk[j] with coefficient 1; so far it is zero there.
-        reached = rows.L[N + j, :j] @ so_far
-        low, high = rows.lower[N + j] - reached, rows.upper[N + j] - reached
-        if paper and j + 1 < N:
-            ahead = rows.L[2 * N + j + 1, :j] @ so_far
-            low = np.maximum(low, rows.lower[2 * N + j + 1] - ahead)
-            high = np.minimum(high, rows.upper[2 * N + j + 1] - ahead)
-        applied = so_far.sum(axis=0)
-        wanted = np.clip(0.0, np.minimum(low, high), np.maximum(low, high))
-        walk[j] = np.clip(wanted, rows.lower[j] - applied, rows.upper[j] - applied)
-    value = rows.L @ walk
-    slack = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
-    slack[:N] = 0.0
-    return slack
+def coming_to_rest(state: JointState, M_bar: Array, N: int, T_s: float) -> Array:
+    """What velocity rows come to, (N, n) N·m, where velocities fall as e^{−BRAKING t}; arguments as there."""
+    t = T_s * np.arange(1.0, N + 1)[:, None]
+    return (np.expm1(-BRAKING * t) * state.v - state.gained_velocity(N, T_s)) * (M_bar / T_s)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter_ns
 
 import numpy as np
 
 from himpc.cascade.explicit import solve_explicit
-from himpc.cascade.last_resort import containing, last_resort, softened
+from himpc.cascade.last_resort import containing, last_resort, softened, towards
 from himpc.cascade.level import NO_ROWS, RUNGS, Point, Rung
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
-from himpc.limits.rows import Kind
+from himpc.limits.rows import Kind, coming_to_rest
+from himpc.prediction.joint import JointState
 from himpc.tick.kernel.active_set import TOLERANCE
-from himpc.tick.kernel.arena import Arena, Array
-from himpc.tick.kernel.cascade import ALONE
+from himpc.tick.kernel.arena import PERIOD, T_S, Arena, Array
+from himpc.tick.kernel.cascade import ALONE, LAST, SOFTENED
 from himpc.tick.kernel.solve import solve
 from himpc.tick.printed import printed_problem
 
@@ -24,6 +24,9 @@ _SMALL = 40
 """Unknowns up to which the printed QP is asked where the kernel gives up."""
 _ITERATIONS = 100
 """What DAQP may take then, at each of at most two attempts: together a matter of milliseconds."""
+
+_LEAK = 1e-7
+"""m/s²: what a point may move levels above by."""
 
 
 @dataclass
@@ -38,9 +41,7 @@ class Asks:
         return self.left >= 2
 
 
-def solve_levels(
-    arena: Arena, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None], asks: Asks
-) -> list[tuple[Rung, float]]:
+def solve_levels(arena: Arena, kinds: tuple[Kind, ...], asks: Asks) -> list[tuple[Rung, float]]:
     """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
     on and its time, microseconds.
 
@@ -50,33 +51,26 @@ def solve_levels(
     Args:
         arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.
         kinds: of the rows.
-        damped: the increments of the damping level alone under torque rows.
         asks: of this tick; what is asked is taken off.
     """
     found: list[tuple[Rung, float]] = []
-    calm: list[Array | None] = []
-
-    def damped_once(rows: Rows) -> Array | None:
-        # All levels that come to this rung want the same.
-        if not calm:
-            calm.append(damped(rows))
-        return calm[0]
-
     for place in range(int(arena.i["sizes"][4])):
         started = perf_counter_ns()
+        arena.f["U"][place, 0, 0] = (
+            np.nan
+        )  # where the kernel gets nowhere, what it found before is no way to go
         solved = solve(*arena.arguments, place, 0.0)
-        rung = "solve" if solved else _climb_down(arena, place, kinds, damped_once, asks)
+        rung = "solve" if solved else _climb_down(arena, place, kinds, asks)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = RUNGS.index(rung), time_us
         found.append((rung, time_us))
     return found
 
 
-def _climb_down(
-    arena: Arena, place: int, kinds: tuple[Kind, ...], damped: Callable[[Rows], Array | None], asks: Asks
-) -> Rung:
+def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], asks: Asks) -> Rung:
     f = arena.f
     rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
+    wanted = f["U"][place].copy()
     point = _as_printed(arena, place, rows, asks)
     if point is not None:
         _put(arena, place, point)
@@ -86,12 +80,14 @@ def _climb_down(
         # Where U_{i−1} is all but the only point that the rows admit, a little room tells them apart.
         if solve(*arena.arguments, place, TOLERANCE):
             return "solve"
-        _put(arena, place, Point(f["U"][place - 1], NO_ROWS, 0.0, "unsolved"))
-        return "inherit"
+        above = f["U"][place - 1]
+        return _on_the_way(arena, place, containing(rows, above), "inherit", above, f["U"][place].copy())
+    rows = rows._replace(rest=_coming_to_rest(arena))
     widened = softened(rows)
     if widened is not None:
         _write(arena, widened)
         solved = bool(solve(*arena.arguments, place, 0.0))
+        wanted = f["U"][place].copy()
         point = None if solved else _as_printed(arena, place, widened, asks)
         if point is not None:
             _put(arena, place, point)
@@ -99,11 +95,35 @@ def _climb_down(
             if place:
                 _write(arena, rows)
             return "soften"
-    before = f["U_was"][place].copy() if arena.i["known"][1] else None
-    rung, U = last_resort(rows, before, damped)
-    _put(arena, place, Point(U, NO_ROWS, 0.0, "unsolved"))
-    _write(arena, rows if place else containing(rows, U))
+    optimal = bool(arena.i["known"][1]) and f["rung"][place] <= SOFTENED
+    rung, U = last_resort(widened or rows, f["U_was"][place].copy() if optimal else None)
+    rung = _on_the_way(arena, place, widened or rows, rung, U, wanted)
+    _write(arena, rows if place else containing(rows, f["U"][place]))
     return rung
+
+
+def _on_the_way(arena: Arena, place: int, rows: Rows, rung: Rung, U: Array, wanted: Array) -> Rung:
+    """Puts in place of U, which meets the rows, what is better on the way to where the kernel got; returns
+    the rung: the one given if nothing is."""
+    f = arena.f
+    on_the_way = towards(rows, U, wanted)
+    if on_the_way is not None and place and not arena.i["level"][place, ALONE]:
+        above = slice(0, int(arena.i["level"][place - 1, LAST]))
+        if np.abs(f["B"][:, above] @ (on_the_way - U)[:, :, None]).max(initial=0.0) > _LEAK:
+            on_the_way = None
+    if on_the_way is not None:
+        problem = printed_problem(arena, place)
+        if problem.cost(on_the_way) < problem.cost(U):
+            rung, U = "feasible", on_the_way
+    _put(arena, place, Point(U, NO_ROWS, 0.0, "unsolved"))
+    return rung
+
+
+def _coming_to_rest(arena: Arena) -> Array:
+    """`Rows.rest` of the state that the arena was given."""
+    f = arena.f
+    state = JointState(f["q"], f["v"], (f["v"] - f["v_was"]) / f["scalars"][PERIOD])
+    return coming_to_rest(state, f["M_bar"], len(f["L"][0]), float(f["scalars"][T_S]))
 
 
 def _as_printed(arena: Arena, place: int, rows: Rows, asks: Asks) -> Point | None:

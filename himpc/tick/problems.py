@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,11 +19,10 @@ def solve_problems(
     problems: Sequence[LevelProblem],
     rows: Rows,
     previous: Mapping[str, LevelSolution],
-    damping: Callable[[], LevelProblem],
 ) -> list[LevelSolution]:
     """`solve_cascade` by the kernel; arguments as there."""
     arena = arena_of(problems, rows, previous)
-    rungs = solve_levels(arena, rows.kinds, lambda torque: increments_of(damping(), torque), Asks())
+    rungs = solve_levels(arena, rows.kinds, Asks())
     conclude(*arena.arguments, False)
     return solutions([problem.name for problem in problems], arena.found(), rungs)
 

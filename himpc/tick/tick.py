@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from time import perf_counter_ns
 from typing import TYPE_CHECKING
 
@@ -71,7 +71,7 @@ class CompiledTick:
         self._led = [each for each in self._given.spans if not isinstance(each[1], Damping)]
         self._read: dict[int, Reference | Preview | None] = {}
         self._gathered: tuple[Layout, Array | None] | None = None
-        self._ticks, self._budget, self._reach = 0, budget_of(self.arena), settings.horizon + 1
+        self._ticks, self.budget, self._reach = 0, budget_of(self.arena), settings.horizon + 1
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
@@ -148,7 +148,6 @@ class CompiledTick:
         previews: Mapping[str, Preview],
         tau_0: Array,
         limits: LimitsInForce,
-        damped: Callable[[Rows], Array | None],
         started: int,
     ) -> Plan | None:
         """One control period; None if the state's consequences are not finite.
@@ -158,14 +157,13 @@ class CompiledTick:
             previews: of every task.
             tau_0: torque that acts now, (n,) N·m.
             limits: in force.
-            damped: increments of the damping level alone under torque rows, the last rung but one.
             started: when the period began, ns.
         """
         self._take(q, v, previews, tau_0, limits)
         arena = self.arena
         rungs: list[tuple[Rung, float]] = []
         change, iterations, asks = math.inf, 0, Asks()
-        arena.f["budget"][:] = self._budget
+        arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
                 # J_i(q_{k+j|k}): the knots of this tick's own prediction take the place of the last one's.
@@ -177,7 +175,7 @@ class CompiledTick:
             if not look(*arena.arguments):
                 return None
             self._looked = True
-            rungs = solve_levels(arena, self._kinds, damped, asks) if self._levels else []
+            rungs = solve_levels(arena, self._kinds, asks) if self._levels else []
             iterations += 1
             once = self._most == 1
             if not conclude(*arena.arguments, once):

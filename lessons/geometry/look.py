@@ -57,7 +57,7 @@ def tick_of(session: TorqueSession) -> Tick:
         raise InputError("This tick held the torque: there was nothing to solve")
     strict: Sequence[LevelSolution] = plan.levels
     if isinstance(controller, Weighted):
-        strict = solve_cascade(problems, plan.rows, {}, lambda: problems[-1], "compiled", "daqp")
+        strict = solve_cascade(problems, plan.rows, {}, "compiled", "daqp")
     return Tick(plan, problems, strict)
 
 

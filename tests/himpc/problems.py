@@ -56,14 +56,7 @@ class Hierarchy:
         solver: Solver = "daqp",
         previous: dict[str, LevelSolution] | None = None,
     ) -> list[LevelSolution]:
-        return solve_cascade(self.problems, self.rows, previous or {}, self.damping, route, solver)
-
-    def damping(self) -> LevelProblem:
-        N, _, n = self.problems[0].B.shape
-        C = residual_model(np.zeros(n), np.full(n, 5.0), N, 1e-3).C
-        return level_problem(
-            "damping", np.tile(np.eye(n), (N, 1, 1)), C, np.zeros((N, n)), np.full(n, 200.0), np.full(n, 10.0)
-        )
+        return solve_cascade(self.problems, self.rows, previous or {}, route, solver)
 
     @property
     def shape(self) -> tuple[int, int]:

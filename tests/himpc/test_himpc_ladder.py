@@ -1,4 +1,4 @@
-"""When a level has no sound solution: softened rows, the previous plan, damping, and torque bounds always."""
+"""When a level has no sound solution: softened rows, the previous plan, braking, within all bounds if any."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import daqp
 import numpy as np
 import pytest
+from broken_solver import NONSENSE, break_kernel, break_solver
 from cascade_checks import assert_within, largest_difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,12 +16,12 @@ from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy
 
 from himpc import qp
-from himpc.cascade import explicit
+from himpc.cascade.last_resort import containing
 from himpc.catalog import Route
 from himpc.limits import Rows
-from himpc.limits.rows import least_slack
+from himpc.limits.braking import least_slack
 from himpc.references import Outlook
-from himpc.tick import ladder, problems
+from himpc.tick import ladder
 from himpc.tick.kernel.solve import BUDGET
 from himpc.tick.tables import budget_of
 from lessons.scenes.catalog import torque_scene
@@ -79,41 +80,14 @@ def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
     return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
 
 
-NONSENSE = {
-    "garbage": lambda f, A: (np.full(f.size, 1e3), np.zeros(len(A)), "optimal"),
-    "nan": lambda f, A: (np.full(f.size, np.nan), np.full(len(A), np.nan), "optimal"),
-    "infinite": lambda f, A: (np.full(f.size, np.inf), np.zeros(len(A)), "optimal"),
-    "unsolved": lambda f, A: (np.zeros(f.size), np.zeros(len(A)), "daqp -4"),
-}
-
-
-def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution; and the method that
-    starts from the point above finds nothing."""
-
-    def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
-        return NONSENSE[kind](f, A)
-
-    monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(qp.SOLVERS, (nonsense,)))
-    monkeypatch.setattr(explicit, "descended", lambda *_: None)
-
-
-def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
-    """The kernel finds no optimum, at one level or at all, and the printed QP is of no help."""
-    healthy = ladder.solve
-
-    def broken(*arguments: Any) -> bool:
-        return arguments[4] != place and place is not None and healthy(*arguments)
-
-    monkeypatch.setattr(ladder, "solve", broken)
-    monkeypatch.setattr(ladder, "solve_explicit", lambda *_: None)
-    monkeypatch.setattr(problems, "solve", broken)
-
-
 @pytest.fixture(scope="module")
 def pressed() -> Hierarchy:
     """Three levels whose bounds all bind, solved once in good health."""
-    hierarchy = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
+    tight = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
+    rows = containing(tight.rows, np.zeros(tight.shape))
+    hierarchy = Hierarchy(tight.problems, rows.widened(np.full(rows.lower.shape, 0.01)))
+    assert not least_slack(hierarchy.rows).any()
+    assert hierarchy.solve()[0].rung == "solve"
     assert len(hierarchy.solve()[0].active)
     return hierarchy
 
@@ -124,8 +98,8 @@ def pressed() -> Hierarchy:
 def test_a_broken_solver_falls_to_the_previous_plan(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, solver: qp.Solver
 ) -> None:
-    """Level 1 goes on with its shifted plan, lower levels inherit, and the torque rows hold."""
-    previous = {s.name: s._replace(U=0.01 * s.U) for s in pressed.solve()}
+    """Level 1 goes on with its shifted plan, lower levels inherit, and all rows hold."""
+    previous = {s.name: s._replace(U=1e-4 * s.U) for s in pressed.solve()}
     break_solver(monkeypatch, kind)
     solutions = pressed.solve("explicit", solver, previous)
     assert solutions[0].rung == "previous"
@@ -133,26 +107,50 @@ def test_a_broken_solver_falls_to_the_previous_plan(
     shifted = np.vstack([previous[solutions[0].name].U[1:], np.zeros((1, pressed.shape[1]))])
     np.testing.assert_array_equal(solutions[0].U, shifted)
     for solution in solutions:
-        assert_within(pressed.rows.torque_only(), solution.U)
+        assert_within(pressed.rows, solution.U)
+
+
+@pytest.mark.parametrize("stale", ["outside", "rung"])
+def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
+    monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, stale: str
+) -> None:
+    """A shifted plan that meets the torque rows and no velocity row, or that was a fallback itself, would let
+    the joints go on as they went: they are braked."""
+    rows, (N, n) = pressed.rows, pressed.shape
+    sound = {s.name: s._replace(U=np.zeros((N, n))) for s in pressed.solve()}
+    if stale == "rung":
+        sound = {name: s._replace(rung="previous") for name, s in sound.items()}
+        moved = pressed
+    else:
+        lower = rows.lower.copy()
+        lower[2 * N - 1] = 0.5 * np.minimum(
+            rows.upper[2 * N - 1], (rows.L @ np.full((N, n), 1e-3))[2 * N - 1]
+        )
+        moved = Hierarchy(pressed.problems, rows._replace(lower=lower))
+        assert not least_slack(moved.rows).any()
+        assert_within(moved.rows.torque_only(), np.zeros((N, n)))
+    break_solver(monkeypatch, "unsolved")
+    solutions = moved.solve("explicit", "daqp", sound)
+    assert solutions[0].rung == "brake"
+    for solution in solutions:
+        assert_within(moved.rows, solution.U)
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("kind", NONSENSE)
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
-def test_a_broken_solver_without_a_plan_damps_or_holds(
+def test_a_broken_solver_without_a_plan_brakes(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, route: Route
 ) -> None:
-    """Without a previous plan the damping level is tried under torque rows, and at last the torque stays."""
+    """Without a previous plan the joints are braked within all rows, which some increments meet here."""
     break_solver(monkeypatch, kind)
     if route == "compiled":
         break_kernel(monkeypatch)
     solutions = pressed.solve(route)
-    assert solutions[0].rung in ("damping", "hold")
-    if route == "explicit" and kind in ("garbage", "nan", "infinite"):
-        assert solutions[0].rung == "hold"
+    assert solutions[0].rung == "brake"
     for solution in solutions:
         assert np.isfinite(solution.U).all()
-        assert_within(pressed.rows.torque_only(), solution.U)
+        assert_within(pressed.rows, solution.U)
         np.testing.assert_array_equal(solution.U, solutions[0].U)
 
 
@@ -182,7 +180,7 @@ def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, posit
     shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
     contradictory = boxed(Hierarchy(hierarchy.problems, shifted), past=float(rng.choice([0.0, 0.3])))
     solutions = contradictory.solve()
-    assert solutions[0].rung in ("solve", "soften", "damping", "hold")
+    assert solutions[0].rung in ("solve", "soften", "feasible", "brake")
     for solution in solutions:
         assert np.isfinite(solution.U).all()
         assert solution.kkt_residual <= 1e-6

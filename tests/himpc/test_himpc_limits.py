@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
+from himpc.limits.braking import least_slack
 from himpc.limits.limits import POSITION_MARGIN
-from himpc.limits.rows import least_slack
 from himpc.limits.viability import RETURN_RATE, viability_bounds
 from himpc.prediction.joint import JointState
 from robots import InputError, load_robot

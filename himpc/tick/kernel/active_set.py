@@ -15,6 +15,7 @@ from himpc.tick.kernel.bounds import sums
 from himpc.tick.kernel.level import Level, increments
 from himpc.tick.kernel.linear import backward
 from himpc.tick.kernel.taken import Taken, balance, fix, move, normal_of, refine, resolve, settle, without
+from himpc.tick.kernel.violated import farthest, lengths, worst
 
 TOLERANCE = 1e-9
 """N·m: a row violated by less counts as met."""
@@ -23,23 +24,16 @@ _NOISE = 1e-12
 _ROUNDED = 1e-7
 """N·m: a row that nothing can move any more and that is violated by less is met, up to rounding."""
 
+_ROUGH = 1e-6
+"""N·m: a point that is not refined may seem to miss a row by as much. Where many rows meet, rows taken for
+that come and go, the same ones again and again, until the budget is spent."""
+_MANY = 12
+"""Rows taken in one attempt from which on it pays to know how far away each violated row is: whoever goes for
+the farthest takes fewer in all than whoever goes for the one that is missed by most newton metres."""
+_HARD = 0.5
+"""Share of the hardest pull from which a row is let go together with that one."""
+
 FAILED = -1.0
-
-
-@piece
-def worst(value: Array, low: Array, high: Array) -> tuple[float, int, int, int]:
-    """The row that is violated most: by how much, row, joint and side. What is not a number is violated."""
-    most, row, joint, side = 0.0, -1, -1, 0
-    for r in range(len(value)):
-        for a in range(value.shape[1]):
-            above, below = value[r, a] - high[r, a], low[r, a] - value[r, a]
-            if above > most:
-                most, row, joint, side = above, r, a, 1
-            if below > most:
-                most, row, joint, side = below, r, a, -1
-            if value[r, a] != value[r, a]:
-                return math.inf, r, a, 1
-    return most, row, joint, side
 
 
 @piece
@@ -76,17 +70,26 @@ def warm_rows(
 
 @piece
 def release(level: Level, taken: Taken, k: int, ideal: Array, budget: Array) -> int:
-    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay."""
-    D = level.rest[len(level.start)]
+    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay.
+
+    Those that pull hardest go first: where a row goes, the multipliers of its neighbours often turn, and rows
+    that all go at once have to be taken again one by one.
+    """
+    d, D = level.offset[len(level.start)], level.rest[len(level.start)]
     while True:
+        wrong = -1.0
+        for p in range(k):
+            wrong = max(wrong, -taken.pull[p] * taken.side[p])
         kept = k
         for p in range(k - 1, -1, -1):
-            if not taken.pull[p] * taken.side[p] > 0.0:
+            push = taken.pull[p] * taken.side[p]
+            if not push > 0.0 and not push > -_HARD * wrong:
                 without(taken, p, kept, D, budget)
                 kept -= 1
         if kept == k:
             return k
         k = kept
+        budget[0] -= k * (d + float(k))
         balance(level, taken, k, ideal)
 
 
@@ -97,8 +100,11 @@ def take(level: Level, taken: Taken, k: int, excess: float, budget: Array) -> tu
     D = level.rest[len(level.start)]
     side = float(taken.side[k])
     taken.pull[k] = 0.0
+    length = resolve(taken, k, D, budget)
+    if length > 0.0:
+        fix(taken, k, length, D)
     while True:
-        length = resolve(taken, k, D, budget)
+        budget[0] -= float(k) * k
         change = taken.change
         for q in range(k):
             change[q] = taken.corner[k, q]
@@ -121,13 +127,21 @@ def take(level: Level, taken: Taken, k: int, excess: float, budget: Array) -> tu
             taken.pull[q] -= step * side * change[q]
         taken.pull[k] += step * side
         if whole <= reach:
-            fix(taken, k, length, D)
             return True, k + 1
         excess -= step * length * length
         taken.pull[first] = 0.0
-        without(taken, first, k, D, budget)
-        move(taken, k, k - 1, D)
-        k -= 1
+        if length > 0.0:
+            # The rotations that close the gap turn this row, too: nothing has to be resolved anew.
+            without(taken, first, k + 1, D, budget)
+            k -= 1
+            length = taken.corner[k, k]
+        else:
+            without(taken, first, k, D, budget)
+            move(taken, k, k - 1, D)
+            k -= 1
+            length = resolve(taken, k, D, budget)
+            if length > 0.0:
+                fix(taken, k, length, D)
 
 
 @piece
@@ -144,10 +158,11 @@ def optimum(
     ideal: Array,
     U: Array,
     value: Array,
+    length: Array,
     budget: Array,
 ) -> tuple[float, int]:
     """The level's optimum under low ≤ L U ≤ high: its KKT residual and how many rows hold it; FAILED if none
-    was found within the budget.
+    was found, and how many rows it got to within the budget, 0 if more of it would be of no help.
 
     Args:
         level: prepared.
@@ -157,6 +172,7 @@ def optimum(
         ideal: from `prepare`.
         U: the increments found, (N, n).
         value: L U, (b, n).
+        length: scratch, (b, n).
         budget: how many multiplications are left, one number: time, but the same on every machine.
     """
     N = len(level.start)
@@ -166,10 +182,13 @@ def optimum(
     balance(level, taken, k, ideal)
     k = release(level, taken, k, ideal, budget)
     settle(level, taken, k, ideal)
+    changes = 0
     while True:
         budget[0] -= 3.0 * look + 4.0 * k * D
         kkt = refine(level, taken, k)
-        if kkt < 0.0 or budget[0] < 0.0:
+        if budget[0] < 0.0:
+            return FAILED, k
+        if kkt < 0.0:
             return FAILED, 0
         kept = release(level, taken, k, ideal, budget)
         if kept < k:
@@ -182,15 +201,22 @@ def optimum(
         if not excess > TOLERANCE:
             return kkt, k
         exact = True
-        while excess > TOLERANCE:
+        while excess > (TOLERANCE if exact else _ROUGH):
             if not excess < math.inf:
                 return FAILED, 0
+            changes += 1
+            if changes == _MANY:
+                lengths(level, taken, k, length, budget)
+            if changes >= _MANY:
+                excess, r, a, side = farthest(value, low, high, length, TOLERANCE if exact else _ROUGH)
             taken.row[k], taken.joint[k], taken.side[k] = r, a, side
             budget[0] -= look + 2.0 * k * D
             normal_of(level, taken, k, L, low, high)
             met, k = take(level, taken, k, excess, budget)
             if not met:
-                if budget[0] < 0.0 or (exact and excess > _ROUNDED):
+                if budget[0] < 0.0:
+                    return FAILED, k
+                if exact and excess > _ROUNDED:
                     return FAILED, 0
                 if exact and side > 0:
                     high[r, a] += excess

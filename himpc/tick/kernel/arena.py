@@ -101,6 +101,7 @@ NUMBERS = {
     "low": "b n",
     "high": "b n",
     "reached": "b n",
+    "length": "b n",
     "effect": "r N M",
     "normal": "k w",
     "white": "k w",

@@ -15,6 +15,8 @@ FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
 """Columns of the table of levels: its rows; how many knots it counts; whether its efforts are measured unlike
 those of the level above, so that directions must be found anew; whether (33) does not bind it; and the rows
 and knots that its evidence is about, which are its own also where priorities are left out."""
+SOFTENED = 1.0
+"""The last of `RUNGS` that applies an optimum."""
 
 
 @piece
@@ -103,6 +105,7 @@ def solve_level(
     low: Array,
     high: Array,
     value: Array,
+    length: Array,
     ideal: Array,
     budget: Array,
     room: float,
@@ -112,7 +115,7 @@ def solve_level(
 
     Args:
         place, levels: i and the table of levels.
-        level, taken, ideal, value: scratch, see `optimum`.
+        level, taken, ideal, value, length: scratch, see `optimum`.
         B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
         U: (r, N, n) increments of all levels, those above known.
         count, row, joint, pressed: the rows active a tick ago.
@@ -141,7 +144,9 @@ def solve_level(
             return 0.0, 0
     if not prepare(level, B, free, root_Q, ideal):
         return FAILED, 0
-    return optimum(level, taken, count, row, joint, pressed, L, low, high, ideal, U[place], value, budget)
+    return optimum(
+        level, taken, count, row, joint, pressed, L, low, high, ideal, U[place], value, length, budget
+    )
 
 
 @piece

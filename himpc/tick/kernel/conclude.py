@@ -12,6 +12,7 @@ from himpc.tick.kernel.cascade import (
     OWN_FIRST,
     OWN_KNOTS,
     OWN_LAST,
+    SOFTENED,
     finite,
     predict,
 )
@@ -97,6 +98,8 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
         )
         pressed = matrix(data, where[AT.pressed], r, k)
         for i in range(r):
+            if data[where[AT.rung] + i] > SOFTENED:
+                continue  # what the attempt left is there already
             active = whole[whole_where[WHOLE_AT.active_count] + i]
             whole[whole_where[WHOLE_AT.pressed_count] + i] = active
             for p in range(active):

@@ -7,16 +7,25 @@ from typing import Any
 from himpc.cascade.compiled import INDICES, NUMBER, VECTOR, WHOLE, entry
 from himpc.tick.kernel.active_set import FAILED
 from himpc.tick.kernel.arena import AT, WHOLE_AT, Whole
-from himpc.tick.kernel.cascade import FIRST, KNOTS, LAST, count_coordinates, own_directions, solve_level
+from himpc.tick.kernel.cascade import (
+    ALONE,
+    FIRST,
+    KNOTS,
+    LAST,
+    count_coordinates,
+    own_directions,
+    solve_level,
+)
 from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.taken import Taken
 from himpc.tick.kernel.views import matrices, matrix, vector
 
-BUDGET = 12e6
-"""Multiplications that the changes of active rows may cost in one tick: ten milliseconds on a slow core. A
-count, not a clock: the same seed gives the same run."""
-LEVEL_BUDGET = 6e6
-"""The most of them that one attempt at one level may take."""
+BUDGET = 36e6
+"""Multiplications that the changes of active rows may cost in one tick: some twelve milliseconds, less than
+twenty on a slower core. A count, not a clock: the same seed gives the same run."""
+_SHARE = 0.75
+"""What one attempt at a level may take of what is left, so that levels below it get theirs; the last one may
+take all."""
 
 
 @entry(VECTOR, INDICES, INDICES, INDICES, WHOLE, NUMBER)
@@ -62,6 +71,10 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         matrix(whole, whole_where[WHOLE_AT.pressed_row], r, k),
         matrix(whole, whole_where[WHOLE_AT.pressed_joint], r, k),
     )
+    pressed_count, pressed = (
+        vector(whole, whole_where[WHOLE_AT.pressed_count], r),
+        matrix(data, where[AT.pressed], r, k),
+    )
     active_row, active_joint = (
         matrix(whole, whole_where[WHOLE_AT.active_row], r, k),
         matrix(whole, whole_where[WHOLE_AT.active_joint], r, k),
@@ -96,7 +109,8 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         vector(data, where[AT.size], 2),
     )
     granted = data[where[AT.budget]]
-    data[where[AT.budget]] = min(granted, LEVEL_BUDGET)
+    spared = 0.0 if i == r - 1 or levels[i, ALONE] else (1.0 - _SHARE) * granted
+    data[where[AT.budget]] = granted - spared
     kkt, held = solve_level(
         i,
         levels,
@@ -106,22 +120,28 @@ def solve(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, roo
         free,
         root_Q,
         U,
-        whole[whole_where[WHOLE_AT.pressed_count] + i],
+        pressed_count[i],
         pressed_row[i],
         pressed_joint[i],
-        matrix(data, where[AT.pressed], r, k)[i],
+        pressed[i],
         matrix(data, where[AT.L], b, N),
         matrix(data, where[AT.lower], b, n),
         matrix(data, where[AT.upper], b, n),
         low,
         high,
         value,
+        matrix(data, where[AT.length], b, n),
         vector(data, where[AT.ideal], w),
         vector(data, where[AT.budget], 1),
         room,
     )
-    data[where[AT.budget]] += max(granted - LEVEL_BUDGET, 0.0)
+    data[where[AT.budget]] += spared
     if kkt == FAILED:
+        # The next attempt, now or a tick later, goes on from where this one got.
+        pressed_count[i] = held
+        for p in range(held):
+            pressed_row[i, p], pressed_joint[i, p] = taken.row[p], taken.joint[p]
+            pressed[i, p] = taken.pull[p]
         return False
     data[where[AT.kkt] + i] = kkt
     whole[whole_where[WHOLE_AT.active_count] + i] = held

@@ -1,0 +1,176 @@
+"""Both routes where many bounds are active: long horizons, low velocity and torque limits, dragged targets.
+
+    python -m benchmarks.bounds [--quick] [--seconds 0.3] [--scenes NAME …] [--horizons N …]
+                                [--velocity SCALE …] [--torque SCALE …] [--still | --dragged] [--alone]
+
+Runs every torque scene with every horizon and every scale of its velocity and torque limits, once as it is
+and, where it has a target, once with the target put elsewhere every 50 ms. Prints a line of a Markdown table
+for each: how many of the QPs had no verified optimum, how fast the fastest joint was as a share of its limit,
+the longest step's processor time, and the most of its budget that a tick of the compiled route used.
+--quick takes the hardest few; --alone leaves out the explicit route. Exit code 1 if the compiled route leaves
+more unsolved than the explicit one, a joint is more than 2 % faster, or a step takes more than 20 ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import product
+from time import thread_time
+from typing import NamedTuple
+
+import numpy as np
+
+from himpc.catalog import Route
+from lessons.events import MoveTarget
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.names import SCENES
+from lessons.session.torque import TorqueSession
+
+HORIZONS, VELOCITY, TORQUE = (1, 5, 10, 20, 30), (1.0, 0.3, 0.2, 0.1), (1.0, 0.5)
+LONGEST_MS = 20.0
+_EVERY = 50
+"""Ticks between two places of a target that is dragged."""
+
+
+class Cell(NamedTuple):
+    """A row of the table."""
+
+    scene: str
+    N: int
+    velocity: float
+    torque: float
+    dragged: bool
+
+
+class Found(NamedTuple):
+    """What a route did there.
+
+    Attributes:
+        unsolved, of: QPs without a verified optimum, and all QPs.
+        speed: the fastest joint's share of its limit.
+        longest_ms: processor time of the longest step, without the first.
+        spent: the most of its budget that a tick of the compiled route used.
+    """
+
+    unsolved: int
+    of: int
+    speed: float
+    longest_ms: float
+    spent: float
+
+
+QUICK = (
+    Cell("iiwa14-circle", 30, 0.3, 1.0, False),
+    Cell("iiwa14-circle", 30, 0.2, 1.0, False),
+    Cell("iiwa14-circle", 20, 0.1, 1.0, False),
+    Cell("iiwa14-hold", 30, 0.3, 1.0, True),
+    Cell("baxter-hold", 20, 0.3, 1.0, True),
+)
+
+
+def run(cell: Cell, route: Route, ticks: int) -> Found:
+    """One run."""
+    scene = torque_scene(cell.scene)
+    limits = replace(scene.settings.limits, velocity_scale=cell.velocity, torque_scale=cell.torque)
+    session = TorqueSession(
+        replace(scene, settings=replace(scene.settings, horizon=cell.N, route=route, limits=limits))
+    )
+    rng, name = np.random.default_rng(1), target_of(session)
+    home = None
+    unsolved, of, speed, longest, spent = 0, 0, 0.0, 0.0, 0.0
+    kernel = getattr(session.controller, "kernel", None)
+    for tick in range(ticks):
+        target = session.target(name) if name and cell.dragged else None
+        if name and target is not None and tick % _EVERY == 0:
+            home = target.value if home is None else home
+            session.post(MoveTarget(name, tuple((home + rng.uniform(-0.3, 0.3, home.size)).tolist())))
+        started = thread_time()
+        session.tick()
+        if tick:
+            longest = max(longest, 1e3 * (thread_time() - started))
+        plan = session.plan
+        assert plan is not None
+        unsolved, of = unsolved + plan.unsolved, of + len(plan.levels)
+        speed = max(speed, float(np.abs(session.plant.v / (cell.velocity * session.robot.v_limit)).max()))
+        if kernel is not None:
+            spent = max(spent, 1.0 - float(kernel.arena.f["budget"][0]) / kernel.budget)
+        if session.diverged_at is not None:
+            speed = np.inf
+            break
+    return Found(unsolved, of, speed, longest, spent)
+
+
+def target_of(session: TorqueSession) -> str | None:
+    """The first position target that can be put elsewhere."""
+    for name in session.references:
+        target = session.target(name)
+        if target is not None and target.raw.ndim == 1:
+            return name
+    return None
+
+
+def cells(given: argparse.Namespace) -> Iterator[Cell]:
+    """Those that were asked for."""
+    if given.quick:
+        yield from QUICK
+        return
+    scenes: Iterable[str] = given.scenes or [name for name in SCENES if name != "hold"]
+    for scene in scenes:
+        draggable = target_of(TorqueSession(torque_scene(scene))) is not None
+        for N, velocity, torque in product(given.horizons, given.velocity, given.torque):
+            if not given.dragged:
+                yield Cell(scene, N, velocity, torque, False)
+            if draggable and not given.still:
+                yield Cell(scene, N, velocity, torque, True)
+
+
+def faults(found: Found, reference: Found | None) -> list[str]:
+    """What the compiled route must not do."""
+    said = ["slow"] if found.longest_ms > LONGEST_MS else []
+    if reference is not None:
+        said += ["unsolved"] if found.unsolved * reference.of > reference.unsolved * found.of else []
+        said += ["fast"] if found.speed > 1.02 * max(reference.speed, 1.0) else []
+    return said
+
+
+def main() -> int:
+    """Prints the table and how many cells are at fault."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--seconds", type=float, default=0.3)
+    parser.add_argument("--scenes", nargs="+")
+    parser.add_argument("--horizons", nargs="+", type=int, default=HORIZONS)
+    parser.add_argument("--velocity", nargs="+", type=float, default=VELOCITY)
+    parser.add_argument("--torque", nargs="+", type=float, default=TORQUE)
+    parser.add_argument("--still", action="store_true", help="nothing is dragged")
+    parser.add_argument("--dragged", action="store_true", help="only runs in which something is")
+    parser.add_argument("--alone", action="store_true", help="without the explicit route")
+    given = parser.parse_args()
+    print(
+        "| scene | N | velocity | torque | dragged | unsolved | explicit | speed | explicit | ms | budget | |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    ran = wrong = 0
+    for cell in cells(given):
+        ticks = round(given.seconds / torque_scene(cell.scene).settings.T_s)
+        found = run(cell, "compiled", ticks)
+        reference = None if given.alone else run(cell, "explicit", ticks)
+        said = faults(found, reference)
+        ran, wrong = ran + 1, wrong + bool(said)
+        other = ("", "") if reference is None else (str(reference.unsolved), f"{reference.speed:.3f}")
+        dragged = "yes" if cell.dragged else ""
+        print(
+            f"| {cell.scene} | {cell.N} | {cell.velocity:g} | {cell.torque:g} | {dragged} "
+            f"| {found.unsolved} of {found.of} | {other[0]} | {found.speed:.3f} | {other[1]} "
+            f"| {found.longest_ms:.1f} | {100 * found.spent:.0f} % | {', '.join(said)} |",
+            flush=True,
+        )
+    print(f"\n{ran} cells, {wrong} at fault")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""Increments that meet all bounds whenever any do, and bring the joints to rest: found joint by joint."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.rows import Rows
+from himpc.qp import solve_qp
+
+Array = NDArray[np.float64]
+
+_ITERATIONS = 300
+"""That the QP of one joint may take."""
+_MET = 1e-7
+"""N·m: a row that is missed by less counts as met."""
+
+
+def braking(rows: Rows) -> Array:
+    """Increments, (N, n) N·m, that meet all rows whenever any increments do, and torque rows always.
+
+    Rows couple no two joints. With w_j = Σ_{i≤j} τ_i, what a joint's velocity row bounds, and τ_i the torque
+    gained up to knot i, torque rows say how far w_j may be from w_{j−1} and velocity rows where it may be.
+    Going back from the last knot, the w_j from which all later rows can still be met are an interval; going
+    forward, each w_j is put as close to `rows.rest` as these intervals allow. Where there is nothing between
+    the bounds, a velocity row of an earlier knot counts more than later ones. Position rows bound sums of
+    w_j: with them the sequence closest to `rows.rest` is a QP with N unknowns for every joint.
+    """
+    N, n = rows.L.shape[1], rows.lower.shape[1]
+    rest = np.zeros((N, n)) if rows.rest is None else rows.rest
+    w = _walk(rows, rest)
+    U = _steps(_steps(w))
+    if len(rows.kinds) == 3:
+        for joint in np.flatnonzero(missed(rows, U).max(axis=0) > _MET).tolist():
+            found = _closest(rows, joint, rest[:, joint])
+            if found is not None:
+                w[:, joint] = found
+        U = _steps(_steps(w))
+    return U
+
+
+def missed(rows: Rows, U: Array) -> Array:
+    """By how much increments (N, n) miss rows, (r, n) ≥ 0 N·m; 0 up to the rounding of the sums."""
+    value, summed = rows.L @ U, rows.L @ np.abs(U)
+    excess = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
+    excess[excess <= 1e-14 * len(rows.L) * summed] = 0.0
+    return excess
+
+
+def least_slack(rows: Rows) -> Array:
+    """How far the state rows must give way so that some increments satisfy all rows; none if some do.
+
+    Returns:
+        slack, (r, n) ≥ 0 N·m (in the rows' scaling), zero on torque rows.
+    """
+    slack = missed(rows, braking(rows))
+    slack[: rows.L.shape[1]] = 0.0
+    if len(rows.kinds) == 3:
+        slack[slack <= _MET] = 0.0
+    return slack
+
+
+def _walk(rows: Rows, rest: Array) -> Array:
+    """w that meets torque and velocity rows, (N, n); of position rows it sees the next one only."""
+    N = len(rest)
+    least, most = rows.lower[:N], rows.upper[:N]
+    low, high = rows.lower[N : 2 * N].copy(), rows.upper[N : 2 * N].copy()
+    for j in range(N - 2, -1, -1):
+        behind_low, behind_high = low[j + 1] - most[j + 1], high[j + 1] - least[j + 1]
+        low[j], high[j] = _within(behind_low, low[j], high[j]), _within(behind_high, low[j], high[j])
+    w, before, position = np.empty_like(rest), np.zeros(rest.shape[1]), np.zeros(rest.shape[1])
+    for j in range(N):
+        wanted = _within(rest[j], low[j], high[j])
+        if len(rows.kinds) == 3 and j + 1 < N:
+            row = 2 * N + j + 1
+            wanted = _within(wanted, rows.lower[row] - position, rows.upper[row] - position)
+        before = w[j] = _within(wanted, before + least[j], before + most[j])
+        position = position + before
+    return w
+
+
+def _within(x: Array, low: Array, high: Array) -> Array:
+    return np.minimum(np.maximum(x, low), high)
+
+
+def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
+    """w of one joint that meets all rows and is closest to `rest`, (N,); None if there is none."""
+    N = rest.size
+    sums = np.tril(np.ones((N, N)))
+    A = np.vstack([np.eye(N) - np.eye(N, k=-1), np.eye(N), sums[: N - 1]])
+    # No increment moves the first position row.
+    kept = np.r_[0 : 2 * N, 2 * N + 1 : 3 * N]
+    lower, upper = rows.lower[kept, joint], rows.upper[kept, joint]
+    found = solve_qp(np.eye(N), -rest, A, lower, upper, "daqp", _ITERATIONS)
+    value = A @ found.x
+    met = bool(((value <= upper + _MET) & (value >= lower - _MET)).all())
+    if not met:
+        return None
+    # The torque rows hold exactly: what the solver leaves of them is taken off.
+    w, before = np.empty(N), 0.0
+    for j in range(N):
+        before = w[j] = min(max(found.x[j], before + rows.lower[j, joint]), before + rows.upper[j, joint])
+    return w
+
+
+def _steps(x: Array) -> Array:
+    """x_j − x_{j−1}, where x_{−1} = 0."""
+    return np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1])))

@@ -1,0 +1,45 @@
+"""QP solvers and a kernel that find nothing, for tests of what happens then."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from himpc import qp
+from himpc.cascade import explicit
+from himpc.tick import ladder, problems
+
+Array = NDArray[np.float64]
+
+NONSENSE = {
+    "garbage": lambda f, A: (np.full(f.size, 1e3), np.zeros(len(A)), "optimal"),
+    "nan": lambda f, A: (np.full(f.size, np.nan), np.full(len(A), np.nan), "optimal"),
+    "infinite": lambda f, A: (np.full(f.size, np.inf), np.zeros(len(A)), "optimal"),
+    "unsolved": lambda f, A: (np.zeros(f.size), np.zeros(len(A)), "daqp -4"),
+}
+
+
+def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution; and the method that
+    starts from the point above finds nothing."""
+
+    def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
+        return NONSENSE[kind](f, A)
+
+    monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(qp.SOLVERS, (nonsense,)))
+    monkeypatch.setattr(explicit, "descended", lambda *_: None)
+
+
+def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
+    """The kernel finds no optimum, at one level or at all, and the printed QP is of no help."""
+    healthy = ladder.solve
+
+    def broken(*arguments: Any) -> bool:
+        return arguments[4] != place and place is not None and healthy(*arguments)
+
+    monkeypatch.setattr(ladder, "solve", broken)
+    monkeypatch.setattr(ladder, "solve_explicit", lambda *_: None)
+    monkeypatch.setattr(problems, "solve", broken)
