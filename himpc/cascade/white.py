@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
-from himpc.tick.kernel.constants import RANK_TOLERANCE
 
 Array = NDArray[np.float64]
 
 
+_FELT = 1e-13
+"""Directions that a level feels by less than this share of its rows are felt by rounding alone."""
 _APART = 1e-6
 """Singular values that are a smaller share of the one before belong to directions that rows do not fix."""
 
@@ -35,7 +36,7 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
 
     H = GᵀQG + R is never formed: where weights or inertias are far apart its condition is 10¹⁷ and R is lost
     in its rounding. Instead, knot by knot, √R ∘ U is turned into directions that the level feels and those
-    that it does not (by less than RANK_TOLERANCE of the size of its rows: they are left to lower levels, and
+    that it does not (by less than _FELT of the size of its rows, which is rounding; and
     only bounds need them here); a QR factorisation of what is felt makes the rest of it.
 
     Args:
@@ -52,7 +53,7 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
         B = problem.B[j] / root_R
         basis = _free(np.vstack([each[j] for each in upper]) / root_R if upper else None, root_R, Z[j])
         left, singular, Vt = np.linalg.svd(B @ basis)
-        count = int((singular > RANK_TOLERANCE * np.sqrt((B * B).sum())).sum())
+        count = int((singular > _FELT * np.sqrt((B * B).sum())).sum())
         turned = basis @ Vt.T
         felt.append(turned[:, :count])
         unfelt.append(turned[:, count:])
