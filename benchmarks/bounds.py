@@ -14,6 +14,7 @@ more unsolved than the explicit one, a joint is more than 2 % faster, or a step 
 from __future__ import annotations
 
 import argparse
+import gc
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -82,6 +83,8 @@ def run(cell: Cell, route: Route, ticks: int) -> Found:
     home = None
     unsolved, of, speed, longest, spent = 0, 0, 0.0, 0.0, 0.0
     kernel = getattr(session.controller, "kernel", None)
+    gc.collect()
+    gc.freeze()  # what the collector finds is no part of a tick
     for tick in range(ticks):
         target = session.target(name) if name and cell.dragged else None
         if name and target is not None and tick % _EVERY == 0:

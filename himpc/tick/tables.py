@@ -15,7 +15,7 @@ from himpc.tick.kernel.solve import BUDGET
 if TYPE_CHECKING:
     from himpc.controllers.forms import LevelForm
 
-_ROUNDS = 24_000
+_ROUNDS = 12_000
 """Changes of active rows in a tick; the longest run is some milliseconds."""
 _ACCURACY = 1e-8
 """N·m: how far a point may be from the optimum, since H ≥ ρ."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class CompiledTick:
-    """The numbers of one controller with one set of settings.
+    """The numbers of one controller with one set of settings; `budget` is what one of its ticks may spend.
 
     Args:
         robot: gives the geometry.

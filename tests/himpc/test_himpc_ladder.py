@@ -248,7 +248,7 @@ def test_a_cycle_at_a_small_problem_ends_early() -> None:
     session.tick()
     kernel = getattr(session.controller, "kernel")  # noqa: B009  (other controllers have none)
     rounds = budget_of(kernel.arena) / (3 * 3 + 4.0 * kernel.arena.f["lower"].size)
-    assert rounds <= 24_000
+    assert rounds <= 12_000
     assert budget_of(kernel.arena) < 0.1 * BUDGET
 
 
