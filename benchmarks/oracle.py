@@ -27,7 +27,7 @@ from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.catalog import Route
 from himpc.limits import Rows, build_rows
-from himpc.limits.rows import least_slack
+from himpc.limits.braking import least_slack
 from himpc.prediction.joint import JointState
 from himpc.references import Outlook
 from himpc.tasks import KINDS
@@ -48,10 +48,9 @@ class Stack:
     seed: int
     problems: list[LevelProblem]
     rows: Rows
-    damping: LevelProblem
 
     def solve(self, route: Route) -> list[LevelSolution]:
-        return solve_cascade(self.problems, self.rows, {}, lambda: self.damping, route, "daqp")
+        return solve_cascade(self.problems, self.rows, {}, route, "daqp")
 
 
 @dataclass(frozen=True)
@@ -72,8 +71,7 @@ def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
     """A stack that can be solved; None if at this state no torque keeps to all limits."""
     rng = np.random.default_rng(seed)
     scene = scene_of(robot)
-    damping = "damping"
-    kinds = [kind for kind in KINDS if kind != damping]
+    kinds = [kind for kind in KINDS if kind != "damping"]
     levels = int(rng.integers(1, 5))
     stack = [
         entry(str(rng.choice(kinds)), scene)
@@ -106,7 +104,7 @@ def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
     rows = build_rows(state, plan.tau_0, np.array(own.M_bar), own.limits, plan.limits, own.horizon, own.T_s)
     if not problems or least_slack(rows).any():
         return None
-    return Stack(robot, seed, problems, rows, problems[-1])
+    return Stack(robot, seed, problems, rows)
 
 
 def judged(stack: Stack) -> list[Found] | None:
