@@ -219,9 +219,7 @@ def main() -> None:
     options = parser.parse_args()
     queues = [SimpleQueue[int]() for _ in range(options.clients)]
     threads = [
-        threading.Thread(
-            target=Viewer(options.link, options.tab, options.delay).watch, args=each, daemon=True
-        )
+        threading.Thread(target=Viewer(options.url, options.tab, options.delay).watch, args=each, daemon=True)
         for each in enumerate(queues)
     ]
     for thread in threads:
