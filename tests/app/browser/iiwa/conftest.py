@@ -15,6 +15,7 @@ from app.link.spares import Spares
 from app.server.server import PageServer
 from browsing.another import show_scene
 from browsing.hands import eventually, open_page, press, tab, wait_for_scene
+from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 
 CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
@@ -24,7 +25,7 @@ CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
 def server(fork_server: ForkServer | None) -> Iterator[PageServer]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("app.server.sessions.Spares", partial(Spares, lent=fork_server))
-        running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0)
+        running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0, own_files=Folder.at("."))
     yield running
     running.close()
 

@@ -288,8 +288,12 @@ def test_wrong_robots_are_one_sentence_and_uploads_work(page: Page, learner: Lea
     tab(page, "Robot")
     write(page, "File", "/nowhere/<b>robot</b>.urdf")
     press(page, "Load file")
-    expect(page.get_by_text("NOT LOADED")).to_be_visible()
+    expect(page.get_by_text("only files below the folder")).to_be_visible()
     expect(page.get_by_text("/nowhere/<b>robot</b>.urdf")).to_be_visible()  # text, not markup
+    write(page, "File", "<b>robot</b>.urdf")
+    press(page, "Load file")
+    expect(page.get_by_text("NOT LOADED")).to_be_visible()
+    expect(page.get_by_text("<b>robot</b>.urdf")).to_be_visible()
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot name='x'><link")
     _upload(page, broken)
