@@ -91,7 +91,7 @@ REGULAR = Step(
             "at most",
             0.5,
             fails_with=("controller=hqp",),
-            because="it comes through as well, but with a model that is 20 % light",
+            because="it comes through as well, but its model knows no friction",
         ),
         Claim(
             "From 1 s on it is as near with R = 10 as with R = 1000, within 10 %.",
@@ -145,7 +145,7 @@ BLAME = Step(
             "at most",
             0.5,
             fails_with=("controller=hqp",),
-            because="its model is wrong, smooth or not",
+            because="its model knows no friction, smooth or not",
         ),
     ),
     set=("smooth=true",),

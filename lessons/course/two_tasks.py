@@ -43,7 +43,7 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=("controller=osf",),
-            because="its model is 20 % light and knows no friction",
+            because="its model knows no friction",
         ),
         Claim(
             "Joint 1 stays within 1° of its reference.",

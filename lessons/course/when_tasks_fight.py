@@ -107,7 +107,7 @@ BETTER_MODEL = Step(
             "at most",
             0.3,
             fails_with=("controller=osf",),
-            because="its model is 20 % light",
+            because="its model knows no friction",
         ),
         Claim(
             "Then a joint passes twenty times its speed limit.",
@@ -162,7 +162,7 @@ EQUALITY = Step(
             "at most",
             105.0,
             fails_with=("controller=hqp",),
-            because="a one-step QP bounds torques, not speeds",
+            because="HQP has rows on torque only, none on speed",
         ),
         Claim(
             "From 2.5 s on joint 3 swings, through more than 150°/s from one way to the other.",
