@@ -351,8 +351,8 @@ COURSE_ROWS = (
     ),
     Intervention(
         "how-strict-is-strict/1",
-        "a tenth of a second later the next plan starts afresh, with level 1 solved again first, and takes back "
-        "what the one before had allowed itself further on",
+        "a tenth of a second later the next plan starts afresh, with level 1 solved again first, and takes "
+        "back what the one before had allowed itself further on",
         EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
     ),
     Intervention(
