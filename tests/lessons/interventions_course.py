@@ -169,6 +169,16 @@ COURSE_ROWS = (
         of("error/position", "mm", "range", 1.0), (100, 900), ("R=1e5",), (0, 5),
         of=("R=1e7",), on="stretched-out/1", seconds=4.0,
     ),
+    Intervention(
+        "further/stretched-out", "is why the ghost does as well: between the two lies no tuning",
+        of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1000",), (0.15, 0.3),
+        on="stretched-out/1", stays=True,
+    ),
+    Intervention(
+        "further/stretched-out", "is why the ghost does as well: between the two lies no tuning",
+        of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1e5",), (0.5, 50), of=("R=1000",),
+        on="stretched-out/1",
+    ),
     # ---------------------------------------- torque-has-a-limit
     Intervention(
         "torque-has-a-limit/0", "A bound that is not met does nothing",
@@ -322,6 +332,10 @@ COURSE_ROWS = (
         "the-model-is-wrong/2", "its model knows no friction",
         HAND, (1, 2), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
     ),
+    Intervention(
+        "further/the-model-is-wrong", "That is why most of OSF's error in *As identified* is friction's",
+        HAND, (1.0, 2.5), ("plant.friction=0",), (0, 0.3), on="the-model-is-wrong/1",
+    ),
     # ---------------------------------------- inside-the-qp
     Intervention(
         "inside-the-qp/3", "Time-delay estimation notices it at the next tick and corrects it",
@@ -433,16 +447,6 @@ COURSE_ROWS = (
     ),
     Intervention(
         "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (28, 50),
-    ),
-    # ---------------------------------------- deliveries
-    Intervention(
-        "deliveries/2", "a first level that saves effort lets the hand slip",
-        of("error/ee", "mm", "largest", 5.0, 14.0), (20, 60), ("Q=100",), (2, 8), of=("formulation=paper",),
-    ),
-    Intervention(
-        "deliveries/3", "with the authors' gain the hand needs seconds for the last stretch",
-        of("error/ee", "mm", "largest", 18.5, 19.5), (200, 500), ("gains=[5,2]",), (0, 1),
-        of=("controller=htidkc",),
     ),
     # ---------------------------------------- your-robot
     Intervention(
