@@ -51,7 +51,7 @@ INVERSE = Step(
             "at least",
             1e5,
             fails_with=("controller=himpc",),
-            because="nothing is inverted, and bounds are part of the problem",
+            because="nothing is inverted: without any bound it asks for no more than half",
         ),
     ),
     set=("controller=osf",),

@@ -13,6 +13,12 @@ X = of("error/position", "mm", "rms", column=0)
 TILT = of("error/orientation", "deg", "last")
 BASE_10 = of("error/base", "m", "mean", 10.0, 10.2)
 NO_FRICTION = ("plant.friction=0", "plant.damping=0")
+NO_BOUNDS = (
+    "limits.torque_scale=1000",
+    "plant.saturate=false",
+    "limits.velocity=false",
+    "limits.position=off",
+)
 JOINT_2 = of("q", "deg", column=1)
 INF = float("inf")
 EXACT = (
@@ -139,7 +145,31 @@ COURSE_ROWS = (
         "when-tasks-fight/2", "HQP has rows on torque only, none on speed",
         of("speed share", "%"), (300, 700), ("controller=hiqp",), (95, 105), of=("controller=hqp",),
     ),
+    Intervention(
+        "when-tasks-fight/0", "bounds are part of the problem",
+        of("tau_demand", "N·m"), (0, 3), NO_BOUNDS, (1000, INF), of=("controller=himpc",),
+    ),
+    Intervention(
+        "when-tasks-fight/1", "bounds are part of the problem",
+        of("v", "deg/s"), (50, 150), NO_BOUNDS, (2000, INF), of=("controller=himpc",),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "without those on speed and position every motor comes to its limit",
+        of("torque share", "%"), (15, 30), NO_BOUNDS[2:], (99, 101),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "the hand is off by 11 mm",
+        HAND, (0.7, 1), NO_BOUNDS[2:], (10.5, 11.5),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "without any bound the arm is lost as with a projection",
+        HAND, (0.7, 1), NO_BOUNDS, (1000, INF),
+    ),
     # ---------------------------------------- stretched-out
+    Intervention(
+        "stretched-out/0", "nothing is inverted: without any bound it asks for no more than half",
+        of("tau_demand", "N·m", column=1), (1, 2), NO_BOUNDS, (1, 2), of=("controller=himpc",), stays=True,
+    ),
     Intervention(
         "stretched-out/1", "its model knows no friction",
         of("error/position", "mm", "largest", 1.0), (2, 3.5), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
