@@ -103,6 +103,14 @@ COURSE_ROWS = (
         HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
     ),
     Intervention(
+        "two-tasks/2", "Without level 2 it errs by 0.2 mm", HAND, (0.5, 1.2), ("levels.q1.enabled=false",),
+        (0.15, 0.25),
+    ),
+    Intervention(
+        "two-tasks/2", "what joint 1 does the estimation has to follow",
+        HAND, (0.7, 1.0), ("M_bar_scale=2",), (0.3, 0.6),
+    ),
+    Intervention(
         "two-tasks/3", "But a $Q$ that small has to outweigh $R$ as well.",
         Q1, (8, 20), ("levels.q1.R=0.001", "levels.position.R=0.001"), (0, 0.1),
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-5"),
@@ -113,6 +121,11 @@ COURSE_ROWS = (
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-3"), on="two-tasks/3",
     ),
     # ---------------------------------------- swap-the-priorities
+    Intervention(
+        "swap-the-priorities/0", "Level 3 may only use torques that satisfy (33)",
+        of("error/posture", "deg", "last"), (31.5, 32.5),
+        ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 0.1),
+    ),
     Intervention(
         "swap-the-priorities/2", "It is not the bounds that keep it calm",
         of("v", "deg/s"), (85, 105), ("limits.velocity=false", "limits.torque=false", "limits.position=off"),
