@@ -154,7 +154,7 @@ STRICT = Step(
             because="equal weights trade the hand away",
         ),
         Claim(
-            "Joint 1 is off by more than 30°: it pays alone.",
+            "Joint 1 is off by more than 30°: it pays.",
             Measure(Q1),
             "at least",
             30.0,
