@@ -109,7 +109,7 @@ LITTLE = Step(
             "at most",
             1.5,
             fails_with=("lexicographic=cost",),
-            because="a bound on the sum (11) may all be spent at one knot",
+            because="with (11) in its place it is off by 3 mm",
         ),
         Claim(
             "By 6 s the base is as near as the arm allows, 35 cm from its target.",

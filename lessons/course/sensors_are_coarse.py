@@ -115,7 +115,7 @@ SQUARE = Step(
             "at most",
             0.5,
             fails_with=("controller=osf",),
-            because="its torque is smoother, and its model is wrong",
+            because="its torque is smoother, and its model knows no friction",
         ),
     ),
     set=(COARSE, "T_s=0.002"),

@@ -154,7 +154,7 @@ HEAVIER = Step(
             "at most",
             0.3,
             fails_with=("controller=hqp",),
-            because="its model is wrong by more now",
+            because="its model knows no friction",
         ),
     ),
     set=("plant.mass_scale=1.5", "plant.inertia_scale=1.5"),

@@ -55,7 +55,7 @@ PROJECTION = Step(
             "at least",
             10000.0,
             fails_with=("controller=himpc",),
-            because="nothing is inverted there, and the bounds are part of the problem",
+            because="nothing is inverted there, and bounds are part of the problem",
         ),
         Claim(
             "A joint turns at more than twenty times its speed limit: control is lost.",
@@ -107,7 +107,7 @@ BETTER_MODEL = Step(
             "at most",
             0.3,
             fails_with=("controller=osf",),
-            because="its model is 20 % light",
+            because="its model knows no friction",
         ),
         Claim(
             "Then a joint passes twenty times its speed limit.",
@@ -115,7 +115,7 @@ BETTER_MODEL = Step(
             "at least",
             2000.0,
             fails_with=("controller=himpc",),
-            because="no projected Jacobian, no inverse",
+            because="no inverse of a projection, and bounds are part of the problem",
         ),
     ),
     set=("controller=tdeosf",),
@@ -137,7 +137,10 @@ EQUALITY = Step(
     Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links
     2 and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge,
     to and fro with 94°/s, a little more than once a second, until joint 1 is called back. Strict is
-    not calm. But torque and speed stay within their bounds, and the hand on its circle.
+    not calm. But torque and speed stay within their bounds, and the hand on its circle. That is the
+    bounds' doing, too, not the equality's alone: without those on speed and position every motor comes
+    to its limit and the hand is off by 11 mm, and without any bound the arm is lost as with a
+    projection.
     """,
     claims=(
         Claim(
@@ -162,7 +165,7 @@ EQUALITY = Step(
             "at most",
             105.0,
             fails_with=("controller=hqp",),
-            because="a one-step QP bounds torques, not speeds",
+            because="HQP has rows on torque only, none on speed",
         ),
         Claim(
             "From 2.5 s on joint 3 swings, through more than 150°/s from one way to the other.",

@@ -9,6 +9,16 @@ Q1 = of("error/q1", "deg")
 RADIUS = of("gauge_radius")
 SPEED = of("speed share", "%")
 NO_LIMITS = ("limits.velocity=false", "limits.acceleration=false", "limits.jerk=false")
+X = of("error/position", "mm", "rms", column=0)
+TILT = of("error/orientation", "deg", "last")
+BASE_10 = of("error/base", "m", "mean", 10.0, 10.2)
+NO_FRICTION = ("plant.friction=0", "plant.damping=0")
+NO_BOUNDS = (
+    "limits.torque_scale=1000",
+    "plant.saturate=false",
+    "limits.velocity=false",
+    "limits.position=off",
+)
 JOINT_2 = of("q", "deg", column=1)
 INF = float("inf")
 EXACT = (
@@ -56,6 +66,11 @@ COURSE_ROWS = (
     Intervention(
         "one-task/3", "the hand hardly notices", HAND, (1.8, 2.8), ("damping=true",), (1.8, 2.8), stays=True,
     ),
+    Intervention(
+        "one-task/2", "The torque that holds the arm costs nothing",
+        of("error/position", "mm", "last"), (0, 0.01), ("levels.position.R=1000",), (0, 0.01),
+        on="no-model-needed/0", stays=True,
+    ),
     # ---------------------------------------- no-model-needed
     Intervention(
         "no-model-needed/0", "its springs hold that, so it sags by centimetres",
@@ -72,6 +87,10 @@ COURSE_ROWS = (
     ),
     # ---------------------------------------- two-tasks
     Intervention(
+        "two-tasks/0", "its model knows no friction",
+        HAND, (2.5, 3.2), NO_FRICTION, (0, 0.3), of=("controller=osf",),
+    ),
+    Intervention(
         "two-tasks/0", "They still do wherever a bound is in the way of one of them",
         HAND, (1, 3), ("controller=himpc",), (0, 0.2), of=("controller=weighted",), on="torque-has-a-limit/1",
     ),
@@ -84,6 +103,14 @@ COURSE_ROWS = (
         HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
     ),
     Intervention(
+        "two-tasks/2", "Without level 2 it errs by 0.2 mm", HAND, (0.5, 1.2), ("levels.q1.enabled=false",),
+        (0.15, 0.25),
+    ),
+    Intervention(
+        "two-tasks/2", "what joint 1 does the estimation has to follow",
+        HAND, (0.7, 1.0), ("M_bar_scale=2",), (0.3, 0.6),
+    ),
+    Intervention(
         "two-tasks/3", "But a $Q$ that small has to outweigh $R$ as well.",
         Q1, (8, 20), ("levels.q1.R=0.001", "levels.position.R=0.001"), (0, 0.1),
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-5"),
@@ -94,6 +121,11 @@ COURSE_ROWS = (
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-3"), on="two-tasks/3",
     ),
     # ---------------------------------------- swap-the-priorities
+    Intervention(
+        "swap-the-priorities/0", "Level 3 may only use torques that satisfy (33)",
+        of("error/posture", "deg", "last"), (31.5, 32.5),
+        ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 0.1),
+    ),
     Intervention(
         "swap-the-priorities/2", "It is not the bounds that keep it calm",
         of("v", "deg/s"), (85, 105), ("limits.velocity=false", "limits.torque=false", "limits.position=off"),
@@ -113,7 +145,52 @@ COURSE_ROWS = (
         of("torque share", "%"), (1e5, INF), ("plant.friction=0", *EXACT), (1e5, INF), of=("controller=osf",),
         stays=True,
     ),
+    Intervention(
+        "when-tasks-fight/1", "its model knows no friction",
+        of("error/position", "mm", "largest", 0.0, 1.0), (3, 4), NO_FRICTION, (0, 0.3),
+        of=("controller=osf",),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "Level 2 wants something it cannot have",
+        of("v", "deg/s", "range", 2.5, column=2), (170, 200), ("q1_amplitude_deg=20",), (40, 80),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "HQP has rows on torque only, none on speed",
+        of("speed share", "%"), (300, 700), ("controller=hiqp",), (95, 105), of=("controller=hqp",),
+    ),
+    Intervention(
+        "when-tasks-fight/0", "bounds are part of the problem",
+        of("tau_demand", "N·m"), (0, 3), NO_BOUNDS, (1000, INF), of=("controller=himpc",),
+    ),
+    Intervention(
+        "when-tasks-fight/1", "bounds are part of the problem",
+        of("v", "deg/s"), (50, 150), NO_BOUNDS, (2000, INF), of=("controller=himpc",),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "without those on speed and position every motor comes to its limit",
+        of("torque share", "%"), (15, 30), NO_BOUNDS[2:], (99, 101),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "the hand is off by 11 mm",
+        HAND, (0.7, 1), NO_BOUNDS[2:], (10.5, 11.5),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "without any bound the arm is lost as with a projection",
+        HAND, (0.7, 1), NO_BOUNDS, (1000, INF),
+    ),
     # ---------------------------------------- stretched-out
+    Intervention(
+        "stretched-out/0", "nothing is inverted: without any bound it asks for no more than half",
+        of("tau_demand", "N·m", column=1), (1, 2), NO_BOUNDS, (1, 2), of=("controller=himpc",), stays=True,
+    ),
+    Intervention(
+        "stretched-out/1", "its model knows no friction",
+        of("error/position", "mm", "largest", 1.0), (2, 3.5), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
+    ),
+    Intervention(
+        "stretched-out/2", "its model knows no friction, smooth or not",
+        HAND, (1.5, 2.5), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
+    ),
     Intervention(
         "stretched-out/0", "for a tenth of a second the demand is small",
         of("torque share", "%", "largest", 0.0, 0.1), (1e6, INF), ("smooth=true",), (0, 1),
@@ -134,6 +211,16 @@ COURSE_ROWS = (
         "further/stretched-out", "the run with $R = 10^7$ swings by decimetres",
         of("error/position", "mm", "range", 1.0), (100, 900), ("R=1e5",), (0, 5),
         of=("R=1e7",), on="stretched-out/1", seconds=4.0,
+    ),
+    Intervention(
+        "further/stretched-out", "is why the ghost does as well: between the two lies no tuning",
+        of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1000",), (0.15, 0.3),
+        on="stretched-out/1", stays=True,
+    ),
+    Intervention(
+        "further/stretched-out", "is why the ghost does as well: between the two lies no tuning",
+        of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1e5",), (0.5, 50), of=("R=1000",),
+        on="stretched-out/1",
     ),
     # ---------------------------------------- torque-has-a-limit
     Intervention(
@@ -160,6 +247,11 @@ COURSE_ROWS = (
         "torque-has-a-limit/2", "16 mm instead of 10, since level 2 has moved joint 1 meanwhile",
         HAND, (15.5, 17), ("levels.q1.enabled=false",), (9.5, 11), of=("q1_amplitude_deg=-30",),
     ),
+    Intervention(
+        "torque-has-a-limit/0", "that is too little for level 1 alone",
+        HAND, (0.5, 30), ("levels.q1.enabled=false",), (0.5, 30), of=("limits.torque_scale=0.03",),
+        stays=True,
+    ),
     # ---------------------------------------- stopping-takes-distance
     Intervention(
         "stopping-takes-distance/0", "overruns its range by 0.6°",
@@ -176,7 +268,22 @@ COURSE_ROWS = (
         JOINT_2, (150.5, 150.8), ("limits.torque_scale=3", "plant.saturate=false"), (150.5, 150.8),
         stays=True,
     ),
+    Intervention(
+        "stopping-takes-distance/2", "The price is time: the last degrees are crept",
+        of("q", "deg", "mean", 1.6, 1.7, column=1), (147.5, 148.7), ("limits.velocity_approach=0",),
+        (149.5, 149.7),
+    ),
     # ---------------------------------------- how-far-ahead
+    Intervention(
+        "how-far-ahead/0", "a longer horizon sees the ends of the joints' ranges sooner",
+        X, (0.56, 0.57), ("horizon=30",), (0.528, 0.538), of=("horizon=5",), on="iiwa14-circle-paper",
+        seconds=4.0,
+    ),
+    Intervention(
+        "how-far-ahead/0", "a longer horizon sees the ends of the joints' ranges sooner",
+        X, (0.47, 0.475), ("horizon=30",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
+        on="iiwa14-circle-paper", seconds=4.0, stays=True,
+    ),
     Intervention(
         "how-far-ahead/0", "Twice the $\\bar M$ halves the error; no horizon does that.",
         of("error/position", "mm", "rms"), (0.75, 1.0), ("M_bar_scale=2",), (0.3, 0.55),
@@ -216,6 +323,19 @@ COURSE_ROWS = (
         "sensors-are-coarse/1", "again the error grows by little more than half",
         HAND, (0.088, 0.102), ("M_bar_scale=0.5",), (0.138, 0.165), of=("T_s=0.001",),
     ),
+    Intervention(
+        "sensors-are-coarse/0", "there the noise alone uses up the torque",
+        HAND, (20, 200), ("limits.torque_scale=10", "plant.saturate=false"), (0, 0.5),
+        of=("plant.encoder_resolution_deg=0.02",),
+    ),
+    Intervention(
+        "sensors-are-coarse/1", "ten times the period is too slow for the circle",
+        HAND, (0.5, 0.7), ("plant.encoder_resolution_deg=0",), (0.5, 0.7), of=("T_s=0.01",), stays=True,
+    ),
+    Intervention(
+        "sensors-are-coarse/1", "its torque is smoother, and its model knows no friction",
+        HAND, (1, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",),
+    ),
     # ---------------------------------------- the-model-is-wrong
     Intervention(
         "the-model-is-wrong/0", "time-delay estimation only what has happened",
@@ -251,7 +371,32 @@ COURSE_ROWS = (
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
         of=("M_bar_scale=4",), seconds=0.5,
     ),
+    Intervention(
+        "the-model-is-wrong/2", "its model knows no friction",
+        HAND, (1, 2), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
+    ),
+    Intervention(
+        "further/the-model-is-wrong", "That is why most of OSF's error in *As identified* is friction's",
+        HAND, (1.0, 2.5), ("plant.friction=0",), (0, 0.3), on="the-model-is-wrong/1",
+    ),
+    # ---------------------------------------- inside-the-qp
+    Intervention(
+        "inside-the-qp/3", "Time-delay estimation notices it at the next tick and corrects it",
+        of("error/reach", "mm", "rms", 1.0), (0, 0.05), ("controller=hqp",), (0.5, 2),
+    ),
+    Intervention(
+        "inside-the-qp/3", "over tens of ticks",
+        of("gauge_radius", "", "mean"), (0.9, 0.92), ("M_bar_scale=2",), (0.82, 0.84),
+    ),
     # ---------------------------------------- first-hold-then-reach
+    Intervention(
+        "first-hold-then-reach/0", "priorities say who may be disturbed meanwhile",
+        EE, (0, 0.1), ("order=base,ee",), (100, 140),
+    ),
+    Intervention(
+        "first-hold-then-reach/2", "the hand is left behind by exactly these 1.63 m",
+        of("error/ee", "m", "mean", 8.5), (1.625, 1.635), ("levels.base.enabled=false",), (0, 0.01),
+    ),
     Intervention(
         "first-hold-then-reach/1", "it is where no plan is left that makes $\\mathcal J_2$ smaller",
         of("error/base", "m", "mean", 7.0), (1.55, 1.7), ("order=base,ee",), (0, 0.05),
@@ -262,7 +407,9 @@ COURSE_ROWS = (
         of("way of the base", "m"), (0, 0.01), ("delta_m=0.001",), (1.0, 3.0),
     ),
     Intervention(
-        "how-strict-is-strict/1", "a tenth of a second later the next plan starts afresh",
+        "how-strict-is-strict/1",
+        "a tenth of a second later the next plan starts afresh, with level 1 solved again first, and takes "
+        "back what the one before had allowed itself further on",
         EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
     ),
     Intervention(
@@ -303,6 +450,22 @@ COURSE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[0.5,2]",), (0, 0.01),
     ),
     Intervention(
+        "seeing-ahead/2", "it is as quick as the limits let it be",
+        BASE_10, (0, 0.06), ("limits.velocity_scale=0.5",), (0.4, 0.6), of=("controller=htmpc_wpt",),
+    ),
+    Intervention(
+        "seeing-ahead/2", "later with half the speed or a third of the acceleration",
+        BASE_10, (0, 0.06), ("limits.acceleration_scale=0.33",), (0.15, 0.25), of=("controller=htmpc_wpt",),
+    ),
+    Intervention(
+        "seeing-ahead/2", "where HTIDKC comes home as late as before",
+        BASE_10, (0.85, 0.95), ("limits.velocity_scale=0.5",), (0.85, 0.95), stays=True,
+    ),
+    Intervention(
+        "seeing-ahead/2", "where HTIDKC comes home as late as before",
+        BASE_10, (0.85, 0.95), ("limits.acceleration_scale=0.33",), (0.85, 0.95), stays=True,
+    ),
+    Intervention(
         "further/seeing-ahead", "With a thousandth of this $\\rho$ the difference goes.",
         of("error/base", "m", "mean", 15.9), (0.15, 0.17), ("rho=1e-5",), (0.13, 0.14), on="seeing-ahead/2",
     ),
@@ -329,6 +492,20 @@ COURSE_ROWS = (
         "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (28, 50),
     ),
     # ---------------------------------------- your-robot
+    Intervention(
+        "your-robot/0", "the orientation as far as five joints can",
+        TILT, (11, 12), ("levels.orientation.enabled=false",), (17, 20),
+    ),
+    Intervention(
+        "your-robot/0", "the posture goes without",
+        of("error/posture", "deg", "last"), (20, 30),
+        ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 1),
+    ),
+    Intervention(
+        "your-robot/0", "A weighted sum gives up the position instead",
+        of("error/position", "mm", "last"), (90, 120), ("controller=himpc",), (0, 0.2),
+        of=("controller=weighted",),
+    ),
     Intervention(
         "your-robot/1", "what it does not know of the weight, the springs must carry",
         of("error/position", "mm", "last"), (10, 100),

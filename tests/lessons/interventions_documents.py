@@ -11,6 +11,14 @@ RT2 = partial(Intervention, on="planar3-conflict", seconds=4.0)
 RT1 = partial(Intervention, on="planar3-circle", seconds=8.0)
 RT4 = partial(Intervention, on="iiwa14-circle-paper", seconds=2.0)
 STRICT = partial(Intervention, on="how-strict-is-strict/2")
+SQUARE = partial(Intervention, on="ridgeback-ur10-square", seconds=16.0)
+X = of("error/position", "mm", "rms", column=0)
+O_Z = of("error/orientation", "deg", "rms")
+ROUGH = of("delta_tau", "N·m", "rms", 1.0)
+ENCODER = "plant.encoder_resolution_deg=0.00125"
+CHATTER = ("plant.encoder_resolution_deg=0.005", "limits.position=off")
+DIAGONAL = "plant.diagonal_scale=[0.8,0.8,1.2,1.2,0.8,1.2,1.2]"
+INF = float("inf")
 FIVE = ("M_bar=[0.1,0.21,0.033,0.042,0.005,0.005,0.0015]",)
 LIGHT = ("plant.mass_scale=[1,1,1,1,0.3,0.3,0.3]", "plant.inertia_scale=[1,1,1,1,0.2,0.2,0.2]")
 
@@ -81,6 +89,111 @@ DOCUMENT_ROWS = (
     RT1(
         "disagreements", "most of its error is friction's",
         HAND_RMS, (2.2, 3.6), ("plant.friction=0", "plant.damping=0"), (0, 1.0), of=("controller=osf",),
+    ),
+    # ---------------------------------------- a disturbed inertia
+    RT4(
+        "disagreements", "with M̄ altered by the same factors most of what changed in orientation goes",
+        O_Z, (0.75, 0.87), ("M_bar=[0.08,0.168,0.0396,0.0504,0.0008,0.0012,0.00036]",), (1.0, 1.1),
+        of=(DIAGONAL,),
+    ),
+    RT4(
+        "disagreements", "HIMPC's errors are the same with a nominal inertia a fifth larger",
+        X, (0.535, 0.545), ("nominal.mass_scale=1.2", "nominal.inertia_scale=1.2"), (0.535, 0.545),
+        stays=True,
+    ),
+    RT4(
+        "disagreements", "hardly change with that of link 3 alone",
+        X, (0.535, 0.545), ("plant.inertia_scale=[1,1,1.2,1,1,1,1]",), (0.535, 0.545), stays=True,
+    ),
+    # ---------------------------------------- horizon
+    RT4(
+        "disagreements", "ours only where joints meet their position limits",
+        X, (0.47, 0.475), ("horizon=30",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
+        seconds=4.0, stays=True,
+    ),
+    RT4(
+        "disagreements", "The first increment already removes nearly all of e",
+        X, (1.2, 1.6), ("horizon=20",), (0.6, 0.8),
+        of=("R_on=acceleration", "limits.position=viability", "horizon=1"), seconds=1.2,
+    ),
+    RT4(
+        "disagreements", "The first increment already removes nearly all of e",
+        X, (0.65, 0.72), ("horizon=20",), (0.65, 0.72), of=("horizon=1",), seconds=1.2, stays=True,
+    ),
+    # ---------------------------------------- TDEOSF and HIMPC
+    RT1(
+        "disagreements", "such a controller is TDEOSF",
+        HAND_RMS, (0.02, 0.05), ("controller=tdeosf",), (0.02, 0.05), seconds=3.0, stays=True,
+    ),
+    RT1(
+        "disagreements", "With the printed weights a tick of HIMPC leaves",
+        HAND_RMS, (0.02, 0.05), ("R=1e5",), (0.055, 0.1), seconds=3.0,
+    ),
+    # ---------------------------------------- smoothness, chatter
+    RT1(
+        "disagreements", "Controllers that remove nearly all of e in a tick answer noise alike",
+        ROUGH, (0.85, 1.05), ("R_on=acceleration", "horizon=1"), (0.6, 0.8), of=(ENCODER,), seconds=3.0,
+    ),
+    RT1(
+        "disagreements", "Controllers that remove nearly all of e in a tick answer noise alike",
+        ROUGH, (0.85, 1.05), ("controller=tdeosf",), (0.85, 1.05), of=(ENCODER,), seconds=3.0, stays=True,
+    ),
+    *(
+        RT4(
+            "disagreements", "S goes with M̄ δ/T_s²",
+            of("delta_tau", "N·m", "rms"), (13, 17), (without,), gone, of=CHATTER, seconds=1.0,
+        )
+        for without, gone in (
+            ("M_bar_scale=0.5", (6.5, 8.5)),
+            ("plant.encoder_resolution_deg=0.0025", (6.5, 8.5)),
+            ("T_s=0.002", (3.2, 4.3)),
+        )
+    ),
+    # ---------------------------------------- RT3
+    *(
+        Intervention(
+            at, says, of("torque share", "%"), (1e6, INF), ("controller=hqp",), (0, 20),
+            of=("controller=osf",), on="planar3-singular", seconds=1.0,
+        )
+        for at, says in (
+            ("disagreements", "ours tracks accelerations and inverts nothing, so there is nothing to fail"),
+            ("results", "ours never inverts J M⁻¹Jᵀ"),
+        )
+    ),
+    # ---------------------------------------- limits
+    *(
+        Intervention(
+            "house", "Time-delay estimation needs tens of ticks to stop an acceleration",
+            of("speed share", "%"), there, without, gone, of=("limits.velocity_approach=0",),
+            on="iiwa14-circle", seconds=2.0,
+        )
+        for there, without, gone in (
+            ((116.5, 117.5), ("limits.velocity_approach=15",), (99, 100.5)),
+            ((116.5, 117.5), ("M_bar_scale=2",), (104, 107)),
+        )
+    ),
+    Intervention(
+        "results", "with the data sheet's velocity limits (`iiwa14-circle`) joint 1 cannot swing as asked",
+        of("error/q1", "deg"), (80, 100), ("limits.velocity=false",), (0, 30), on="iiwa14-circle",
+        seconds=2.0,
+    ),
+    Intervention(
+        "results", "Dry friction of 5 N·m at every joint costs 1.8 mm",
+        of("error/position", "mm", "rms", 1.0), (2.0, 2.15), ("plant.friction=0",), (0.2, 0.3),
+        of=("M_bar_adapt=true", "plant.payload_kg=2", "plant.friction=5"), on="iiwa14-circle", seconds=3.0,
+    ),
+    # ---------------------------------------- formulation C
+    SQUARE(
+        "disagreements", "upper levels are charged for leaving their shifted previous plan, not for effort",
+        of("error/ee", "mm", "mean"), (0, 0.1), ("formulation=paper",), (8, 15),
+    ),
+    SQUARE(
+        "disagreements", "with a thousandth of the charge for speed it errs less than half as much",
+        of("error/ee", "mm", "mean"), (8, 15), ("velocity_effort=0.001",), (3, 5), of=("formulation=paper",),
+    ),
+    SQUARE(
+        "disagreements", "C is not the paper's formulation: in A the base comes home later",
+        of("error/base", "m", "mean", 8.0), (0.05, 0.08), ("formulation=paper",), (0.22, 0.32),
     ),
     # ---------------------------------------- formulation A
     STRICT(

@@ -221,6 +221,14 @@ QUOTED = (
         1.635,
     ),
     Quoted("how-strict-is-strict/1", "Less than a tenth of it is used", _of(EE), 0.1, 1.0),
+    Quoted(
+        "how-strict-is-strict/1",
+        "with (11) in its place it is off by 3 mm",
+        _of(EE),
+        2.5,
+        3.5,
+        ("lexicographic=cost",),
+    ),
     Quoted("how-strict-is-strict/1", "35 cm from its target", _of(BASE, "mean", 6.0, 7.0), 0.345, 0.355),
     Quoted(
         "how-strict-is-strict/2",
@@ -233,6 +241,7 @@ QUOTED = (
     Quoted("seeing-ahead/0", "about a quarter of the ghost's", _ratio(BASE, "mean", after=8.0), 0.2, 0.3),
     Quoted("seeing-ahead/1", "is off by 3 cm all the same", _of(EE), 25, 35),
     Quoted("seeing-ahead/2", "16 cm from home at the end", _of(BASE, "mean", after=15.9), 0.155, 0.165),
+    Quoted("seeing-ahead/2", "the plan keeps the hand within a millimetre", _of(EE), 0.1, 1.0, None),
     Quoted("seeing-ahead/3", "the hand pays with 2 cm", _of(EE), 15, 25),
     Quoted(
         "deliveries/0", "Less than two thirds of the time", _ratio(Signal("time at work", "s")), 0.55, 0.667

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -21,9 +22,11 @@ from himpc.controllers import null_space_control
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
 from lessons.recording.run import run
+from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
+from robots import Plant
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = {
@@ -34,6 +37,7 @@ DOCUMENTS = {
     "README": "README.md",
 }
 """Names of documents in `Intervention.at`."""
+COMPARED = ("himpc", "tdeosf", "hiqp")
 ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
 
 
@@ -101,6 +105,51 @@ def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
     room = 1e-5 * 4.0  # N·m: the motors give 4
     price = (cost(231, -1e-5) - cost(231, 1e-5)) / (2.0 * room)
     assert price == pytest.approx(2.0 * bound.multiplier, rel=1e-4)
+    assert "by twice the bound's multiplier, per N·m" in told("inside-the-qp/2")
+
+
+def test_what_is_clipped_lies_on_nobodys_line() -> None:
+    """*Inside the QP*: OSF's torque, clipped joint by joint, accelerates level 1 otherwise."""
+    assert "what is clipped no longer lies on anybody's line" in told("inside-the-qp/2")
+    scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).but("controller=osf").prepared()
+    found = run(scene)
+    tau, limit = found["tau_demand"], 0.25 * np.array(scene.robot.tau_limit)
+    worst = int(np.argmax(np.abs(tau / limit).max(axis=1)))
+    plant = Plant(scene.robot, scene.settings.plant)
+    plant.reset(found["q"][worst])
+
+    def leak(room: float) -> float:
+        """m/s² along x, level 1's direction."""
+        lost = np.clip(tau[worst], -room * limit, room * limit) - tau[worst]
+        return abs(float((plant.jacobian(scene.robot.tip) @ np.linalg.solve(plant.mass_matrix(), lost))[0]))
+
+    assert leak(1.0) > 0.1
+    assert leak(1.4) < 1e-12  # nothing is clipped
+
+
+@pytest.mark.parametrize(("K_p", "period"), [(100.0, 0.628), (400.0, 0.314)])
+def test_a_hand_without_a_damper_swings_like_the_wish(K_p: float, period: float) -> None:
+    """*One task*: ω = √K_P; with another K_P the same arm swings otherwise."""
+    assert "thus a period of 0.63 s" in told("one-task/1")
+    spec = load_lesson("one-task").run_of(step_of("one-task/1")).but(f"tasks.position.K_p={K_p}")
+    found = run(replace(spec, duration=3.0).prepared())
+    x, t = found["error/position"][:, 0], found["t"].ravel()
+    crossed = ((x[1:] > 0) != (x[:-1] > 0)) & (t[1:] > 0.5)
+    half = np.diff(t[1:][crossed])
+    assert 2.0 * float(np.mean(half)) == pytest.approx(period, rel=0.02)
+
+
+def test_the_average_cost_of_a_noisy_run_is_noise() -> None:
+    """The page of disagreements: (41) weighs a measured acceleration, whose noise is alike for all three."""
+    assert "whose noise is nearly the same for all three" in told("disagreements")
+
+    def costs(*more: str) -> list[float]:
+        specs = [RunSpec("planar3-circle", duration=1.0).but(f"controller={c}", *more) for c in COMPARED]
+        return [summary(run(spec.prepared()))["average_cost"][0] for spec in specs]
+
+    noisy, ideal = costs("plant.encoder_resolution_deg=0.00125"), costs()
+    assert max(noisy) < 1.15 * min(noisy)
+    assert min(noisy) > 1e4 * max(ideal)
 
 
 def test_TDEOSF_gets_through_without_leaving_out_singular_values(monkeypatch: pytest.MonkeyPatch) -> None:
