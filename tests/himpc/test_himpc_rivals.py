@@ -296,7 +296,7 @@ def test_a_failing_qp_is_data(monkeypatch: pytest.MonkeyPatch) -> None:
     at = moment(4)
     plan = make_controller("hqp", robot(), settings()).step(at.q, 40.0 * at.v, at.previews)
     assert plan.unsolved == 3
-    assert [level.rung for level in plan.levels] == ["damping", "inherit", "inherit"]
+    assert [level.rung for level in plan.levels] == ["brake", "inherit", "inherit"]
     assert {level.status for level in plan.levels} == {"no idea"}
     assert (np.abs(plan.tau) <= robot().tau_limit).all()
     assert (np.abs(plan.tau) == robot().tau_limit).any()

@@ -138,7 +138,7 @@ def test_printed_position_rows_fail_honestly() -> None:
     solver = result["solver"]
     assert solver["unsolved"] > 0
     assert sum(solver["fallbacks"].values()) == solver["unsolved"]
-    assert set(solver["fallbacks"]) <= {"soften", "previous", "inherit", "damping", "hold"}
+    assert set(solver["fallbacks"]) <= {"soften", "feasible", "previous", "inherit", "brake", "hold"}
     assert solver["max_kkt_residual"] <= 1e-6
     assert result["finite"] is True
     assert result["limits"]["torque"]["max_ratio"] <= 1.000
