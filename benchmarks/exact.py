@@ -114,10 +114,10 @@ class _Corrector:
         """(v, e, λ) for (r₁, r₂, r₃)."""
         d, k = self._A.shape[1], len(self._A)
         r1, r2, r3 = right[:d], right[d : d + k], right[d + k :]
-        v = self._held @ solve_triangular(self._R, r3, trans="T") if self._count else np.zeros(d)
+        v = self._held @ solve_triangular(self._R, r3, trans=1) if self._count else np.zeros(d)
         if self._free.shape[1]:
             rest = self._free.T @ (r1 - v - self._A.T @ (self._A @ v - r2))
-            v = v + self._free @ solve_triangular(self._F, solve_triangular(self._F, rest, trans="T"))
+            v = v + self._free @ solve_triangular(self._F, solve_triangular(self._F, rest, trans=1))
         e = self._A @ v - r2
         press = self._held.T @ (r1 - v - self._A.T @ e)
         return np.concatenate([v, e, solve_triangular(self._R, press) if self._count else press])

@@ -13,7 +13,7 @@ from himpc.cascade.level import ActiveRows, LevelProblem, Point
 from himpc.cascade.polish import descended, polished
 from himpc.cascade.white import WhiteLevel, white
 from himpc.limits.rows import Rows
-from himpc.qp import QPSolution, Solver, solve_qp
+from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
 
 Array = NDArray[np.float64]
 
@@ -53,8 +53,9 @@ def solve_explicit(
         iterations: that one attempt may take, see `solve_qp`; None: as many as it likes.
 
     Returns:
-        the optimum, or None if no solver gave a point that is within `KKT_TOLERANCE` of its optimality
-        conditions: in N·m for every increment, or as a share of it where it is larger than 1 N·m.
+        the optimum, or None if a row is missed that nothing free can move, or if no solver gave a point that
+        is within `KKT_TOLERANCE` of its optimality conditions: in N·m for every increment, or as a share of
+        it where it is larger than 1 N·m.
     """
     n = U_above.shape[1]
     level = white(problem, U_above, [B for B, _ in above], Z)
@@ -68,6 +69,8 @@ def solve_explicit(
     length = np.sqrt(np.einsum("ij,ij->i", A, A))
     reach = every @ np.tile(1.0 / np.sqrt(problem.R), problem.knots)
     kept = np.flatnonzero((length > _NOISE * reach) & (np.isfinite(lower) | np.isfinite(upper)))
+    if (np.delete(np.maximum(lower - at, at - upper), kept) > KKT_TOLERANCE).any():
+        return None  # nothing that is free moves such a row
     length = length[kept]
     A, low, high = A[kept] / length[:, None], (lower - at)[kept] / length, (upper - at)[kept] / length
     found = solve_qp(np.eye(level.c.size), level.c, A, low, high, solver, iterations)

@@ -45,9 +45,9 @@ PRINTED = Step(
     why=r"""
     To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². The motor can do less than
     60, and the rows on speed let it change by even less, 41. So the problem has no solution, a fallback
-    takes over, the torque hits its limit and the joint overruns its range by 0.6°. Three times the
-    torque alone changes nothing; with the rows on speed off as well only 0.1° is left. The row is true
-    to the letter and comes too late.
+    takes over, the torque hits its limit and the joint overruns its range by 0.6°. With three times the
+    torque 0.2° is left; with the rows on speed off as well only 0.1° is left. The row is true to the
+    letter and comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",

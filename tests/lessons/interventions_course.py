@@ -264,9 +264,8 @@ COURSE_ROWS = (
         of=("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"),
     ),
     Intervention(
-        "stopping-takes-distance/0", "Three times the torque alone changes nothing",
-        JOINT_2, (150.5, 150.8), ("limits.torque_scale=3", "plant.saturate=false"), (150.5, 150.8),
-        stays=True,
+        "stopping-takes-distance/0", "With three times the torque 0.2° is left",
+        JOINT_2, (150.55, 150.75), ("limits.torque_scale=3", "plant.saturate=false"), (150.15, 150.25),
     ),
     Intervention(
         "stopping-takes-distance/2", "The price is time: the last degrees are crept",
