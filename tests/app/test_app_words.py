@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
@@ -321,7 +322,8 @@ def test_a_control_that_goes_before_it_is_written_is_no_news() -> None:
     bindings.bind(gone, lambda settings: settings, lambda _: None)  # pyright: ignore[reportArgumentType]
     bindings.refresh(2)
     loop.call_soon(loop.stop)
-    loop.run_forever()
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+        elsewhere.submit(loop.run_forever).result()
     loop.close()
     assert heard == []
 
