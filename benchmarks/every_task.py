@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.rotation import quaternion
 from himpc.tasks import KINDS, Damping, Joints, Posture, Task
 from lessons.events import MoveTarget

@@ -21,7 +21,7 @@ import time
 
 LISTS = (["--help"], ["scenes"], ["controllers"], ["robots"], ["lessons"])
 PAGES = ([], ["--lesson", "one-task"], ["--scene", "hold", "--urdf", "planar3"])
-COMPILE = "from himpc.cascade.compiling import compile_all; compile_all(lambda *_: None)"
+COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lambda *_: None)"
 
 
 def cost(command: list[str], **environment: str) -> float:

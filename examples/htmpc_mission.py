@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from himpc import HTMPC, FramePosition, HTMPCSettings, Level
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.missions import Go, MissionTask, Progress, advanced, where
 from himpc.references import previews
 from robots import VelocityPlant, load_robot

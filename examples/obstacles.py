@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from himpc import HTMPC, FramePosition, HTMPCSettings, Level
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.missions import where
 from himpc.references import Hold, previews
 from robots import Ball, Box, VelocityPlant, load_robot

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.tasks import Damping, Task
 from himpc.tasks.axes import AXES, OnAxes
 from himpc.tasks.task import GAINS

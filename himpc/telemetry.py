@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import RUNGS, ActiveRows
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import Rows
 from himpc.plan import Plan
 from himpc.references import Preview

@@ -73,7 +73,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 _ROOT = Path(__file__).parents[1]
-_COMPILE = "from himpc.cascade.compiling import compile_all; compile_all(lambda *_: None)"
+_COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lambda *_: None)"
 _COLD = pytest.StashKey[tuple[str, str]]()
 
 

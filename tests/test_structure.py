@@ -20,8 +20,8 @@ DOORS = {
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
     "numba": (
-        *("himpc/cascade/compiled.py", "himpc/cascade/keeping.py"),
-        *("himpc/cascade/loading.py", "himpc/cascade/pieces.py"),
+        *("himpc/compilation/compiled.py", "himpc/compilation/keeping.py"),
+        *("himpc/compilation/loading.py", "himpc/compilation/pieces.py"),
         "himpc/tick/kernel/views.py",
     ),
     "casadi": ("himpc/qp.py",),

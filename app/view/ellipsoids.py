@@ -7,7 +7,7 @@ import viser
 import viser.transforms as vtf
 
 from app.html.palette import BOUND, RGB
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.stack import Stack
 from lessons.geometry.ellipsoids import Ellipsoid, ellipsoids
 from robots import Robot

@@ -9,7 +9,7 @@ from app.link.wire import Wire
 
 def warm(say: Callable[[str], None]) -> None:
     """Loads all that simulations need. `say` is told what is being done, for a page that waits."""
-    from himpc.cascade.compiling import compile_all
+    from himpc.compilation.compiling import compile_all
 
     compile_all(lambda ready, of: say(f"compiling the controllers, this once: {ready} of {of} functions"))
     from app.worker.main import rehearse

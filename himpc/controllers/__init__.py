@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from himpc.controllers.make import make_controller
     from himpc.controllers.nhimpc import NHIMPC
     from himpc.controllers.osf import OSF
-    from himpc.controllers.settings import Settings
     from himpc.controllers.tdeosf import TDEOSF
     from himpc.controllers.weighted import Weighted
+    from himpc.formulation.settings import Settings
 
 __all__ = [
     "CONTROLLERS",
@@ -40,7 +40,7 @@ __getattr__ = lazily(
         "HQP": "hqp",
         "NHIMPC": "nhimpc",
         "OSF": "osf",
-        "Settings": "settings",
+        "Settings": ".formulation.settings",
         "TDEOSF": "tdeosf",
         "Weighted": "weighted",
         "make_controller": "make",

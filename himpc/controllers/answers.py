@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import NO_ROWS, LevelSolution, Rung
-from himpc.controllers.forms import usable
 from himpc.controllers.view import LevelView
+from himpc.formulation.forms import usable
 from himpc.limits import Rows
 
 Array = NDArray[np.float64]

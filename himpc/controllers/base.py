@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
 from himpc.limits import Limits, in_force
 from robots import Robot
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
 from himpc.plan import Plan
 from himpc.references import Preview
 

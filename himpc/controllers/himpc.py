@@ -9,15 +9,15 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.adaptation import Adaptation, LoadModel, adapted
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
-from himpc.configuration import Configuration
+from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
-from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
-from himpc.controllers.memory import Memory
 from himpc.controllers.period import Found, Tick
-from himpc.controllers.settings import Settings
+from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
+from himpc.formulation.memory import Memory
+from himpc.formulation.settings import Settings
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.controllers.himpc import HIMPC
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
 from himpc.plan import Plan
 from himpc.references import Preview
 from robots import Robot

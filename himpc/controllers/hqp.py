@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from himpc.cascade.level import NO_ROWS, ActiveRows, LevelSolution, Rung
 from himpc.controllers.null_space_control import split
 from himpc.controllers.one_step import Demand, Law, OneStepController, leak
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
 from himpc.limits import Rows
 from himpc.qp import solve_qp
 from robots import NominalModel

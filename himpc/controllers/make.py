@@ -13,9 +13,9 @@ from himpc.controllers.hqp import HQP
 from himpc.controllers.nhimpc import NHIMPC
 from himpc.controllers.null_space_control import DAMPED
 from himpc.controllers.osf import OSF
-from himpc.controllers.settings import Settings
 from himpc.controllers.tdeosf import TDEOSF
 from himpc.controllers.weighted import Weighted
+from himpc.formulation.settings import Settings
 from robots import Robot
 from robots.errors import unknown_name
 

@@ -7,7 +7,7 @@ import numpy as np
 from himpc.cascade.level import LevelSolution
 from himpc.controllers.himpc import HIMPC
 from himpc.controllers.period import Found, Tick
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 from robots import Robot

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import NO_ROWS, LevelSolution
-from himpc.configuration import Configuration
 from himpc.controllers.answers import no_rows
 from himpc.controllers.base import TorqueController
-from himpc.controllers.forms import LevelForm, StackForm, measure, prepare, usable
-from himpc.controllers.settings import Settings
+from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
+from himpc.formulation.settings import Settings
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview

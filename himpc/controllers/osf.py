@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from himpc.controllers.null_space_control import projected_law
 from himpc.controllers.one_step import Demand, Law, OneStepController
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
 from robots import NominalModel, Robot
 
 Array = NDArray[np.float64]

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.controllers.answers import OwnFault, checked, next_cost, no_rows, solution
 from himpc.controllers.base import TorqueController
-from himpc.controllers.forms import StackForm, measure, prepare, usable
 from himpc.controllers.one_step import leak as leak_of
-from himpc.controllers.settings import Settings
 from himpc.controllers.view import Bounds, LevelView, View, read_only
+from himpc.formulation.forms import StackForm, measure, prepare, usable
+from himpc.formulation.settings import Settings
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, in_force, ramp, viability_bounds
 from himpc.limits.rows import reaction
 from himpc.plan import Evidence, Plan

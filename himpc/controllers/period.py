@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelSolution
-from himpc.controllers.memory import Memory
+from himpc.formulation.memory import Memory
 from himpc.limits import Rows
 from himpc.prediction.joint import JointState
 from himpc.references import Preview

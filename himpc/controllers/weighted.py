@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem, LevelSolution
-from himpc.controllers.forms import LevelForm
 from himpc.controllers.himpc import HIMPC
 from himpc.controllers.period import Tick
+from himpc.formulation.forms import LevelForm
 from himpc.limits import Rows
 from himpc.plan import Plan
 from himpc.references import Preview

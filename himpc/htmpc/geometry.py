@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.geometry import Geometry, geometry
 from himpc.htmpc.kernel.kinematics import frame_along, place_all
+from himpc.kinematics.geometry import Geometry, geometry
 from himpc.tick.kernel.kinematics import ORIENTATION, POSITION
 from robots import Robot
 

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.htmpc.kernel.kinds import VELOCITY
 from himpc.htmpc.plan import Felt, LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start
 from himpc.htmpc.safety import commandable, plausible
 from himpc.htmpc.settings import Bounds, HTMPCSettings, bounds
 from himpc.htmpc.tracking import check_dimensions
+from himpc.kinematics.configuration import Configuration
 from himpc.qp import QPSolution, solve_qp
 from himpc.references import Preview
 from himpc.stack import Level

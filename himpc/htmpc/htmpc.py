@@ -9,7 +9,6 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration, joint_indices
 from himpc.htmpc.active_set import ActiveSet
 from himpc.htmpc.avoidance import Avoidance, clearance
 from himpc.htmpc.clearance import CollisionModel
@@ -25,6 +24,7 @@ from himpc.htmpc.safety import commandable, permitted, plausible
 from himpc.htmpc.settings import HTMPCSettings, bounds, efforts
 from himpc.htmpc.sqp import Solved, solve_level
 from himpc.htmpc.tracking import Guard, check_dimensions, tracking
+from himpc.kinematics.configuration import Configuration, joint_indices
 from himpc.references import Preview
 from himpc.stack import Stack
 from robots import Robot

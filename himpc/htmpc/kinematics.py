@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.htmpc.geometry import Frames, Placed, frame_at, geometry, placed
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
 from himpc.rotation import exp3
 from himpc.tasks import FramePosition, OrientationTask, Task

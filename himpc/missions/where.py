@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.tasks import Task
 
 Array = NDArray[np.float64]

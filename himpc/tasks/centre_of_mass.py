@@ -9,7 +9,7 @@ from himpc.tasks.axes import AXES, OnAxes
 from himpc.tasks.task import Array
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
 
 
 @dataclass(frozen=True, kw_only=True)

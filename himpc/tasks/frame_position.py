@@ -9,7 +9,7 @@ from himpc.tasks.frame import FrameTask
 from himpc.tasks.task import Array
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import numpy as np
 from himpc.tasks.task import Array, Gain, Task
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
     from robots import Robot
 
 

@@ -16,7 +16,7 @@ from himpc.tasks.seen import NUDGE, at_rest, rests, seen
 from himpc.tasks.task import Array, Gain
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
 
 _UPRIGHT = 1e-12
 """Sine of the angle below which a direction counts as the desired one, or as its opposite."""

@@ -11,7 +11,7 @@ from himpc.tasks.task import Array, Task
 from robots import InputError
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
     from robots import Robot
 
 

@@ -15,7 +15,7 @@ from himpc.tasks.task import Array, Gain, Task
 from robots.errors import unknown_name
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
     from robots import Robot
 
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")

@@ -10,7 +10,7 @@ from himpc.tasks.orientation import OrientationTask
 from himpc.tasks.task import Array
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robots.ranges import Range
 
 if TYPE_CHECKING:
-    from himpc.configuration import Configuration
+    from himpc.kinematics.configuration import Configuration
     from himpc.references import Preview
     from robots import Robot
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from himpc.configuration import joint_indices
-from himpc.controllers.forms import StackForm
-from himpc.controllers.settings import Settings
-from himpc.geometry import geometry
+from himpc.formulation.forms import StackForm
+from himpc.formulation.settings import Settings
+from himpc.kinematics.configuration import joint_indices
+from himpc.kinematics.geometry import geometry
 from himpc.limits import LimitsInForce
 from himpc.limits.rows import approached, reaction, toeplitz
 from himpc.references import Preview, Reference

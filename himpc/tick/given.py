@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
 from himpc.tasks import FrameOrientation, OrientationTask, Task
 from himpc.tasks.axes import AXES

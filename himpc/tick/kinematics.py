@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from himpc.controllers.forms import StackForm
+from himpc.formulation.forms import StackForm
 from himpc.references import Preview
 from himpc.tasks import Damping, FrameOrientation, Task
 from himpc.tick.configure import write_tasks

@@ -13,7 +13,7 @@ from himpc.tick.kernel.arena import Arena, Array
 from himpc.tick.kernel.solve import BUDGET
 
 if TYPE_CHECKING:
-    from himpc.controllers.forms import LevelForm
+    from himpc.formulation.forms import LevelForm
 
 _ROUNDS = 12_000
 """Changes of active rows in a tick; the longest run is some milliseconds."""

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from himpc.cascade.level import LevelProblem, LevelSolution, Rung
-from himpc.controllers.forms import StackForm
-from himpc.controllers.memory import Memory
-from himpc.controllers.settings import Settings
+from himpc.formulation.forms import StackForm
+from himpc.formulation.memory import Memory
+from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.rows import Kind
 from himpc.plan import AtOnce, Evidence, Plan

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.stack import Stack
 from himpc.tasks import FrameOrientation, FramePosition
 

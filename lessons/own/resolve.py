@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.stack import Level
 from himpc.tasks import Task
 from lessons.own.check import check_lesson, check_scene

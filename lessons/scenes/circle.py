@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import Limits
 from himpc.references import Circle, Hold, Phase, Reference, Sinusoid
 from himpc.stack import Level, Stack

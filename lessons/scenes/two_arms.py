@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Waypoints
 from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition, Posture, RelativeOrientation, RelativePosition

@@ -9,8 +9,8 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.controllers import Controller
+from himpc.kinematics.configuration import Configuration
 from himpc.plan import Binding, Plan
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.stack import Stack, about, ranks

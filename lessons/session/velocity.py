@@ -9,9 +9,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
 from himpc.htmpc.clearance import CollisionModel
+from himpc.kinematics.configuration import Configuration
 from himpc.missions import Progress, advanced, insert, move, release, remove, reorder, where
 from himpc.plan import Binding
 from himpc.references import Reference, previews

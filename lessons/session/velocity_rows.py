@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.htmpc import VelocityPlan, base_joints
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Reference
 from himpc.rotation import quaternion
 from himpc.stack import Stack

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from himpc.catalog import CONTROLLERS, Route
 from himpc.controllers import Settings as ControllerSettings
-from himpc.controllers.settings import Horizon, Period
+from himpc.formulation.settings import Horizon, Period
 from himpc.limits import Limits
 from himpc.qp import Solver
 from himpc.references import Reference
@@ -61,7 +61,7 @@ class TorqueSettings(Settings):
         levels: the stack.
         M_bar: diagonal of M̄ before scaling.
         M_bar_scale: factor on all of it.
-        M_bar_adapt: let the controller fit it to the payload, see `himpc.adaptation`.
+        M_bar_adapt: let the controller fit it to the payload, see `himpc.controllers.adaptation`.
         nominal: what model-based controllers believe the plant to be.
         deadline_ms: a torque that is found later than this after its tick began acts one tick later; see
             `lessons.session.deadline`. 0: lockstep, time stands still while the controller computes.

@@ -172,7 +172,7 @@ def test_menus_offer_every_word_a_setting_may_hold(
     viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A code may bring any of them: a menu that does not know its own value is no page."""
-    monkeypatch.setattr("himpc.controllers.settings.is_installed", lambda _: True)  # CasADi is an extra
+    monkeypatch.setattr("himpc.formulation.settings.is_installed", lambda _: True)  # CasADi is an extra
     scene, bindings = torque_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
     words = scene.settings.place(path).form.words
     assert len(words) > 1

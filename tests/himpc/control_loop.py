@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc import FrameOrientation, FramePosition, Joints, Level, Settings
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Hold, Preview
 from lessons.session.torque import TorqueSession
 from robots import Robot

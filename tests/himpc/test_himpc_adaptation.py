@@ -9,7 +9,7 @@ import pytest
 from control_loop import field, rows_of
 from numpy.typing import NDArray
 
-from himpc.adaptation import EVERY, LARGEST, RISE, Adaptation, LoadModel, adapted, wanted
+from himpc.controllers.adaptation import EVERY, LARGEST, RISE, Adaptation, LoadModel, adapted, wanted
 from lessons.events import Event, MoveTarget, Set
 from lessons.experiments.eigenvalues import EigenvalueJob
 from lessons.scenes.catalog import torque_scene

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from himpc.cascade.compiled import told
-from himpc.cascade.compiling import compile_all, compiled_functions
 from himpc.catalog import CONTROLLERS
+from himpc.compilation.compiled import told
+from himpc.compilation.compiling import compile_all, compiled_functions
 from himpc.tick.kernel.linear import dot
 from lessons.events import Set
 from lessons.scenes.catalog import torque_scene
@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[2]
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 SMALL = """
-from himpc.cascade.compiled import NUMBER, entry, piece
+from himpc.compilation.compiled import NUMBER, entry, piece
 
 @piece
 def _twice(x):
@@ -42,7 +42,7 @@ def twice(x):
 LOAD = """
 import os, sys
 from himpc.catalog import CONTROLLERS
-from himpc.cascade.compiled import told
+from himpc.compilation.compiled import told
 found = []
 with told(found.append):
     import small
@@ -146,7 +146,7 @@ def test_what_is_on_disk_needs_no_compiler() -> None:
     compile_all(lambda *_: None)
     script = (
         "import sys\n"
-        "from himpc.cascade.compiling import compile_all\n"
+        "from himpc.compilation.compiling import compile_all\n"
         "compile_all(print)\n"
         "print(*sorted({'numba', 'scipy.linalg', 'numba.np.linalg'} & set(sys.modules)))"
     )
@@ -163,7 +163,8 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
     above, below = SMALL.split("\n\n@entry")
     (tmp_path / "install" / "parts" / "part.py").write_text(above)
     (tmp_path / "install" / "small.py").write_text(
-        f"from himpc.cascade.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n@entry{below}"
+        "from himpc.compilation.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n"
+        f"@entry{below}"
     )
     assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]
     (tmp_path / "install" / "parts" / "part.py").write_text(f"{above}\n# changed")

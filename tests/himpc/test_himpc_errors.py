@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
 from himpc.htmpc.kinematics import Knots
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Circle, Phase, Preview
 from himpc.rotation import exp3
 from himpc.stack import Level

@@ -13,8 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from himpc import FrameOrientation, FramePosition, Joints, Level, Settings
-from himpc.configuration import Configuration
 from himpc.controllers import Controller, hqp, make_controller
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import Limits
 from himpc.plan import Plan
 from himpc.qp import QPSolution

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from problems import quadratic, random_hierarchy
 
 from himpc import CONTROLLERS, HIMPC, Settings
-from himpc.configuration import Configuration
 from himpc.controllers import HIQP, NHIMPC, Weighted, make_controller
 from himpc.controllers.nhimpc import MAX_ITERATIONS
 from himpc.controllers.weighted import sum_of_costs
+from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan
 from himpc.references import Preview
 from himpc.stack import Level

@@ -21,7 +21,7 @@ RUNS = (
 LOOK = """
 import json, sys
 
-from himpc.cascade import compiled
+from himpc.compilation import compiled
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import load_scene, prepared
 from lessons.session.start import begin

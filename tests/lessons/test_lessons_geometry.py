@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from himpc.cascade.level import LevelProblem
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from himpc.limits import Rows
 from himpc.qp import solve_qp
 from lessons.events import MoveLevel, MoveTarget, Set

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.recording.summary import summary

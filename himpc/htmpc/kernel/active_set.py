@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.compiled import INDICES, MATRIX, VECTOR, WHOLE, entry, piece
+from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, entry, piece
 from himpc.tick.kernel.linear import (
     backward,
     close_gap,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.compiled import (
+from himpc.compilation.compiled import (
     FLAGS,
     INDICES,
     MATRICES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.compiled import FIXED, GIVEN_MATRIX, MATRICES, MATRIX, NUMBER, VECTOR, entry
+from himpc.compilation.compiled import FIXED, GIVEN_MATRIX, MATRICES, MATRIX, NUMBER, VECTOR, entry
 
 Array = NDArray[np.float64]
 

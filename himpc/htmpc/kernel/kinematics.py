@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.compiled import INDICES, MATRICES, MATRIX, TABLE, entry
+from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, entry
 from himpc.tick.kernel.kinematics import frame_rotation, jacobian, place, points
 from himpc.tick.kernel.views import borrowed
 

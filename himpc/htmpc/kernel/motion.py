@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.compiled import GIVEN_VECTOR, MATRIX, NUMBER, entry
+from himpc.compilation.compiled import GIVEN_VECTOR, MATRIX, NUMBER, entry
 
 Array = NDArray[np.float64]
 

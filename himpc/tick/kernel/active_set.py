@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.cascade.compiled import piece
+from himpc.compilation.compiled import piece
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.bounds import sums
 from himpc.tick.kernel.level import Level, increments

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.cascade.compiled import piece
+from himpc.compilation.compiled import piece
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.constants import RANK_TOLERANCE
 from himpc.tick.kernel.linear import dot, subtract

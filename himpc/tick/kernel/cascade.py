@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from himpc.cascade.compiled import piece
+from himpc.compilation.compiled import piece
 from himpc.tick.kernel.active_set import FAILED, optimum
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.bases import no_directions, seen_rows, take_directions

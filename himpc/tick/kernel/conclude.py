@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.cascade.compiled import INDICES, VECTOR, WHOLE, entry
+from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, entry
 from himpc.tick.kernel.arena import AT, PERIOD, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.cascade import (
     ALONE,

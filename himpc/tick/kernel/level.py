@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from himpc.cascade.compiled import piece
+from himpc.compilation.compiled import piece
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.linear import dot, factorise, forward
 from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.cascade.compiled import INDICES, VECTOR, entry
+from himpc.compilation.compiled import INDICES, VECTOR, entry
 from himpc.tick.kernel.arena import AT, NOW, PERIOD, REACTION, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (

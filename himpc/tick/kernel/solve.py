@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from himpc.cascade.compiled import INDICES, NUMBER, VECTOR, WHOLE, entry
+from himpc.compilation.compiled import INDICES, NUMBER, VECTOR, WHOLE, entry
 from himpc.tick.kernel.active_set import FAILED
 from himpc.tick.kernel.arena import AT, WHOLE_AT, Whole
 from himpc.tick.kernel.cascade import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from himpc.cascade.compiled import piece
+from himpc.compilation.compiled import piece
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.cascade.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
+from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.kinematics import turned_away
 from himpc.tick.kernel.linear import copy, dot

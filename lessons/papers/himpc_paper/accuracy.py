@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.planar import RT1
 from lessons.papers.item import Item, Section, Table, between

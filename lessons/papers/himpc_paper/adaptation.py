@@ -1,4 +1,5 @@
-"""Not in the paper: M̄ that looks after itself (`himpc.adaptation`), under payloads that nobody told of."""
+"""Not in the paper: M̄ that looks after itself (`himpc.controllers.adaptation`), under payloads that nobody
+told of."""
 
 from __future__ import annotations
 

@@ -9,8 +9,8 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
-from himpc.controllers.forms import StackForm, measure, stack_form
+from himpc.formulation.forms import StackForm, measure, stack_form
+from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
 from himpc.references.hold import still
 from lessons.experiments.jobs import Run, Work

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.configuration import Configuration
+from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, Results, Run
 from lessons.papers.himpc_paper.iiwa import RT4, rt4
 from lessons.papers.himpc_paper.iiwa import SOURCE as SECTION_VI

@@ -27,7 +27,7 @@ class Settings:
         T_s: control period, s.
         M_bar: diagonal of M̄, one per joint, kg·m².
         M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they find from the applied
-            torques, see `himpc.adaptation`.
+            torques, see `himpc.controllers.adaptation`.
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".

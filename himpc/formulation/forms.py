@@ -11,8 +11,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
-from himpc.configuration import Configuration
-from himpc.controllers.settings import Settings
+from himpc.formulation.settings import Settings
+from himpc.kinematics.configuration import Configuration
 from himpc.prediction.task import ResidualModel, residual_model
 from himpc.references import Later, Preview
 from himpc.references.hold import still

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelSolution
-from himpc.controllers.forms import StackForm
+from himpc.formulation.forms import StackForm
 
 Array = NDArray[np.float64]
 

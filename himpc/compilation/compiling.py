@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-_DOOR = "himpc.cascade.compiled"
+_DOOR = "himpc.compilation.compiled"
 _PACKAGE = Path(__file__).parents[1]
 
 
@@ -18,7 +18,7 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
         tell: called with (functions ready, of how many) after each that had to be compiled; never if all
             were on disk.
     """
-    from himpc.cascade.compiled import told
+    from himpc.compilation.compiled import told
 
     waiting = compiled_functions()
     total = sum(map(len, waiting.values()))
@@ -36,8 +36,8 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
 
 
 def compiled_functions() -> dict[str, frozenset[str]]:
-    """Dotted names of the functions that a decorator of `himpc.cascade.compiled` compiles, by module. Read
-    from the sources: importing them is what takes long."""
+    """Dotted names of the functions that a decorator of `himpc.compilation.compiled` compiles, by module.
+    Read from the sources: importing them is what takes long."""
     found = {}
     for path in sorted(_PACKAGE.rglob("*.py")):
         text = path.read_text()

@@ -32,7 +32,8 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
         tell: hears the dotted name of every function that was compiled.
     """
     code = (
-        f"import sys; sys.path[:] = {sys.path!r}; from himpc.cascade.compiler import serve; serve({module!r})"
+        f"import sys; sys.path[:] = {sys.path!r}; "
+        f"from himpc.compilation.compiler import serve; serve({module!r})"
     )
     with subprocess.Popen(
         (sys.executable, "-c", code),
@@ -56,11 +57,11 @@ def serve(module: str) -> None:
     # Whatever a module prints is not part of what we tell.
     with os.fdopen(os.dup(1), "w", buffering=1) as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        from himpc.cascade.compiled import told
+        from himpc.compilation.compiled import told
 
         with told(lambda name: print(name, file=out)):
             import_module(module)
             if module.startswith("himpc."):
-                from himpc.cascade.compiling import compile_all
+                from himpc.compilation.compiling import compile_all
 
                 compile_all(lambda *_: None)

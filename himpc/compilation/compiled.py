@@ -15,10 +15,10 @@ import numpy.ma  # noqa: F401  (Numba imports it at the first call with an array
 from numba import boolean, float64, int64, intp, njit, types
 from numba.core import event
 
-from himpc.cascade.compiler import compile_apart, compiles_here
-from himpc.cascade.keeping import Kept
-from himpc.cascade.loading import load
-from himpc.cascade.pieces import Piece, Whole
+from himpc.compilation.compiler import compile_apart, compiles_here
+from himpc.compilation.keeping import Kept
+from himpc.compilation.loading import load
+from himpc.compilation.pieces import Piece, Whole
 
 try:
     import fcntl
