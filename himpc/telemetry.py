@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import RUNGS, ActiveRows
+from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import Rows
 from himpc.plan import Plan
@@ -17,7 +18,6 @@ from himpc.references import Preview
 from himpc.rotation import quaternion
 from himpc.stack import DAMPING_LEVEL, Stack
 from himpc.tasks.axes import AXES
-from himpc.tick.kernel.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from robots import Robot
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ DOORS = {
     "numba": (
         *("himpc/compilation/compiled.py", "himpc/compilation/keeping.py"),
         *("himpc/compilation/loading.py", "himpc/compilation/pieces.py"),
-        "himpc/tick/kernel/views.py",
+        "himpc/compilation/views.py",
     ),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),

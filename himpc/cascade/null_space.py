@@ -9,7 +9,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.tick.kernel.constants import RANK_TOLERANCE
+from himpc.constants import RANK_TOLERANCE
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.tick.kernel.constants import RETURN_RATE
+from himpc.constants import RETURN_RATE
 
 Array = NDArray[np.float64]
 

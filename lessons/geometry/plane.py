@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
+from himpc.constants import RANK_TOLERANCE
 from himpc.limits.rows import Kind, Rows
-from himpc.tick.kernel.constants import RANK_TOLERANCE
 
 Array = NDArray[np.float64]
 

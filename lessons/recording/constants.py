@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from himpc.constants import RETURN_RATE
 from himpc.htmpc.settings import bounds
 from himpc.limits import POSITION_MARGIN, reaction
-from himpc.tick.kernel.constants import RETURN_RATE
 from lessons.settings.settings import Settings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, entry, piece
+from himpc.compilation.views import borrowed
 from himpc.tick.kernel.linear import (
     backward,
     close_gap,
@@ -19,7 +20,6 @@ from himpc.tick.kernel.linear import (
     split,
     subtract,
 )
-from himpc.tick.kernel.views import borrowed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -17,8 +17,8 @@ from himpc.compilation.compiled import (
     entry,
     piece,
 )
+from himpc.compilation.views import borrowed
 from himpc.tick.kernel.kinematics import points
-from himpc.tick.kernel.views import borrowed
 from robots.collision import BOX, FLOOR
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, entry
+from himpc.compilation.views import borrowed
 from himpc.tick.kernel.kinematics import frame_rotation, jacobian, place, points
-from himpc.tick.kernel.views import borrowed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

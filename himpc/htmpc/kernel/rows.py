@@ -22,9 +22,9 @@ from himpc.compilation.compiled import (
     WHOLE,
     entry,
 )
+from himpc.compilation.views import borrowed
 from himpc.htmpc.kernel.kinds import ACCELERATION, JERK, LEXICOGRAPHIC, POSITION, RAMP, STOP, VELOCITY
 from himpc.tick.kernel.linear import dot
-from himpc.tick.kernel.views import borrowed
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import piece
+from himpc.constants import RANK_TOLERANCE
 from himpc.tick.kernel.arena import Array
-from himpc.tick.kernel.constants import RANK_TOLERANCE
 from himpc.tick.kernel.linear import dot, subtract
 
 

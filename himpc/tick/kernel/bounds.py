@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import piece
+from himpc.constants import RETURN_RATE
 from himpc.tick.kernel.arena import Array
-from himpc.tick.kernel.constants import RETURN_RATE
 
 VIABILITY, PAPER, OFF = range(3)
 """How position limits are kept."""

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, entry
+from himpc.compilation.views import matrices, matrix, vector
 from himpc.tick.kernel.arena import AT, PERIOD, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.cascade import (
     ALONE,
@@ -19,7 +20,6 @@ from himpc.tick.kernel.cascade import (
 from himpc.tick.kernel.evidence import bounds_met, cost_of, leak_of, quaternions
 from himpc.tick.kernel.linear import copy, copy_rows
 from himpc.tick.kernel.residual import add_effects, effects
-from himpc.tick.kernel.views import matrices, matrix, vector
 
 
 @entry(VECTOR, INDICES, INDICES, INDICES, WHOLE)

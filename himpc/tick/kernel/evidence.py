@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import piece
+from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.cascade import OWN_FIRST, OWN_LAST
-from himpc.tick.kernel.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.tick.kernel.kinematics import ORIENTATION
 
 

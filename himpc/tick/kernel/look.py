@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, VECTOR, entry
+from himpc.compilation.views import matrices, matrix, vector
 from himpc.tick.kernel.arena import AT, NOW, PERIOD, REACTION, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (
@@ -24,7 +25,6 @@ from himpc.tick.kernel.kinematics import (
 from himpc.tick.kernel.linear import dot
 from himpc.tick.kernel.references import curves
 from himpc.tick.kernel.residual import free_motion
-from himpc.tick.kernel.views import matrices, matrix, vector
 
 
 @entry(VECTOR, INDICES, INDICES, INDICES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, NUMBER, VECTOR, WHOLE, entry
+from himpc.compilation.views import matrices, matrix, vector
 from himpc.tick.kernel.active_set import FAILED
 from himpc.tick.kernel.arena import AT, WHOLE_AT, Whole
 from himpc.tick.kernel.cascade import (
@@ -18,7 +19,6 @@ from himpc.tick.kernel.cascade import (
 )
 from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.taken import Taken
-from himpc.tick.kernel.views import matrices, matrix, vector
 
 BUDGET = 36e6
 """Multiplications that the changes of active rows may cost in one tick: some twelve milliseconds, less than
