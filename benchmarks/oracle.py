@@ -31,6 +31,7 @@ from himpc.limits.braking import least_slack
 from himpc.prediction.joint import JointState
 from himpc.references import Outlook
 from himpc.tasks import KINDS
+from himpc.tick.problems import solve_problems
 from lessons.scenes.catalog import prepared
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import assignment
@@ -50,7 +51,9 @@ class Stack:
     rows: Rows
 
     def solve(self, route: Route) -> list[LevelSolution]:
-        return solve_cascade(self.problems, self.rows, {}, route, "daqp")
+        if route == "compiled":
+            return solve_problems(self.problems, self.rows, {})
+        return solve_cascade(self.problems, self.rows, {}, "daqp")
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from time import perf_counter_ns
 
 import numpy as np
 
+from himpc.plan import write_plan
 from himpc.references import Outlook
-from himpc.telemetry import write_plan
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
-from himpc.references import Hold, Target, previews
+from himpc.controllers import dragged_target
+from himpc.references import Hold, previews
 from robots import Plant, PlantSettings, load_robot
 
 T_S = 1e-3
@@ -38,7 +39,7 @@ def main(seconds: float = 2.0) -> None:
     tasks = FramePosition(name="hand"), FrameOrientation(name="wrist"), Posture(name="posture")
     controller = HIMPC(robot, Settings(tuple(Level((task,)) for task in tasks), tuple(robot.M_bar)))
     rotation, position = driver.plant.frame_pose(robot.tip)
-    hand = Target(position)
+    hand = dragged_target(position)
     hand.move(position + np.array([0.0, 0.0, 0.05]))
     references = {"hand": hand, "wrist": Hold(rotation), "posture": Hold(robot.home)}
     late, ticks, tau = 0, round(seconds / T_S), driver.plant.tau

@@ -15,7 +15,8 @@ import numpy as np
 
 import lessons
 from himpc import HIMPC, FramePosition, Level, Posture, Settings
-from himpc.references import Hold, Target, previews
+from himpc.controllers import dragged_target
+from himpc.references import Hold, previews
 from robots import Plant, load_robot
 
 LAMP = Path(lessons.__file__).parent / "course" / "lamp.urdf"
@@ -39,7 +40,7 @@ def main(seconds: float = 3.0, urdf: Path = LAMP) -> None:
     controller = HIMPC(robot, Settings(stack, tuple(robot.M_bar), horizon=5))
     controller.reset(plant.tau)
     # A target is a goal that may be moved at any time; the motion towards it stays smooth.
-    hand = Target(position)
+    hand = dragged_target(position)
     hand.move(goal)
     references = {"hand": hand, "posture": Hold(robot.home)}
 

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from himpc import HIMPC, FramePosition, Level, Posture, Settings
-from himpc.references import Hold, Target, previews
+from himpc.controllers import dragged_target
+from himpc.references import Hold, previews
 from robots import Plant, load_robot
 
 
@@ -28,7 +29,7 @@ def main(seconds: float = 4.0) -> None:
     settings = Settings(stack, tuple(robot.M_bar))
     controller = HIMPC(robot, settings)
     controller.reset(plant.tau)
-    hand = Target(position)
+    hand = dragged_target(position)
     hand.move(position + np.array([0.0, 0.1, 0.0]))
     references = {"hand": hand, "posture": Hold(robot.home)}
 

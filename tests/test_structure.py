@@ -19,11 +19,7 @@ DOORS = {
     "placo": ("robots/reach.py",),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
-    "numba": (
-        *("himpc/compilation/compiled.py", "himpc/compilation/keeping.py"),
-        *("himpc/compilation/loading.py", "himpc/compilation/pieces.py"),
-        "himpc/compilation/views.py",
-    ),
+    "numba": ("himpc/compilation/",),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
     "tyro": ("app/",),
@@ -179,6 +175,128 @@ def test_lessons_have_no_other_parts() -> None:
     places = [each for each in (ROOT / "lessons").iterdir() if each.stem[0] not in "._"]
     parts = {each.stem for each in places if each.is_dir() or each.suffix == ".py"}
     assert parts - set(LESSONS) == {"own", "examples", "headless", "kinds", "mobile"}
+
+
+HIMPC_ROOT = ("catalog", "constants", "qp", "rotation", "stack", "telemetry")
+"""Files of himpc/ beside its folders; they have their place in the order as well."""
+THEORY = {
+    "catalog": (),
+    "constants": (),
+    "qp": (),
+    "rotation": (),
+    "references": ("rotation", "constants"),
+    "kinematics": ("references",),
+    "tasks": ("kinematics", "references", "rotation"),
+    "stack": ("tasks", "kinematics"),
+    "prediction": (),
+    "limits": ("prediction", "qp", "constants"),
+    "cascade": ("limits", "qp", "constants"),
+    "formulation": (
+        *("cascade", "limits", "prediction", "stack", "tasks", "kinematics", "references"),
+        *("qp", "catalog"),
+    ),
+    "telemetry": ("cascade", "stack", "kinematics", "constants"),
+    "plan": ("telemetry", "cascade", "limits", "tasks", "references", "rotation", "constants"),
+    "missions": ("tasks", "kinematics", "references", "rotation"),
+}
+"""What each part of himpc/ that is not compiled may import beside itself."""
+COMPILED = {
+    "compilation": (),
+    "tick/kernel": ("compilation", "constants"),
+    "htmpc/kernel": ("tick/kernel", "compilation", "constants"),
+    "tick": (
+        *("tick/kernel", "plan", "telemetry", "formulation", "cascade", "limits", "prediction"),
+        *("tasks", "kinematics", "references", "qp"),
+    ),
+    "controllers": (
+        *("tick", "plan", "formulation", "cascade", "limits", "prediction", "stack", "tasks"),
+        *("kinematics", "references", "qp", "catalog"),
+    ),
+    "htmpc": (
+        *("htmpc/kernel", "tick/kernel", "plan", "stack", "tasks", "kinematics", "references"),
+        *("rotation", "qp"),
+    ),
+}
+"""The same for what is compiled, and what runs it."""
+HIMPC = THEORY | COMPILED
+
+
+def part_of(path: Path) -> str:
+    """The part of himpc/ that a file belongs to; "" for the package itself."""
+    names = path.relative_to(ROOT / "himpc").with_suffix("").parts
+    return next(("/".join(names[:k]) for k in (2, 1) if "/".join(names[:k]) in HIMPC), "")
+
+
+def home_of(name: str) -> Path:
+    """The file that an imported name of himpc comes from."""
+    parts = name.split(".")
+    files = (
+        ROOT.joinpath(*parts[:k]).with_suffix(".py") if k > 0 else ROOT.joinpath(*parts[:-k], "__init__.py")
+        for length in range(len(parts), 0, -1)
+        for k in (length, -length)
+    )
+    return next(file for file in files if file.exists())
+
+
+@pytest.mark.parametrize("part", HIMPC)
+def test_himpc_is_built_in_one_direction(part: str) -> None:
+    """references, kinematics, tasks, limits ← cascade ← formulation, plan ← tick ← controllers; htmpc."""
+    files = [path for path in sources("himpc") if part_of(path) == part]
+    assert files
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, "himpc") and part_of(home_of(name)) not in (part, *HIMPC[part])
+    }
+    assert not wrong
+
+
+def test_himpc_has_no_other_parts() -> None:
+    """Every file belongs to one, and the tables go one way: nobody may import whoever may import it."""
+    files = sources("himpc")
+    assert {path for path in files if not part_of(path)} == {ROOT / "himpc" / "__init__.py"}
+    assert {path.stem for path in (ROOT / "himpc").glob("*.py")} == {"__init__", *HIMPC_ROOT}
+    assert not {
+        (a, b)
+        for table in (HIMPC, APP, LESSONS)
+        for a, below in table.items()
+        for b in below
+        if a in below_of(table, b)
+    }
+
+
+def below_of(table: dict[str, tuple[str, ...]], part: str) -> set[str]:
+    """All that a part may import, directly or through others."""
+    found: set[str] = set()
+    waiting = [*table.get(part, ())]
+    while waiting:
+        each = waiting.pop()
+        if each not in found:
+            found.add(each)
+            waiting += table.get(each, ())
+    return found
+
+
+def test_the_theory_imports_nothing_compiled() -> None:
+    """Directly or through others: the equations can be read, and run, without a compiler."""
+    assert not {(part, each) for part in THEORY for each in below_of(HIMPC, part) if each in COMPILED}
+
+
+PRIVATE_OF_NUMBA = {"private", "private_views", "pieces", "keeping", "loading"}
+
+
+def test_few_files_touch_private_names_of_numba() -> None:
+    """The other files of the tool chain use what `numba` itself shows: they are the way out."""
+    touching, using = set(), set()
+    for path in sources("himpc/compilation"):
+        of_numba = {name for name in imports(path) if within(name, "numba")}
+        using |= {path.stem} if of_numba else set()
+        touching |= {path.stem} if any(name.count(".") > 1 for name in of_numba) else set()
+    assert touching == PRIVATE_OF_NUMBA
+    assert using - touching == {"compiled", "public"}
+    told = ast.get_docstring(ast.parse((ROOT / "himpc/compilation/__init__.py").read_text())) or ""
+    assert set(re.findall(r"`(\w+)`", told)) >= PRIVATE_OF_NUMBA
 
 
 NO_PICTURE = ("worker", "link", "client", "html")

@@ -13,10 +13,8 @@ from himpc.cascade.explicit import solve_explicit
 from himpc.cascade.last_resort import containing, last_resort, softened
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution, Point, Rung
 from himpc.cascade.null_space import nested_bases, whole_space
-from himpc.catalog import Route
 from himpc.limits.rows import Rows
 from himpc.qp import Solver
-from himpc.tick.problems import solve_problems
 
 Array = NDArray[np.float64]
 
@@ -25,7 +23,6 @@ def solve_cascade(
     problems: Sequence[LevelProblem],
     rows: Rows,
     previous: Mapping[str, LevelSolution],
-    route: Route,
     solver: Solver,
 ) -> list[LevelSolution]:
     """Solves the levels in order; each keeps what (33) asks of the levels above.
@@ -33,19 +30,15 @@ def solve_cascade(
     The ladder, each rung counted by the caller: "solve" the printed problem; "soften" the state rows by the
     least slack that makes them feasible, and pass the widened rows down (else Theorem 2 breaks);
     level 1 then falls to the shifted "previous" plan of that level if that was an optimum and meets all rows,
-    or "brake"s as the rows allow; a lower level "inherit"s U_{i−1}, which keeps every priority. Where the
-    compiled route has got somewhere before its time was over, it goes as far that way as the rows allow
-    ("feasible"). So the increments meet all rows whenever any do.
+    or "brake"s as the rows allow; a lower level "inherit"s U_{i−1}, which keeps every priority. So the
+    increments meet all rows whenever any do.
 
     Args:
         problems: the levels, highest priority first; at least one.
         rows: all bounds of this tick.
         previous: last tick's solutions by level name: warm starts and the "previous" rung.
-        route: compiled or explicit.
         solver: QP solver.
     """
-    if route == "compiled":
-        return solve_problems(problems, rows, previous)
     N, _, n = problems[0].B.shape
     upper = [problem.B for problem in problems[:-1]]
     U, above = np.zeros((N, n)), []

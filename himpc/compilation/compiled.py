@@ -1,29 +1,15 @@
-"""The door to Numba: functions on disk, loaded when their module is first imported; what is not there is
-compiled first, by a process of its own, see `compiler`."""
+"""The door to Numba: decorators of what is compiled, and the types of its arguments."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from hashlib import sha256
-from logging import getLogger
-from pathlib import Path
-from typing import Any
+from numba import boolean, float64, int64, intp, types
 
-import numpy.ma  # noqa: F401  (Numba imports it at the first call with an array, which would be a robot's first tick)
-from numba import boolean, float64, int64, intp, njit, types
-from numba.core import event
+from himpc.compilation import public_only
 
-from himpc.compilation.compiler import compile_apart, compiles_here
-from himpc.compilation.keeping import Kept
-from himpc.compilation.loading import load
-from himpc.compilation.pieces import Piece, Whole
-
-try:
-    import fcntl
-except ImportError:  # a system without it: two processes may then compile the same
-    fcntl = None
+if public_only():
+    from himpc.compilation import public as chain
+else:
+    from himpc.compilation import private as chain
 
 NUMBER, WHOLE, FLAG = float64, intp, boolean
 VECTOR, MATRIX, MATRICES = float64[::1], float64[:, ::1], float64[:, :, ::1]
@@ -35,126 +21,10 @@ GIVEN_VECTOR = types.Array(float64, 1, "A", readonly=True)
 GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """What others hand over: it may be a slice."""
 
-Function = Callable[..., Any]
-
-_ANY_ORDER = {"reassoc", "contract", "nsz"}
-"""Sums may be taken in any order; NaN and infinity keep their meaning."""
-
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": _ANY_ORDER, "no_cfunc_wrapper": True}
-_PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
-piece = njit(**_PIECE)
+piece = chain.piece
 """Compiles a function as a part of every `entry` that calls it, wherever that stands."""
-
-
-def entry(*arguments: Any) -> Callable[[Function], Any]:
-    """Compiles a function, with every `piece` that it calls, for arguments of these types, and for no others.
-
-    Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
-    that its compilation takes.
-
-    What is on disk is current as long as no file of its folder has changed, or of the folders that pieces
-    come from.
-    """
-
-    def compile_now(function: Function) -> Any:
-        digest = sha256()
-        for folder in sorted(_folders(function)):
-            for file in sorted(folder.glob("*.py")):
-                digest.update(file.read_bytes())
-        fast: Any = njit(**_OPTIONS, pipeline_class=Whole)(function)
-        fast._cache = Kept(Path(function.__code__.co_filename), function.__qualname__, digest.digest())
-        return _compiled_now(fast, arguments)
-
-    return compile_now
-
-
-def _folders(function: Function) -> set[Path]:
-    """Where a function's file is, and those of the pieces that its module knows."""
-    pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
-    files = [function.__code__.co_filename, *(each.__code__.co_filename for each in pieces if each)]
-    return {Path(file).parent for file in files}
-
-
-def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
-    module = fast.py_func.__module__
-    found = load(fast, arguments)
-    if not found:
-        place = fast.stats.cache_path
-        if not compiles_here() and module != "__main__" and fast._cache.has_room():
-            _FIRST_WORD.say()
-            with _one_at_a_time(place, "waiting"):
-                found = load(fast, arguments)  # somebody else may have compiled it meanwhile
-                if not found:
-                    compile_apart(module, lambda name: event.end_event(_APART, name))
-                    found = load(fast, arguments)
-        if not found:
-            with _one_at_a_time(place, "compiling"):
-                fast.compile(arguments)
-    fast.disable_compile()
-    return fast
-
-
-@contextmanager
-def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
-    """Processes that need the same code wait for the first one, and then find it on disk."""
-    lock = None
-    if fcntl is not None and folder is not None:
-        with suppress(OSError):  # a full disk, say
-            lock = os.open(Path(folder, f"himpc-lab-{what}.lock"), os.O_WRONLY | os.O_CREAT, 0o600)
-            fcntl.flock(lock, fcntl.LOCK_EX)
-    try:
-        yield
-    finally:
-        if lock is not None:
-            os.close(lock)
-
-
-class _FirstWord(event.Listener):
-    """What takes so long, once: whoever looks at a terminal would think that nothing happens."""
-
-    def __init__(self) -> None:
-        self._said = compiles_here()  # then somebody else did
-
-    def say(self) -> None:
-        """Unless it was said."""
-        if not self._said:
-            self._said = True
-            getLogger(__name__).warning(
-                "compiling the controller's inner loops: about half a minute, this once"
-            )
-
-    def on_start(self, event: Any) -> None:
-        self.say()
-
-    def on_end(self, event: Any) -> None:
-        """Nothing: it was said."""
-
-
-_FIRST_WORD = _FirstWord()
-event.register("numba:compile", _FIRST_WORD)
-
-
-_APART = "himpc-lab:compiled-apart"
-
-
-class _Compiled(event.Listener):
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell = tell
-
-    def on_start(self, event: Any) -> None:
-        """Nothing: only what is done counts."""
-
-    def on_end(self, event: Any) -> None:
-        if event.kind == _APART:
-            self._tell(event.data)
-        elif tuple(event.data["args"]) in event.data["dispatcher"].overloads:
-            function = event.data["dispatcher"].py_func
-            self._tell(f"{function.__module__}.{function.__qualname__}")
-
-
-@contextmanager
-def told(tell: Callable[[str], None]) -> Iterator[None]:
-    """While it is open, `tell` hears the dotted name of every function that had to be compiled."""
-    heard = _Compiled(tell)
-    with event.install_listener("numba:compile", heard), event.install_listener(_APART, heard):
-        yield
+entry = chain.entry
+"""(*argument types): compiles a function, with every `piece` that it calls, for arguments of these types, and
+for no others, when its module is first imported."""
+told = chain.told
+"""(tell): while this context is open, `tell` hears the dotted names of functions that had to be compiled."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from himpc.controllers.tdeosf import TDEOSF
     from himpc.controllers.weighted import Weighted
     from himpc.formulation.settings import Settings
+    from himpc.tick.target import dragged_target
 
 __all__ = [
     "CONTROLLERS",
@@ -28,6 +29,7 @@ __all__ = [
     "Controller",
     "Settings",
     "Weighted",
+    "dragged_target",
     "make_controller",
 ]
 
@@ -43,6 +45,7 @@ __getattr__ = lazily(
         "Settings": ".formulation.settings",
         "TDEOSF": "tdeosf",
         "Weighted": "weighted",
+        "dragged_target": ".tick.target",
         "make_controller": "make",
     },
 )

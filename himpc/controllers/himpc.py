@@ -201,8 +201,7 @@ class HIMPC(TorqueController):
 
     def _cascade(self, problems: list[LevelProblem], tick: Tick) -> list[LevelSolution]:
         """Problem 1 to Problem r."""
-        previous, settings = tick.memory.solutions, self._settings
-        return solve_cascade(problems, tick.rows, previous, settings.route, settings.solver)
+        return solve_cascade(problems, tick.rows, tick.memory.solutions, self._settings.solver)
 
     def _problems(
         self,

@@ -1,5 +1,6 @@
 """What one control tick decided, and how it becomes a row of telemetry."""
 
 from himpc.plan.plan import AtOnce, Binding, Evidence, Plan
+from himpc.plan.row import on_axes, write_plan
 
-__all__ = ["AtOnce", "Binding", "Evidence", "Plan"]
+__all__ = ["AtOnce", "Binding", "Evidence", "Plan", "on_axes", "write_plan"]

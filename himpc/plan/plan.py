@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelSolution
 from himpc.limits import LimitsInForce, Rows
-
-if TYPE_CHECKING:
-    from himpc.telemetry import Layout
+from himpc.telemetry import Layout
 
 Array = NDArray[np.float64]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
+from himpc.references.filter import roll
 from himpc.references.preview import Array, Preview
 
 
@@ -28,12 +28,8 @@ _ROOM = 200
 """Periods after which the samples that are left move to the front of a new array."""
 
 
-@cache
-def _filter() -> Callable[..., None]:
-    """It loads the compiler: only who makes a target needs it."""
-    from himpc.tick.kernel.target import roll
-
-    return roll
+Roll = Callable[[Array, int, Array, Array, float, Array], None]
+"""As `himpc.references.filter.roll`."""
 
 
 class Target:
@@ -48,16 +44,17 @@ class Target:
         caps: caps on speed, acceleration and jerk of the filtered motion.
     """
 
-    def __init__(self, value: Array, caps: Caps = POSITION_CAPS) -> None:
-        """Starts at rest at `value`."""
+    def __init__(self, value: Array, caps: Caps = POSITION_CAPS, roll: Roll = roll) -> None:
+        """Starts at rest at `value`. Another `roll` computes the same filter, see
+        `himpc.controllers.dragged_target`."""
         value = np.array(value, float)
         self.raw = value
         self.caps = caps
         self._rotation = value.ndim == 2
-        self._filter = _filter()  # now: the tick in which a hand first moves the target must not wait for it
+        self._filter = roll
         self._m = 3 if self._rotation else value.size
         self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
-        # See `tick.kernel.target.roll`; the first `_known` samples are there, the first of them is now.
+        # See `references.filter.roll`; the first `_known` samples are there, the first of them is now.
         self._samples = np.zeros((2, value.size + 3 * self._m + 1))
         self._samples[0, : value.size], self._samples[0, -1], self._known = value.ravel(), 1.0, 1
         self._time: float | None = None
@@ -77,7 +74,7 @@ class Target:
 
     def jump(self, value: Array) -> None:
         """Puts hand and reference to `value`, at rest (for resets)."""
-        self.__init__(value, self.caps)
+        self.__init__(value, self.caps, self._filter)
 
     def _forget_future(self) -> None:
         self._known, self._rest = 1, None

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from himpc.tasks import Damping, FrameOrientation
+from himpc.telemetry import Layout
 from himpc.tick.configure import Span, is_built_in
 from himpc.tick.kernel.arena import AT, Arena, Whole
-
-if TYPE_CHECKING:
-    from himpc.telemetry import Layout
 
 _LIMITS = ("tau_lower", "tau_upper", "v_limit", "", "", "", "q_lower", "q_upper")
 """Fields that the rows of `limits` are; stops and decelerations are none."""

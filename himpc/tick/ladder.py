@@ -45,8 +45,10 @@ def solve_levels(arena: Arena, kinds: tuple[Kind, ...], asks: Asks) -> list[tupl
     """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
     on and its time, microseconds.
 
-    The ladder is that of `solve_cascade`. All levels share the budget that the arena was granted: what one
-    used up the next ones do not get, and then they stand on lower rungs. So the time of a tick is bounded.
+    The ladder is that of `solve_cascade`, and one rung more: where the kernel has got somewhere before its
+    time was over, the level goes as far that way as the rows allow ("feasible"). All levels share the budget
+    that the arena was granted: what one used up the next ones do not get, and then they stand on lower rungs.
+    So the time of a tick is bounded.
 
     Args:
         arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.

@@ -20,7 +20,7 @@ def solve_problems(
     rows: Rows,
     previous: Mapping[str, LevelSolution],
 ) -> list[LevelSolution]:
-    """`solve_cascade` by the kernel; arguments as there."""
+    """`himpc.cascade.cascade.solve_cascade` by the kernel; arguments as there."""
     arena = arena_of(problems, rows, previous)
     rungs = solve_levels(arena, rows.kinds, Asks())
     conclude(*arena.arguments, False)

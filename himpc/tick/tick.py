@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from time import perf_counter_ns
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from himpc.limits.rows import Kind
 from himpc.plan import AtOnce, Evidence, Plan
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.tasks import Damping, Task
+from himpc.telemetry import Layout
 from himpc.tick.configure import arena_for, write_curve, write_limits, write_preview
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
@@ -29,9 +29,6 @@ from himpc.tick.ladder import Asks, solve_levels
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, budget_of, write_effects
 from robots import Robot
-
-if TYPE_CHECKING:
-    from himpc.telemetry import Layout
 
 
 class CompiledTick:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.controllers import HIMPC, OSF, Weighted
 from himpc.controllers.weighted import compromise
 from himpc.plan import Plan
+from himpc.tick.problems import solve_problems
 from lessons.geometry.matrix import Matrix, matrix
 from lessons.geometry.plane import Plane, cut
 from lessons.session.bumpless import Handover
@@ -57,7 +57,7 @@ def tick_of(session: TorqueSession) -> Tick:
         raise InputError("This tick held the torque: there was nothing to solve")
     strict: Sequence[LevelSolution] = plan.levels
     if isinstance(controller, Weighted):
-        strict = solve_cascade(problems, plan.rows, {}, "compiled", "daqp")
+        strict = solve_problems(problems, plan.rows, {})
     return Tick(plan, problems, strict)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.controllers import dragged_target
 from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Reference, Target
 from himpc.rotation import from_quaternion
 from himpc.stack import about, essence
@@ -22,9 +23,9 @@ Array = NDArray[np.float64]
 def target_at(task: Task, value: Array) -> Target:
     """A draggable target of a task that starts at one of its `Task.target`s."""
     if value.ndim == 2:
-        return Target(value, ROTATION_CAPS)
+        return dragged_target(value, ROTATION_CAPS)
     in_space = task.unit == "m" or isinstance(task, Pointing)
-    return Target(value, POSITION_CAPS if in_space else JOINT_CAPS)
+    return dragged_target(value, POSITION_CAPS if in_space else JOINT_CAPS)
 
 
 def kept(task: Task, reference: Reference | None, value: Array) -> Reference:

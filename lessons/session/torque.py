@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
-from himpc.plan import Binding, Plan
+from himpc.plan import Binding, Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
-from himpc.telemetry import layout_of, write_plan
+from himpc.telemetry import layout_of
 from lessons.events import Event, MoveTarget, Push
 from lessons.own.controllers import controller_of
 from lessons.scenes.torque_scene import TorqueScene

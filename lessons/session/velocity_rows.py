@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from himpc.htmpc import VelocityPlan, base_joints
 from himpc.kinematics.configuration import Configuration
+from himpc.plan import on_axes
 from himpc.references import Reference
 from himpc.rotation import quaternion
 from himpc.stack import Stack
 from himpc.tasks import Task
-from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY, Layout, arranged, on_axes
+from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY, Layout, arranged
 from robots import Robot
 
 Array = NDArray[np.float64]

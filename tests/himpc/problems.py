@@ -14,6 +14,7 @@ from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.prediction.task import residual_model
 from himpc.qp import Solver
+from himpc.tick.problems import solve_problems
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,9 @@ class Hierarchy:
         solver: Solver = "daqp",
         previous: dict[str, LevelSolution] | None = None,
     ) -> list[LevelSolution]:
-        return solve_cascade(self.problems, self.rows, previous or {}, route, solver)
+        if route == "compiled":
+            return solve_problems(self.problems, self.rows, previous or {})
+        return solve_cascade(self.problems, self.rows, previous or {}, solver)
 
     @property
     def shape(self) -> tuple[int, int]:

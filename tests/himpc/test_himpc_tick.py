@@ -16,8 +16,8 @@ from problems import Hierarchy, random_hierarchy, shifted
 
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
 from himpc.catalog import Route
+from himpc.plan import write_plan
 from himpc.references import Circle, FigureEight, Hold, Outlook, Phase, Reference, Sinusoid
-from himpc.telemetry import write_plan
 from himpc.tick.kernel.conclude import conclude
 from himpc.tick.kernel.look import look
 from himpc.tick.kernel.solve import solve

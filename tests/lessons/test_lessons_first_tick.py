@@ -21,14 +21,14 @@ RUNS = (
 LOOK = """
 import json, sys
 
-from himpc.compilation import compiled
+from himpc.compilation import private
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import load_scene, prepared
 from lessons.session.start import begin
 
 late = []
-loaded = compiled.load
-compiled.load = lambda function, arguments: late.append(function.__name__) or loaded(function, arguments)
+loaded = private.load
+private.load = lambda function, arguments: late.append(function.__name__) or loaded(function, arguments)
 for name in sys.argv[1:]:
     scene, _, controller = name.partition("/")
     session = begin(prepared(load_scene(scene), controller, []))

@@ -1,20 +1,14 @@
-"""Entry: the filter of a dragged target, see `references.target`."""
+"""Entry: the filter of a dragged target, see `references.target`; `references.filter` has it as formulas."""
 
 from __future__ import annotations
 
 import math
 
 from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
+from himpc.constants import APPROACH_RATE, STILL, VELOCITY_RATE
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.kinematics import turned_away
 from himpc.tick.kernel.linear import copy, dot
-
-_APPROACH = 6.0
-"""1/s: how fast the remaining distance closes near the raw target."""
-_RATE = 36.0
-"""1/s: how fast the filtered velocity follows the one wanted."""
-_STILL = 1e-9
-"""Below this distance and speed the filtered target snaps to rest: it must not drift for ever."""
 
 
 @piece
@@ -91,17 +85,17 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     if width > m and not rests:
         turned_away(raw.reshape(3, 3), now[:9].reshape(3, 3), away)
     distance, speed = math.sqrt(dot(away, away, m)), math.sqrt(dot(velocity, velocity, m))
-    if rests or (distance < _STILL and speed < 10.0 * _STILL):
+    if rests or (distance < STILL and speed < 10.0 * STILL):
         copy(raw, then, width)
         then[width:] = 0.0
         copy(away, then[width + 2 * m :], m)
         then[width + 3 * m] = 1.0
         return
     # Never faster than a stop with half the acceleration cap allows; linear close to the goal.
-    wanted = min(caps[0], _APPROACH * distance, math.sqrt(caps[1] * distance))
+    wanted = min(caps[0], APPROACH_RATE * distance, math.sqrt(caps[1] * distance))
     for a in range(m):
         goal = away[a] * (wanted / distance) if distance > 0.0 else 0.0
-        along[a] = _RATE * (goal - velocity[a])
+        along[a] = VELOCITY_RATE * (goal - velocity[a])
     shorten(along, caps[1], m)
     jerked(velocity, acceleration, along, speed, caps, T_s, m, change)
     for a in range(m):

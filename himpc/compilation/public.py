@@ -1,0 +1,64 @@
+"""Compiling with what Numba documents and nothing else; see the package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import njit
+
+from himpc.compilation.options import OPTIONS, Function
+from himpc.compilation.sources import digest_of
+
+config: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
+piece = njit(**OPTIONS)
+"""See `compiled`."""
+
+
+def entry(*arguments: Any) -> Callable[[Function], Any]:
+    """See `compiled`."""
+
+    def compile_now(function: Function) -> Any:
+        # Numba's cache knows the function's own file; the name of the folder stands for all the others.
+        given: str = config.CACHE_DIR
+        kept = Path(given) if given else Path(function.__code__.co_filename).parent / "__pycache__" / "public"
+        config.CACHE_DIR = str(kept / digest_of(function).hex()[:16])
+        try:
+            return njit(arguments, cache=True, **OPTIONS)(function)
+        finally:
+            config.CACHE_DIR = given
+
+    return compile_now
+
+
+@contextmanager
+def told(tell: Callable[[str], None]) -> Iterator[None]:
+    """See `compiled`; here `tell` hears nothing."""
+    yield
+
+
+@piece
+def vector(data: Any, start: int, n: int) -> Any:
+    """See `views`."""
+    return data[start : start + n]
+
+
+@piece
+def matrix(data: Any, start: int, rows: int, columns: int) -> Any:
+    """See `views`."""
+    return data[start : start + rows * columns].reshape((rows, columns))
+
+
+@piece
+def matrices(data: Any, start: int, count: int, rows: int, columns: int) -> Any:
+    """See `views`."""
+    return data[start : start + count * rows * columns].reshape((count, rows, columns))
+
+
+@piece
+def borrowed(array: Any) -> Any:
+    """See `views`."""
+    return array

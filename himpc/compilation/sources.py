@@ -1,0 +1,47 @@
+"""The source files that a compiled function depends on: when one of them changes, it is compiled anew."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+_IMPORTS = re.compile(r"^from ([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+"""Imports for types alone are indented, and change no code."""
+_PACKAGE = __name__.partition(".")[0]
+
+
+def digest_of(function: Callable[..., Any]) -> bytes:
+    """A digest of every file in `sources_of` a function."""
+    return sha256(b"".join(_read(file)[0] for file in sources_of(function))).digest()
+
+
+def sources_of(function: Callable[..., Any]) -> list[Path]:
+    """The file of a function, and the files that it imports from this package, from its own or from those of
+    the pieces that it calls, directly or through others: they define these pieces, and constants that are
+    compiled in. And the tool chain, which sets the compiler's options."""
+    pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
+    packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
+    files = {Path(function.__code__.co_filename)}
+    waiting = [*files]
+    files.update(Path(__file__).parent.glob("*.py"))
+    while waiting:
+        for module in _read(waiting.pop())[1]:
+            file = getattr(sys.modules.get(module), "__file__", None)
+            if module.partition(".")[0] in packages and file and Path(file) not in files:
+                files.add(Path(file))
+                waiting.append(Path(file))
+    return sorted(files)
+
+
+@lru_cache(maxsize=256)
+def _read(file: Path) -> tuple[bytes, tuple[str, ...]]:
+    """The digest of a file's content, and the dotted names that it imports; some of them are modules."""
+    text = file.read_bytes() if file.is_file() else b""
+    found = _IMPORTS.findall(text.decode(errors="replace"))
+    names = [(module, f"{module}.{name}") for module, line in found for name in re.findall(r"\w+", line)]
+    return sha256(text).digest(), tuple(dict.fromkeys(each for pair in names for each in pair))
