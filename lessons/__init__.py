@@ -7,11 +7,11 @@ from robots.lazy import lazily
 if TYPE_CHECKING:
     from lessons.experiments.jobs import Job, perform_all
     from lessons.experiments.tune import chosen, tune
-    from lessons.own.resolve import scene_named, with_tasks
     from lessons.recording.arrays import arrays
     from lessons.recording.recording import Recording
     from lessons.recording.run import run
     from lessons.recording.summary import summary
+    from lessons.runs.named import scene_named, with_tasks
     from lessons.scenes.catalog import load_scene, prepared, torque_scene
     from lessons.scenes.run_spec import RunSpec
     from lessons.session.start import begin
@@ -47,10 +47,10 @@ __getattr__ = lazily(
         "perform_all": "experiments.jobs",
         "prepared": "scenes.catalog",
         "run": "recording.run",
-        "scene_named": "own.resolve",
+        "scene_named": "runs.named",
         "summary": "recording.summary",
         "torque_scene": "scenes.catalog",
         "tune": "experiments.tune",
-        "with_tasks": "own.resolve",
+        "with_tasks": "runs.named",
     },
 )

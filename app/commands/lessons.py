@@ -31,7 +31,7 @@ def lessons(
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.course import COURSE
-    from lessons.own.resolve import lesson_named
+    from lessons.runs.named import lesson_named
     from lessons.teaching.check import check as check_lessons
 
     chosen = [lesson_named(name) for name in dict.fromkeys(check or COURSE)]

@@ -21,8 +21,8 @@ def new(
             file of an exercise (himpc-lab grade lists them), a scene, a lesson, or a kind of task (com,
             plane_distance, …).
     """
+    from lessons.authoring.new import write_new
     from lessons.exercises import EXERCISES, load_exercise
-    from lessons.own.new import write_new
 
     write_new(kind, file, start)
     exercise = load_exercise(start) if start is not None and start in EXERCISES else None

@@ -49,10 +49,10 @@ def run(
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
     """
-    from lessons.own.resolve import tasks_named
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
+    from lessons.runs.named import tasks_named
 
     spec = _given(scene, urdf, tip, state)
     if controller is not None:  # instead of the code's

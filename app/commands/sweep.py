@@ -53,8 +53,8 @@ def sweep(
         metrics,
         usual_folder,
     )
-    from lessons.own.resolve import tasks_named
     from lessons.parallel import on_cores
+    from lessons.runs.named import tasks_named
     from lessons.scenes.run_spec import RunSpec
 
     own = tasks_named(set)

@@ -182,7 +182,7 @@ class SceneChoice:
         """The choice without those tasks of files that its robot cannot have, its scene, and why each is left
         out: who opened a file for one robot is not kept from the others. Raises InputError for what cannot be
         loaded; also if the stack names such a task."""
-        from lessons.own.resolve import misfits
+        from lessons.runs.named import misfits
 
         choice = self.resolved()
         bare, run = choice._bare(), choice.run
@@ -196,7 +196,7 @@ class SceneChoice:
 
     def _bare(self) -> Scene:
         """The scene before anything is set."""
-        from lessons.own.resolve import scene_named
+        from lessons.runs.named import scene_named
         from lessons.scenes.catalog import load_scene
 
         run = self.run

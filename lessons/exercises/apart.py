@@ -22,8 +22,8 @@ from lessons.exercises.inside import wire
 from lessons.exercises.inside.now import numbers_of, shape_of
 from lessons.exercises.inside.serve import ROOT
 from lessons.exercises.watch import LOOK, Watch
-from lessons.own.controllers import LONGEST_TICK
 from lessons.own.files import Source
+from lessons.session.controllers import LONGEST_TICK
 from robots import InputError
 from robots.errors import shortened
 from robots.family import end_family, has_ended, memory_of, spent

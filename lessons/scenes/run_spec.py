@@ -42,7 +42,7 @@ class RunSpec:
 
     def loaded(self) -> Scene:
         """The scene without controller and assignments. Raises InputError if it cannot be loaded."""
-        from lessons.own.resolve import scene_named, with_tasks
+        from lessons.runs.named import scene_named, with_tasks
         from lessons.scenes.catalog import with_controllers
 
         scene = with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
@@ -55,7 +55,7 @@ class RunSpec:
 
     def applied_to(self, scene: Scene) -> Scene:
         """The scene, however it was loaded, with all that the run says besides."""
-        from lessons.own.resolve import with_tasks
+        from lessons.runs.named import with_tasks
         from lessons.scenes.catalog import prepared, with_controllers
 
         scene = with_tasks(with_controllers(scene, self.files), self.tasks)

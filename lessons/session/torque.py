@@ -17,9 +17,9 @@ from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of
 from lessons.events import Event, MoveTarget, Push
-from lessons.own.controllers import controller_of
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
+from lessons.session.controllers import controller_of
 from lessons.session.deadline import Outbox
 from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.places import Places

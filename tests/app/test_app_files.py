@@ -11,8 +11,8 @@ from app.client.learner import Learner
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.authoring.new import text_of
 from lessons.own.folder import Folder
-from lessons.own.new import text_of
 from lessons.replay.progress import read_handed_in
 from lessons.replay.state import State, decode, encode
 from lessons.scenes.run_spec import RunSpec

@@ -16,8 +16,8 @@ from app.server.server import PageServer
 from app.worker.ghost import GhostBody
 from app.worker.simulation import Body
 from browsing.wire import Wire, eventually
+from lessons.authoring.new import text_of
 from lessons.events import Reset, Set
-from lessons.own.new import text_of
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import RunSpec
@@ -175,7 +175,7 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
 
 
 def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
-    from lessons.own.new import text_of
+    from lessons.authoring.new import text_of
 
     scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.py"
     scene.write_text(text_of("scene", None, "scene.py"))

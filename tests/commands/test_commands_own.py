@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from app.__main__ import main
+from lessons.authoring.new import TASKS
 from lessons.exercises import EXERCISES
-from lessons.own.new import TASKS
 
 
 @pytest.fixture(autouse=True)

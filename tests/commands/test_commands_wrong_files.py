@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from app.__main__ import main
+from lessons.authoring.new import text_of
 from lessons.own import judge
-from lessons.own.new import text_of
 
 SCENE, TASK, LESSON = (text_of(kind, None, "mine.py") for kind in ("scene", "task", "lesson"))
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lessons.authoring.new import text_of
 from lessons.own.files import execute, read
 from lessons.own.kinds import kind_of
 from lessons.own.load import load
-from lessons.own.new import text_of
-from lessons.own.resolve import lesson_named, scene_named
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.replay.state import decode, encode, state_of
+from lessons.runs.named import lesson_named, scene_named
 from lessons.scenes.catalog import load_scene, prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession

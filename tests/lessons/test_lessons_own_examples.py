@@ -9,9 +9,9 @@ import pytest
 
 import lessons.examples
 from lessons.events import MoveTarget, Push
-from lessons.own.controllers import controller_of
 from lessons.recording.run import run
 from lessons.scenes.catalog import load_scene, prepared, torque_scene
+from lessons.session.controllers import controller_of
 from lessons.session.torque import TorqueSession
 
 FOLDER = Path(next(iter(lessons.examples.__path__)))

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from lessons.own.new import text_of
-from lessons.own.resolve import tasks_named
+from lessons.authoring.new import text_of
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
+from lessons.runs.named import tasks_named
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import differences
 from lessons.settings.torque import TorqueSettings

@@ -13,11 +13,11 @@ import numpy as np
 from himpc.kinematics.configuration import Configuration
 from himpc.stack import Level
 from himpc.tasks import Task
-from lessons.own.check import check_lesson, check_scene
 from lessons.own.files import Source, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
 from lessons.own.load import alone, load
+from lessons.runs.check import check_lesson, check_scene
 from lessons.scenes.catalog import as_torque_scene, load_scene, with_own_tasks
 from lessons.scenes.scene import Scene
 from lessons.settings.assignments import parse_assignment

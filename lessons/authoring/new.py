@@ -51,7 +51,7 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
     elif kind == "task" and start is not None:
         text = _task(start)
     else:
-        text = _read("lessons.own.begin", kind)
+        text = _read("lessons.authoring.begin", kind)
     return text.replace("FILE.py", file)
 
 
