@@ -136,45 +136,72 @@ def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
 
 LESSONS = {
     "events": (),
-    "settings": ("events",),
-    "scenes": ("settings", "events"),
-    "session": ("scenes", "settings", "events"),
-    "recording": ("session", "scenes", "settings", "events"),
-    "geometry": ("session",),
-    "teaching": ("recording", "scenes", "settings", "events", "parallel"),
-    "experiments": ("recording", "session", "scenes", "settings", "events", "parallel", "plots"),
-    "course": ("teaching", "events"),
-    "exercises": ("teaching", "recording", "session", "scenes", "settings", "events", "parallel"),
-    "replay": ("course", "scenes", "settings", "events"),
-    "papers": ("replay", "experiments", "scenes", "settings", "plots"),
+    "own": (),
+    "examples": (),
     "plots": (),
     "parallel": (),
     "cluster": ("parallel",),
+    "settings": ("events", "own"),
+    "scenes": ("settings", "events", "own"),
+    "session": ("scenes", "settings", "events", "own"),
+    "runs": ("session", "scenes", "settings", "events", "own"),
+    "scenes/run_spec": ("runs", "scenes", "events"),
+    "recording": ("session", "scenes", "settings", "events"),
+    "geometry": ("session",),
+    "teaching": ("recording", "scenes/run_spec", "scenes", "settings", "events", "parallel"),
+    "experiments": (
+        *("recording", "scenes/run_spec", "session", "scenes", "settings", "events", "own", "parallel"),
+        "plots",
+    ),
+    "course": ("teaching", "events"),
+    "exercises": (
+        *("teaching", "recording", "scenes/run_spec", "session", "scenes", "settings", "events", "own"),
+        "parallel",
+    ),
+    "authoring": ("course", "exercises", "teaching", "runs", "scenes", "events", "own"),
+    "replay": ("course", "scenes/run_spec", "scenes", "settings", "events", "own"),
+    "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots"),
+    "headless": ("recording", "runs", "scenes"),
+    "kinds": ("recording", "scenes"),
+    "mobile": ("events",),
 }
-"""What each part of lessons/ may import beside itself and `own`: files of a learner's own stand in for
-settings, scenes, sessions and lessons alike, so that folder is on nobody's side."""
+"""What each part of lessons/ may import beside itself. A run names its scene, which may be that of a file:
+only trying it out in a session shows whether it can be used, and so runs stand above sessions."""
+
+
+def lessons_part(name: str) -> str:
+    """The part of lessons/ that a dotted name is of."""
+    words = name.split(".")
+    here = [ROOT / "lessons" / f"{word}{end}" for word in words[1:2] for end in ("", ".py")]
+    if here and not any(place.exists() for place in here):
+        words = origins(ROOT / "lessons" / "__init__.py")[words[1]].split(".")  # it is shown by the package
+    return next((part for k in (3, 2) if (part := "/".join(words[1:k])) in LESSONS), "")
 
 
 @pytest.mark.parametrize("part", LESSONS)
 def test_lessons_are_built_in_one_direction(part: str) -> None:
-    """settings, events ← scenes ← session ← recording ← teaching, experiments ← course, papers."""
-    path = ROOT / "lessons" / f"{part}.py"
-    files = [path] if path.exists() else sources(f"lessons/{part}")
+    """settings, events ← scenes ← session ← runs ← teaching, experiments ← course, papers."""
+    files = [path for path in sources("lessons") if lessons_part(dotted(path)) == part]
     assert files
     wrong = {
         f"{path.relative_to(ROOT)} imports {name}"
         for path in files
         for name in imports(path)
-        if within(name, "lessons") and name.split(".")[1] not in (part, "own", *LESSONS[part])
+        if within(name, "lessons") and lessons_part(name) not in (part, *LESSONS[part])
     }
     assert not wrong
 
 
 def test_lessons_have_no_other_parts() -> None:
-    """Beside these there are only what is one's own, examples to begin with, and names of before."""
-    places = [each for each in (ROOT / "lessons").iterdir() if each.stem[0] not in "._"]
-    parts = {each.stem for each in places if each.is_dir() or each.suffix == ".py"}
-    assert parts - set(LESSONS) == {"own", "examples", "headless", "kinds", "mobile"}
+    """Every file belongs to one."""
+    assert {path for path in sources("lessons") if not lessons_part(dotted(path))} == {
+        ROOT / "lessons" / "__init__.py"
+    }
+
+
+def dotted(path: Path) -> str:
+    """The name of a file's module."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
 HIMPC_ROOT = ("catalog", "constants", "qp", "rotation", "stack", "telemetry")
@@ -450,8 +477,7 @@ def origins(path: Path) -> dict[str, str]:
 
 def stands_in(path: Path, module: str) -> bool:
     """Whether a file is that module, or one that the package of that name hands on."""
-    dotted = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-    return bool(module) and within(dotted, module)
+    return bool(module) and within(".".join(path.relative_to(ROOT).with_suffix("").parts), module)
 
 
 def test_files_stay_readable() -> None:

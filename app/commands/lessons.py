@@ -30,8 +30,8 @@ def lessons(
         check: names of the lessons to check, or Python files of your own; none after --check: all of them.
         json: write JSON to this file, or to standard output for "-".
     """
+    from lessons.authoring.lesson import lesson_named
     from lessons.course import COURSE
-    from lessons.runs.named import lesson_named
     from lessons.teaching.check import check as check_lessons
 
     chosen = [lesson_named(name) for name in dict.fromkeys(check or COURSE)]

@@ -83,7 +83,7 @@ class RunStep:
 def _lesson(name: str) -> Lesson:
     if not is_file(name):
         return load_lesson(name)
-    from lessons.runs.named import lesson_named
+    from lessons.authoring.lesson import lesson_named
 
     return lesson_named(name)
 

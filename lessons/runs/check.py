@@ -1,25 +1,21 @@
-"""Whether what a file defines can be used, before anything is shown of it."""
+"""Whether the scene of a file can be used, before anything is shown of it."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from lessons.events import Event
 from lessons.scenes.scene import Scene
+from lessons.session.start import begin
 from robots import InputError
 from robots.errors import shortened
-
-if TYPE_CHECKING:
-    from lessons.teaching.lesson import Lesson
 
 
 def check_scene(scene: Scene) -> None:
     """Raises InputError for a scene that cannot begin, or one of whose events cannot happen; or whatever its
     own code raises."""
-    from lessons.session.start import begin
-
-    _check_duration(scene.duration)
+    check_duration(scene.duration)
     for each in scene.events:
         if not (isinstance(each, tuple) and len(each) == 2 and isinstance(each[1], get_args(Event))):
             raise InputError(
@@ -44,30 +40,8 @@ def check_scene(scene: Scene) -> None:
         raise InputError(session.notices[0])
 
 
-def check_lesson(lesson: Lesson) -> None:
-    """Raises InputError, naming the step, for a lesson whose steps cannot be run."""
-    from lessons.teaching.claim import Relation
-    from lessons.teaching.lesson import Step
-
-    if not lesson.steps:
-        raise InputError("the lesson has no steps: give at least one Step(…)")
-    for place, step in enumerate(lesson.steps, start=1):
-        if not isinstance(step, Step):
-            raise InputError(f"step {place} is a {type(step).__name__}: make it with Step(…)")
-        try:
-            _check_duration(step.duration)
-            lesson.run_of(step).prepared()
-            for claim in step.claims:
-                if claim.relation not in get_args(Relation):
-                    raise InputError(
-                        f"claim '{claim.text}': {claim.relation!r} is no relation; choose one of "
-                        f"{', '.join(get_args(Relation))}"
-                    )
-        except InputError as error:
-            raise InputError(f"step {place}, '{step.title}': {error}") from None
-
-
-def _check_duration(seconds: Any) -> None:
+def check_duration(seconds: Any) -> None:
+    """Raises InputError for what is no number of seconds, more than 0."""
     number = isinstance(seconds, (int, float)) and not isinstance(seconds, bool)
     if not (number and math.isfinite(seconds) and seconds > 0):
         raise InputError(f"duration is {shortened(repr(seconds), 40)}: give seconds, more than 0")

@@ -1,4 +1,4 @@
-"""Scenes, lessons and tasks by name or, where whoever started the program said so, by the path of a file."""
+"""Scenes and tasks by name or, where whoever started the program said so, by the path of a file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache, partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,15 +17,12 @@ from lessons.own.files import Source, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
 from lessons.own.load import alone, load
-from lessons.runs.check import check_lesson, check_scene
+from lessons.runs.check import check_scene
 from lessons.scenes.catalog import as_torque_scene, load_scene, with_own_tasks
 from lessons.scenes.scene import Scene
+from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.assignments import parse_assignment
 from robots import InputError, Robot
-
-if TYPE_CHECKING:
-    from lessons.scenes.torque_scene import TorqueScene
-    from lessons.teaching.lesson import Lesson
 
 TASK_SCENE = "iiwa14-hold"
 """Where a task of one's own is tried if no scene is named."""
@@ -54,34 +51,13 @@ def _scene_of(source: Source) -> Scene:
         return with_task(load_scene(TASK_SCENE), source.path)
     expected(module, "scene")
     given = vars(module).get("SCENE")
-    found = _called(source, vars(module)["scene"]) if given is None else given
+    found = called(source, vars(module)["scene"]) if given is None else given
     if not isinstance(found, Scene):
         raise InputError(
             f"{source.path}: its scene is a {type(found).__name__}: make it with TorqueScene or "
             "VelocityScene, or change one of lessons.load_scene"
         )
-    _called(source, partial(check_scene, found))
-    return replace(found, name=source.path)
-
-
-def lesson_named(name: str) -> Lesson:
-    """A lesson by its name or file. Raises InputError if there is none, or the file cannot be used."""
-    from lessons.course import load_lesson
-
-    return _lesson_of(read(name)) if is_file(name) else load_lesson(name)
-
-
-@lru_cache(maxsize=64)
-def _lesson_of(source: Source) -> Lesson:
-    """The lesson of a file, tried once per content."""
-    from lessons.teaching.lesson import Lesson
-
-    module = module_of(source)
-    expected(module, "lesson")
-    found = vars(module)["LESSON"]
-    if not isinstance(found, Lesson):
-        raise InputError(f"{source.path}: LESSON is a {type(found).__name__}: make it with Lesson(…)")
-    _called(source, partial(check_lesson, found))
+    called(source, partial(check_scene, found))
     return replace(found, name=source.path)
 
 
@@ -103,7 +79,7 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
     """
     scene = as_torque_scene(scene, "a task of your own")
     source, task = read(name), task_in(name)
-    _called(source, lambda: check_task(task, scene.robot, name))
+    called(source, lambda: check_task(task, scene.robot, name))
     first, *others = scene.settings.levels
     levels = (first, Level((task,)), *others)
     return replace(scene, settings=replace(scene.settings, levels=levels, own_tasks=((name, task),)))
@@ -132,7 +108,7 @@ def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
 def _task_for(robot: Robot, name: str) -> Task:
     """The task of a file. Raises InputError if it cannot be used, or not on this robot."""
     task = task_in(name)
-    _called(read(name), partial(check_task, task, robot, name))
+    called(read(name), partial(check_task, task, robot, name))
     return task
 
 
@@ -199,7 +175,8 @@ def _module_of(source: Source) -> ModuleType:
     return load(source)
 
 
-def _called(source: Source, function: Callable[[], Any]) -> Any:
+def called(source: Source, function: Callable[[], Any]) -> Any:
+    """function(), which runs code of the file. Raises InputError, with the line, for whatever goes wrong."""
     try:
         with alone(source.path):
             return function()

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lessons.authoring.lesson import lesson_named
 from lessons.authoring.new import text_of
 from lessons.own.files import execute, read
 from lessons.own.kinds import kind_of
@@ -16,7 +17,7 @@ from lessons.own.load import load
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.replay.state import decode, encode, state_of
-from lessons.runs.named import lesson_named, scene_named
+from lessons.runs.named import scene_named
 from lessons.scenes.catalog import load_scene, prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
@@ -194,7 +195,7 @@ def test_own_second_import_that_never_ends_is_ended(where: str, file, monkeypatc
     """The trial ended well, and what comes then is bounded, too."""
     from concurrent.futures import ThreadPoolExecutor
 
-    from lessons.own import controllers
+    from lessons.session import controllers
 
     monkeypatch.setattr(controllers, "load", partial(load, seconds=1.0))
     scene = prepared(load_scene("planar3-hold"), file(ONCE.format("while True: pass")), ())

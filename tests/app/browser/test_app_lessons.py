@@ -16,10 +16,10 @@ from app.link.messages import Post
 from app.server.server import PageServer
 from browsing.hands import eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
+from lessons.authoring.lesson import lesson_named
 from lessons.authoring.new import text_of
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
-from lessons.runs.named import lesson_named
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson
