@@ -11,6 +11,7 @@ PACKAGES = {
     "lessons": "What is taught: scenes, runs, experiments",
 }
 INSIDE = (
+    "himpc.compilation",
     "himpc.tick",
     "lessons.course",
     "lessons.papers",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import ctypes
 import os
 import stat
@@ -18,6 +19,7 @@ import pytest
 from himpc.catalog import CONTROLLERS
 from himpc.compilation.compiled import told
 from himpc.compilation.compiling import compile_all, compiled_functions
+from himpc.compilation.sources import sources_of
 from himpc.tick.kernel.linear import dot
 from lessons.events import Set
 from lessons.scenes.catalog import torque_scene
@@ -157,18 +159,47 @@ def test_what_is_on_disk_needs_no_compiler() -> None:
 
 
 def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> None:
-    """When it changes, those that call it are compiled afresh."""
-    for folder in ("install/parts", "home", "tmp"):
+    """When it changes, or a constant that it imports, those that call it are compiled afresh."""
+    for folder in ("install/parts/below", "home", "tmp"):
         (tmp_path / folder).mkdir(parents=True)
     above, below = SMALL.split("\n\n@entry")
+    above = f"from parts.below.constants import TWO\n{above.replace('2.0', 'TWO')}"
+    constants = tmp_path / "install" / "parts" / "below" / "constants.py"
+    constants.write_text("TWO = 1.0")
     (tmp_path / "install" / "parts" / "part.py").write_text(above)
     (tmp_path / "install" / "small.py").write_text(
         "from himpc.compilation.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n"
         f"@entry{below}"
     )
+    wrong = start(tmp_path)
+    assert "AssertionError" in wrong.communicate(timeout=120)[1]  # of LOAD: what is compiled gives half
+    constants.write_text("TWO = 2.0")
     assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]
     (tmp_path / "install" / "parts" / "part.py").write_text(f"{above}\n# changed")
     assert compiled_and_place(start(tmp_path))[0] == 2
+
+
+def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
+    """Whatever a compiled function's module imports of ours, directly or not, is in its digest."""
+
+    def imported(file: Path, known: set[Path]) -> set[Path]:
+        known.add(file)
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom):
+                names = (str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names))
+                for name in names:
+                    path = ROOT.joinpath(*name.split(".")).with_suffix(".py")
+                    if name.startswith("himpc.") and path.exists() and path not in known:
+                        imported(path, known)
+        return known
+
+    checked: set[Path] = set()
+    for module, names in compiled_functions().items():
+        loaded = import_module(module)
+        found = sources_of(getattr(loaded, next(iter(names)).rpartition(".")[2]).py_func)
+        assert imported(Path(str(loaded.__file__)), set()) <= set(found)
+        checked.update(found)
+    assert ROOT / "himpc" / "constants.py" in checked
 
 
 def test_nobody_but_compiled_code_calls_a_piece() -> None:

@@ -22,8 +22,7 @@ from himpc.limits import Rows
 from himpc.limits.braking import least_slack
 from himpc.references import Outlook
 from himpc.tick import ladder
-from himpc.tick.kernel.solve import BUDGET
-from himpc.tick.tables import budget_of
+from himpc.tick.tables import BUDGET, budget_of
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 

@@ -20,9 +20,6 @@ from himpc.tick.kernel.cascade import (
 from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.taken import Taken
 
-BUDGET = 36e6
-"""Multiplications that the changes of active rows may cost in one tick: some twelve milliseconds, less than
-twenty on a slower core. A count, not a clock: the same seed gives the same run."""
 _SHARE = 0.75
 """What one attempt at a level may take of what is left, so that levels below it get theirs; the last one may
 take all."""
