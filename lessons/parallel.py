@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Protocol, TypeVar
 
 from robots import InputError
-from robots.orphans import end_with_parent
+from robots.processes.orphans import end_with_parent
 
 T = TypeVar("T")
 U = TypeVar("U")

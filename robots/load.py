@@ -10,7 +10,7 @@ import numpy as np
 from robots.catalog import CATALOG, CatalogEntry
 from robots.errors import InputError, shortened, unknown_name
 from robots.importing import Import, bounds, import_robot
-from robots.isolation import Fault, isolated
+from robots.processes.isolation import Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import canonicalise, load_bytes

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from robots.isolation import DEADLINE, Fault, isolated
 from robots.meshes import installed_mesh
+from robots.processes.isolation import DEADLINE, Fault, isolated
 from robots.simplify import simplify
 
 MAX_FACES = 12_000  # per mesh: what a browser on a laptop still turns smoothly with several robots

@@ -26,7 +26,7 @@ DOORS = {
     "rich": ("app/",),
     "matplotlib": ("lessons/plots/",),
     "distributed": ("lessons/cluster.py",),
-    "psutil": ("robots/family.py",),
+    "psutil": ("robots/processes/family.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }

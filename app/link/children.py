@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import Protocol
 
 from app.link.wire import Wire
-from robots.orphans import end_with_parent
+from robots.processes.orphans import end_with_parent
 
 
 class Child(Protocol):

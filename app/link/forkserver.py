@@ -24,8 +24,8 @@ from typing import NoReturn
 
 from app.link.children import Forked, one_thread_each
 from app.link.wire import Handle, Wire, packed
-from robots.isolation import is_stopped, threads, waited
-from robots.orphans import end_with
+from robots.processes.isolation import is_stopped, threads, waited
+from robots.processes.orphans import end_with
 
 PATIENCE = 3.0
 """s after which a server that is ready but does not fork counts as stuck, and any that somebody has stopped;

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 
-from robots.orphans import end_with
+from robots.processes.orphans import end_with
 
 _COMPILES = "HIMPC_LAB_COMPILES"  # in the environment of such a process
 

@@ -26,7 +26,7 @@ from lessons.own.files import Source
 from lessons.session.controllers import LONGEST_TICK
 from robots import InputError
 from robots.errors import shortened
-from robots.family import end_family, has_ended, memory_of, spent
+from robots.processes.family import end_family, has_ended, memory_of, spent
 
 Array = NDArray[np.float64]
 

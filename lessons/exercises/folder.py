@@ -13,7 +13,7 @@ from lessons.exercises.grade import WITHIN, Grade, Submission, grade_apart
 from lessons.own.files import SUFFIX, Source, read
 from lessons.parallel import Failed, Spread
 from robots import InputError
-from robots.isolation import Allowance
+from robots.processes.isolation import Allowance
 
 COLUMNS: tuple[str, ...] = (
     *("file", "exercise", "points", "of", "missed", "error", "seed", "asked", "sha256", "protection"),

@@ -26,7 +26,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot
-from robots.isolation import PATIENCE, Allowance, Fault, isolated
+from robots.processes.isolation import PATIENCE, Allowance, Fault, isolated
 
 WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program itself", "leave that out")
 """What grading one file may cost."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import final
 
-from robots.family import spent
-from robots.isolation import PATIENCE
+from robots.processes.family import spent
+from robots.processes.isolation import PATIENCE
 
 LOOK = 0.1
 """s between looks at a process that has not answered."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import ParamSpec, TypeVar, final
 
-from robots.isolation import waited
+from robots.processes.isolation import waited
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")

@@ -10,7 +10,7 @@ from lessons.own.files import Source
 from lessons.own.kinds import Kind, kind_of
 from lessons.own.load import load
 from robots import InputError
-from robots.isolation import Allowance, Fault, isolated
+from robots.processes.isolation import Allowance, Fault, isolated
 
 
 def judged(source: Source) -> Kind:

@@ -29,7 +29,7 @@ def open_files() -> set[str]:
 
 def apart(work: Any, *args: Any, seconds: float = 10.0) -> Any:
     """isolated(work, *args), as a copy of this process if it can be, which has seen "the original"."""
-    from robots.isolation import Allowance, Fault, isolated
+    from robots.processes.isolation import Allowance, Fault, isolated
 
     _seen[:] = ["the original"]
     try:

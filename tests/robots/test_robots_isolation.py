@@ -18,8 +18,9 @@ import pytest
 from arms import two_joint_arm
 from hostile import chain
 
-from robots import InputError, check_urdf, isolation, load_robot, load_urdf_text
-from robots.isolation import Fault, isolated
+from robots import InputError, check_urdf, load_robot, load_urdf_text
+from robots.processes import isolation
+from robots.processes.isolation import Fault, isolated
 
 
 @pytest.mark.parametrize(
@@ -104,7 +105,7 @@ def test_a_process_with_two_threads_is_not_copied() -> None:
 def test_it_dies_with_its_parent(tmp_path: Path, copied: bool) -> None:
     file = tmp_path / "pid"
     code = (
-        "import misbehaving; from robots.isolation import isolated as i; "
+        "import misbehaving; from robots.processes.isolation import isolated as i; "
         f"i(misbehaving.stay, {str(file)!r}, copied={copied})"
     )
     path = os.pathsep.join(filter(None, sys.path))

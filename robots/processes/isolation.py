@@ -122,7 +122,7 @@ def _copies() -> bool:
 
 
 def _empty(within: Allowance) -> subprocess.Popen[bytes]:
-    folder = str(Path(__file__).parents[1])
+    folder = str(Path(__file__).parents[2])
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(dict.fromkeys((folder, *filter(None, sys.path)))),
@@ -132,7 +132,7 @@ def _empty(within: Allowance) -> subprocess.Popen[bytes]:
     }
     limits = (str(os.getpid()), str(within.seconds), str(within.memory))
     return subprocess.Popen(
-        (sys.executable, "-P", "-c", "from robots.isolation import serve; serve()", *limits),
+        (sys.executable, "-P", "-c", "from robots.processes.isolation import serve; serve()", *limits),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
