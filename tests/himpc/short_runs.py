@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,4 +90,5 @@ def htmpc() -> Array:
 RUNS: Mapping[str, Callable[[], Array]] = {"osf": osf, "himpc": himpc, "htmpc": htmpc}
 
 if __name__ == "__main__":
-    np.savez(Path(sys.argv[1]), **{name: RUNS[name]() for name in sys.argv[2:]})
+    found: dict[str, Any] = {name: RUNS[name]() for name in sys.argv[2:]}
+    np.savez(Path(sys.argv[1]), **found)
