@@ -10,7 +10,7 @@ import numpy as np
 
 from himpc.qp import KKT_TOLERANCE
 from himpc.tick.kernel.arena import Arena, Array
-from himpc.tick.kernel.solve import BUDGET
+from himpc.tick.kernel.solve_level import BUDGET
 
 if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from himpc.catalog import CONTROLLERS
-from himpc.compilation.compiled import told
+from himpc.compilation.compiled import on_compiled
 from himpc.compilation.compiling import compile_all, compiled_functions
 from himpc.tick.kernel.linear import dot
 from lessons.events import Set
@@ -221,7 +221,7 @@ def test_no_setting_compiles_in_the_middle_of_a_run() -> None:
         *(Set("controller", name) for name in CONTROLLERS),
         *(Set("controller", "himpc"), Set("route", "explicit")),
     ]
-    with told(late.append):
+    with on_compiled(late.append):
         for change in changes:
             session.post(change)
             for _ in range(3):
