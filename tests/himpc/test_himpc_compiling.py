@@ -28,13 +28,13 @@ ROOT = Path(__file__).parents[2]
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 SMALL = """
-from himpc.compilation.compiled import NUMBER, entry, piece
+from himpc.compilation.compiled import NUMBER, inline_kernel, kernel
 
-@piece
+@inline_kernel
 def _twice(x):
     return 2.0 * x
 
-@entry(NUMBER)
+@kernel(NUMBER)
 def twice(x):
     return _twice(x)
 """
@@ -42,9 +42,9 @@ def twice(x):
 LOAD = """
 import os, sys
 from himpc.catalog import CONTROLLERS
-from himpc.compilation.compiled import told
+from himpc.compilation.compiled import on_compiled
 found = []
-with told(found.append):
+with on_compiled(found.append):
     import small
 assert small.twice(2.0) == 4.0
 print(len(found), small.twice.stats.cache_path)
@@ -160,11 +160,11 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
     """When it changes, those that call it are compiled afresh."""
     for folder in ("install/parts", "home", "tmp"):
         (tmp_path / folder).mkdir(parents=True)
-    above, below = SMALL.split("\n\n@entry")
+    above, below = SMALL.split("\n\n@kernel")
     (tmp_path / "install" / "parts" / "part.py").write_text(above)
     (tmp_path / "install" / "small.py").write_text(
         "from himpc.compilation.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n"
-        f"@entry{below}"
+        f"@kernel{below}"
     )
     assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]
     (tmp_path / "install" / "parts" / "part.py").write_text(f"{above}\n# changed")
