@@ -74,7 +74,7 @@ class CollisionModel:
         gradient = np.empty((most if gradients else 0, tree.moves.shape[1]))
         count = near(
             *(*where, tree.is_revolute, tree.moves, around.joint, around.centre, around.radius, around.kind),
-            *(around.carrier, around.rotation, around.middle, around.half, around.meets, within),
+            *(around.carrier, around.turn, around.middle, around.half, around.meets, within),
             *(np.empty((K, S, 3)), knot, sphere, shape, distance, normal, gradient),
         )
         found = (knot[:count], distance[:count], gradient[:count], sphere[:count], shape[:count])

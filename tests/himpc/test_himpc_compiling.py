@@ -163,7 +163,7 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
     above, below = SMALL.split("\n\n@kernel")
     (tmp_path / "install" / "parts" / "part.py").write_text(above)
     (tmp_path / "install" / "small.py").write_text(
-        "from himpc.compilation.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n"
+        "from himpc.compilation.compiled import NUMBER, kernel\nfrom parts.part import _twice\n\n"
         f"@kernel{below}"
     )
     assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]
