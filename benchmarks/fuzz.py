@@ -59,7 +59,7 @@ class Tally:
     ticks: int = 0
     episodes: int = 0
     faults: Counter[str] = field(default_factory=Counter)
-    rungs: Counter[str] = field(default_factory=Counter)
+    fallbacks: Counter[str] = field(default_factory=Counter)
     longest_ms: float = 0.0
     lines: list[str] = field(default_factory=list)
 
@@ -142,7 +142,7 @@ def event(rng: np.random.Generator, session: TorqueSession) -> Event:
 def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan, spent: float) -> None:
     """What must hold of every plan."""
     tally.ticks += 1
-    tally.rungs.update(level.rung for level in plan.levels)
+    tally.fallbacks.update(level.fallback for level in plan.levels)
     tally.longest_ms = max(tally.longest_ms, 1e3 * spent)
     if spent > LONGEST_S:
         shape = f"{session.settings.controller}, N = {session.settings.horizon}, {session.scene.name}"
@@ -224,7 +224,7 @@ def main() -> int:
                 "ticks": tally.ticks,
                 "episodes": tally.episodes,
                 "faults": dict(tally.faults),
-                "rungs": dict(tally.rungs),
+                "rungs": dict(tally.fallbacks),
                 "longest_ms": round(tally.longest_ms, 2),
             }
         )

@@ -124,7 +124,7 @@ def judged(stack: Stack) -> list[Found] | None:
         if best is None:
             return None
         for route in ROUTES:  # below a level without a point there is another problem
-            right[route] = right[route] and points[route].rung == "solve"
+            right[route] = right[route] and points[route].fallback == "solve"
         errors = [float(np.abs(points[route].U - best.U).max()) if right[route] else None for route in ROUTES]
         found.append(
             Found(stack.robot, stack.seed, place + 1, len(problem.B), best.active, errors[0], errors[1])

@@ -28,7 +28,7 @@ def main(seconds: float = 4.0) -> None:
             for level in plan.levels:
                 print(
                     f"level {level.name}: cost {level.cost:.3g}, increment {np.round(level.U[0], 4)} N·m, "
-                    f"KKT residual {level.kkt_residual:.1e}, {level.rung} in {level.time_us:.0f} µs"
+                    f"KKT residual {level.kkt_residual:.1e}, {level.fallback} in {level.time_us:.0f} µs"
                 )
             for each in plan.binding(session.robot.joint_names):
                 print(

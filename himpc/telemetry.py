@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.level import RUNGS
+from himpc.cascade.level import FALLBACKS
 from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.kinematics.configuration import Configuration
 from himpc.stack import DAMPING_LEVEL, Stack
@@ -21,8 +21,8 @@ __all__ = [
     "AT_POSITION",
     "AT_TORQUE",
     "AT_VELOCITY",
+    "FALLBACKS",
     "PER_LEVEL",
-    "RUNGS",
     "Layout",
     "TaskInfo",
     "arranged",
@@ -78,7 +78,7 @@ class Layout:
     `q` and `v` are the plant's, `q_measured` and `v_measured` what the controller was given; `tau_0` is what
     acted until then. Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w),
     `error/<task>`, `v_d/<task>`, `a_d/<task>` (m each; three where the target is a point to look at); per
-    level the fields cost, kkt, rung (index into RUNGS), time_us, leak and active (number of binding
+    level the fields cost, kkt, rung (index into FALLBACKS), time_us, leak and active (number of binding
     constraints), NaN where the level was not solved.
     """
 

@@ -115,8 +115,8 @@ Run = tuple[Path, str]
 def first_and_second_run(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Run, Run]:
     """What a run recorded and said where nothing was compiled, and the same run after it."""
     config, second = request.config, tmp_path / "second.npz"
-    told = getattr(config, "workerinput", {"cold": config.stash.get(_COLD, None)})
-    if (cold := told["cold"]) is not None:
+    on_compiled = getattr(config, "workerinput", {"cold": config.stash.get(_COLD, None)})
+    if (cold := on_compiled["cold"]) is not None:
         return (Path(cold[0]), cold[1]), (second, _run(second))
     first, cache = tmp_path / "first.npz", str(tmp_path / "cache")
     return (first, _run(first, NUMBA_CACHE_DIR=cache)), (second, _run(second, NUMBA_CACHE_DIR=cache))

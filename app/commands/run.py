@@ -132,7 +132,7 @@ def _show(result: dict[str, Any]) -> None:
     ending = f"out of control at {result['diverged_at_s']:.3f} s" if result["diverged"] else "completed"
     title = f"{result['scene']} · {result['controller']} · {result['duration_s']:g} s simulated, {ending}"
     print_table(title, columns, rows)
-    fallbacks = ", ".join(f"{rung} {count}" for rung, count in solver["fallbacks"].items()) or "none"
+    fallbacks = ", ".join(f"{fallback} {count}" for fallback, count in solver["fallbacks"].items()) or "none"
     pairs = {
         "largest share of its limit": ", ".join(
             f"{kind} {_figure(limits[kind]['max_ratio'])}"

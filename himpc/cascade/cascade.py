@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.explicit import solve_explicit
 from himpc.cascade.last_resort import containing, last_resort, softened
-from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution, Point, Rung
+from himpc.cascade.level import NO_ROWS, Fallback, LevelProblem, LevelSolution, Point
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits.rows import Rows
 from himpc.qp import Solver
@@ -43,18 +43,18 @@ def solve_cascade(
     upper = [problem.B for problem in problems[:-1]]
     U, above = np.zeros((N, n)), []
     points: list[Point] = []
-    rungs: list[Rung] = []
+    fallbacks: list[Fallback] = []
     for problem, Z in zip(problems, [whole_space(N, n), *nested_bases(upper)], strict=True):
         started = perf_counter_ns()
         if Z.shape[2] == 0:
-            point, rung = Point(U, NO_ROWS, 0.0, "empty"), "solve"
+            point, fallback = Point(U, NO_ROWS, 0.0, "empty"), "solve"
         else:
             before = previous.get(problem.name)
-            point, rung, rows = _climb_down(problem, rows, U, above, Z, before, solver)
+            point, fallback, rows = _climb_down(problem, rows, U, above, Z, before, solver)
         U = point.U
         above.append((problem.B, U))
         points.append(point._replace(time_us=(perf_counter_ns() - started) / 1e3))
-        rungs.append(rung)
+        fallbacks.append(fallback)
     B = np.concatenate([np.empty((N, 0, n)), *upper], axis=1)
     leaks = _leaks(upper, B, [point.U for point in points])
     return [
@@ -65,12 +65,12 @@ def solve_cascade(
             point.active,
             point.kkt_residual,
             point.status,
-            rung,
+            fallback,
             point.time_us,
             point.qp_us,
             leak,
         )
-        for problem, point, rung, leak in zip(problems, points, rungs, leaks, strict=True)
+        for problem, point, fallback, leak in zip(problems, points, fallbacks, leaks, strict=True)
     ]
 
 
@@ -82,7 +82,7 @@ def _climb_down(
     Z: Array,
     before: LevelSolution | None,
     solver: Solver,
-) -> tuple[Point, Rung, Rows]:
+) -> tuple[Point, Fallback, Rows]:
     point = solve_explicit(problem, rows, U, above, Z, solver)
     if point is not None:
         return point, "solve", rows
@@ -93,9 +93,9 @@ def _climb_down(
     if widened is not None and point is not None:
         return point, "soften", widened
 
-    optimal = before is not None and before.rung in ("solve", "soften")
-    rung, held = last_resort(widened or rows, before.U if before is not None and optimal else None)
-    return Point(held, NO_ROWS, 0.0, "unsolved"), rung, containing(rows, held)
+    optimal = before is not None and before.fallback in ("solve", "soften")
+    fallback, held = last_resort(widened or rows, before.U if before is not None and optimal else None)
+    return Point(held, NO_ROWS, 0.0, "unsolved"), fallback, containing(rows, held)
 
 
 def _leaks(upper: Sequence[Array], B: Array, increments: Sequence[Array]) -> list[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.level import Rung
+from himpc.cascade.level import Fallback
 from himpc.limits.braking import braking, least_slack, missed
 from himpc.limits.rows import Rows
 
@@ -21,7 +21,7 @@ def softened(rows: Rows) -> Rows | None:
     return rows.widened(np.where(slack > 0, slack + _ROOM, 0.0)) if slack.any() else None
 
 
-def last_resort(rows: Rows, before: Array | None) -> tuple[Rung, Array]:
+def last_resort(rows: Rows, before: Array | None) -> tuple[Fallback, Array]:
     """The last rungs: the shifted "previous" plan if it meets all rows, else "brake": increments that meet
     all rows whenever any do, and bring the joints to rest.
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from himpc.limits.rows import Kind, Rows
 
 Array = NDArray[np.float64]
-Rung = Literal["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"]
-RUNGS: tuple[Rung, ...] = get_args(Rung)
+Fallback = Literal["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"]
+FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
 
 
 class LevelProblem(NamedTuple):
@@ -104,7 +104,7 @@ class LevelSolution(NamedTuple):
     active: ActiveRows
     kkt_residual: float
     status: str
-    rung: Rung
+    fallback: Fallback
     time_us: float
     qp_us: float
     leak: float

@@ -21,10 +21,10 @@ GIVEN_VECTOR = types.Array(float64, 1, "A", readonly=True)
 GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """What others hand over: it may be a slice."""
 
-piece = chain.piece
-"""Compiles a function as a part of every `entry` that calls it, wherever that stands."""
-entry = chain.entry
-"""(*argument types): compiles a function, with every `piece` that it calls, for arguments of these types, and
-for no others, when its module is first imported."""
-told = chain.told
+inline_kernel = chain.inline_kernel
+"""Compiles a function as a part of every `kernel` that calls it, wherever that stands."""
+kernel = chain.kernel
+"""(*argument types): compiles a function, with every `inline_kernel` that it calls, for arguments of these
+types, and for no others, when its module is first imported."""
+on_compiled = chain.on_compiled
 """(tell): while this context is open, `tell` hears the dotted names of functions that had to be compiled."""

@@ -57,9 +57,9 @@ def serve(module: str) -> None:
     # Whatever a module prints is not part of what we tell.
     with os.fdopen(os.dup(1), "w", buffering=1) as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        from himpc.compilation.compiled import told
+        from himpc.compilation.compiled import on_compiled
 
-        with told(lambda name: print(name, file=out)):
+        with on_compiled(lambda name: print(name, file=out)):
             import_module(module)
             if module.startswith("himpc."):
                 from himpc.compilation.compiling import compile_all

@@ -18,7 +18,7 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
         tell: called with (functions ready, of how many) after each that had to be compiled; never if all
             were on disk.
     """
-    from himpc.compilation.compiled import told
+    from himpc.compilation.compiled import on_compiled
 
     waiting = compiled_functions()
     total = sum(map(len, waiting.values()))
@@ -29,7 +29,7 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
             ready.add(function)
             tell(len(ready), total)
 
-    with told(count):
+    with on_compiled(count):
         for module, names in waiting.items():
             import_module(module)
             ready |= names

@@ -28,12 +28,12 @@ except ImportError:  # a system without it: two processes may then compile the s
 
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
-piece = njit(**_PIECE)
+inline_kernel = njit(**_PIECE)
 """See `compiled`."""
 
 
-def entry(*arguments: Any) -> Callable[[Function], Any]:
-    """Compiles a function, with every `piece` that it calls, for arguments of these types, and for no others.
+def kernel(*arguments: Any) -> Callable[[Function], Any]:
+    """Compiles a function, with every `inline_kernel` that it calls, for arguments of these types only.
 
     Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
     that its compilation takes.
@@ -127,7 +127,7 @@ class _Compiled(event.Listener):
 
 
 @contextmanager
-def told(tell: Callable[[str], None]) -> Iterator[None]:
+def on_compiled(tell: Callable[[str], None]) -> Iterator[None]:
     """While it is open, `tell` hears the dotted name of every function that had to be compiled."""
     heard = _Compiled(tell)
     with event.install_listener("numba:compile", heard), event.install_listener(_APART, heard):

@@ -14,11 +14,11 @@ from himpc.compilation.options import OPTIONS, Function
 from himpc.compilation.sources import digest_of
 
 config: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
-piece = njit(**OPTIONS)
+inline_kernel = njit(**OPTIONS)
 """See `compiled`."""
 
 
-def entry(*arguments: Any) -> Callable[[Function], Any]:
+def kernel(*arguments: Any) -> Callable[[Function], Any]:
     """See `compiled`."""
 
     def compile_now(function: Function) -> Any:
@@ -35,30 +35,30 @@ def entry(*arguments: Any) -> Callable[[Function], Any]:
 
 
 @contextmanager
-def told(tell: Callable[[str], None]) -> Iterator[None]:
+def on_compiled(tell: Callable[[str], None]) -> Iterator[None]:
     """See `compiled`; here `tell` hears nothing."""
     yield
 
 
-@piece
+@inline_kernel
 def vector(data: Any, start: int, n: int) -> Any:
     """See `views`."""
     return data[start : start + n]
 
 
-@piece
+@inline_kernel
 def matrix(data: Any, start: int, rows: int, columns: int) -> Any:
     """See `views`."""
     return data[start : start + rows * columns].reshape((rows, columns))
 
 
-@piece
+@inline_kernel
 def matrices(data: Any, start: int, count: int, rows: int, columns: int) -> Any:
     """See `views`."""
     return data[start : start + count * rows * columns].reshape((count, rows, columns))
 
 
-@piece
+@inline_kernel
 def borrowed(array: Any) -> Any:
     """See `views`."""
     return array

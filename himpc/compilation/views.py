@@ -1,4 +1,4 @@
-"""Arrays as the compiled functions see them: parts of a larger one, which the caller of the `entry` keeps."""
+"""Arrays as the compiled functions see them: parts of a larger one, which the kernel's caller keeps."""
 
 from __future__ import annotations
 

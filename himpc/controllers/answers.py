@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.level import NO_ROWS, LevelSolution, Rung
+from himpc.cascade.level import NO_ROWS, Fallback, LevelSolution
 from himpc.controllers.view import LevelView
 from himpc.formulation.forms import usable
 from himpc.limits import Rows
@@ -48,9 +48,9 @@ def next_cost(level: LevelView, effort: Array, T_s: float) -> float:
 
 
 def solution(
-    name: str, U: Array, cost: float, leak: float, status: str = "own code", rung: Rung = "solve"
+    name: str, U: Array, cost: float, leak: float, status: str = "own code", fallback: Fallback = "solve"
 ) -> LevelSolution:
-    return LevelSolution(name, U[None], cost, NO_ROWS, math.nan, status, rung, 0.0, 0.0, leak)
+    return LevelSolution(name, U[None], cost, NO_ROWS, math.nan, status, fallback, 0.0, 0.0, leak)
 
 
 def no_rows(n: int) -> Rows:

@@ -144,7 +144,7 @@ class HIMPC(TorqueController):
             tau_0=self._tau_0,
             limits=self._limits,
             step_us=(perf_counter_ns() - started) / 1e3,
-            unsolved=sum(solution.rung != "solve" for solution in solutions),
+            unsolved=sum(solution.fallback != "solve" for solution in solutions),
             find_evidence=lambda: evidence,
             iterations=found.iterations,
             M_bar=self._M_bar if settings.M_bar_adapt else None,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.level import NO_ROWS, ActiveRows, LevelSolution, Rung
+from himpc.cascade.level import NO_ROWS, ActiveRows, Fallback, LevelSolution
 from himpc.controllers.null_space_control import split
 from himpc.controllers.one_step import Demand, Law, OneStepController, leak
 from himpc.formulation.settings import Settings
@@ -69,12 +69,12 @@ class HQP(OneStepController):
             R = np.diag(demand.form.R)
             if self._by_acceleration:
                 R = (inverse * demand.form.level.R) @ inverse
-            rung: Rung = "solve"
+            fallback: Fallback = "solve"
             found = self._optimum(demand, B, R, y, free, rows) if free.shape[1] else Found(y, status="empty")
             if not found.usable:
                 # Staying where the levels above are keeps every priority; below nothing, come to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
-                rung = "inherit" if i else "brake"
+                fallback = "inherit" if i else "brake"
                 found = Found(y if i else braking, status=found.status, qp_us=found.qp_us)
             y = found.y
             if i + 1 < len(demands):
@@ -90,7 +90,7 @@ class HQP(OneStepController):
                     active=found.active,
                     kkt_residual=found.kkt_residual,
                     status=found.status,
-                    rung=rung,
+                    fallback=fallback,
                     time_us=(perf_counter_ns() - started) / 1e3,
                     qp_us=found.qp_us,
                     leak=leak(demands, accelerations, i),

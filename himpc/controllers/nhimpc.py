@@ -72,7 +72,7 @@ class NHIMPC(HIMPC):
 
 def _solved(found: Found) -> bool:
     """Whether every level is at its optimum; what is none leads to none by being solved again."""
-    return bool(found.solutions) and all(solution.rung == "solve" for solution in found.solutions)
+    return bool(found.solutions) and all(solution.fallback == "solve" for solution in found.solutions)
 
 
 def _change(before: list[LevelSolution], after: list[LevelSolution]) -> float:

@@ -98,7 +98,7 @@ def projected_law(M: Array, bias: Array, tau_0: Array, demands: list[Demand], da
                 active=NO_ROWS,
                 kkt_residual=float("nan"),
                 status=f"directions lost: {each.lost}" if each.lost else "optimal",
-                rung="solve",
+                fallback="solve",
                 time_us=time_us,
                 qp_us=0.0,
                 leak=leak(demands, accelerations, i),

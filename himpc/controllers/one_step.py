@@ -231,7 +231,7 @@ class OneStepController(TorqueController):
             tau_0=self._tau_0,
             limits=self._limits,
             step_us=(perf_counter_ns() - started) / 1e3,
-            unsolved=sum(level.rung != "solve" for level in levels),
+            unsolved=sum(level.fallback != "solve" for level in levels),
             find_evidence=lambda: evidence,
         )
 

@@ -73,7 +73,7 @@ class CollisionModel:
         distance, normal = np.empty(most + 1), np.empty((most + 1, 3))
         gradient = np.empty((most if gradients else 0, tree.moves.shape[1]))
         count = near(
-            *(*where, tree.turns, tree.moves, around.joint, around.centre, around.radius, around.kind),
+            *(*where, tree.is_revolute, tree.moves, around.joint, around.centre, around.radius, around.kind),
             *(around.carrier, around.turn, around.middle, around.half, around.meets, within),
             *(np.empty((K, S, 3)), knot, sphere, shape, distance, normal, gradient),
         )

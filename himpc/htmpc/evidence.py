@@ -23,7 +23,7 @@ def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
     return LevelEvidence(
         name=level.name,
         status=solved.status,
-        rung=solved.rung,
+        fallback=solved.fallback,
         kkt_residual=solved.kkt_residual,
         best=best,
         final=final.errors(level),

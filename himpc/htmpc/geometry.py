@@ -37,7 +37,7 @@ def placed(tree: Geometry, q: Array) -> Placed:
     q = np.array(q, float)
     joints = len(tree.parent)
     found = Placed(np.empty((len(q), joints, 12)), np.empty((len(q), joints, 3)))
-    place_all(tree.parent, tree.turns, tree.turn, tree.shift, tree.axis, q, *found)
+    place_all(tree.parent, tree.is_revolute, tree.rotation, tree.translation, tree.axis, q, *found)
     return found
 
 
@@ -54,7 +54,7 @@ def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
     """A frame of the robot, the tip for an empty name, where its joints are as given."""
     tree, K = geometry(robot), len(where.at)
     found = Frames(np.empty((K, 3, 3)), np.empty((K, 3)), np.empty((K, 6, robot.n)))
-    frame_along(_TASK, _PART, tree.parent, tree.turns, *where, *_mounted(robot, name), *found)
+    frame_along(_TASK, _PART, tree.parent, tree.is_revolute, *where, *_mounted(robot, name), *found)
     return found
 
 

@@ -151,7 +151,7 @@ class HTIDKC:
         return LevelEvidence(
             name=level.name,
             status=solution.status,
-            rung="solve" if solution.solved else "keep",
+            fallback="solve" if solution.solved else "keep",
             kkt_residual=solution.kkt_residual if solution.solved else 0.0,
             best=gap[None],
             final=gap[None],

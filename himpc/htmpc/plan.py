@@ -48,7 +48,7 @@ class LevelEvidence(NamedTuple):
 
     name: str
     status: str
-    rung: str
+    fallback: str
     kkt_residual: float
     best: Array
     final: Array

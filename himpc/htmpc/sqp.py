@@ -44,7 +44,7 @@ class Solved(NamedTuple):
 
     at: Iterate
     status: str
-    rung: str
+    fallback: str
     kkt_residual: float
     steps: tuple[float, ...]
     unsolved: int
@@ -60,7 +60,7 @@ class _Direction(NamedTuple):
     """Derivative of the merit along d."""
     solution: QPSolution
     rows: Rows
-    rung: str
+    fallback: str
     H: Array
     g: Array
     own: bool
@@ -71,14 +71,14 @@ def solve_level(problem: Problem, at: Iterate) -> Solved:
     """At most MAX_ITER steps from an iterate; it ends early when the inputs stand still."""
     started = perf_counter_ns()
     steps: list[float] = []
-    residual, rung, unsolved = 0.0, "solve", 0
+    residual, fallback, unsolved = 0.0, "solve", 0
     found = None
     for _ in range(problem.tick.settings.max_iter):
         found = _direction(problem, at)
-        unsolved += found.rung != "solve"
-        if found.rung != "solve":
-            rung = found.rung
-        if found.rung == "keep":
+        unsolved += found.fallback != "solve"
+        if found.fallback != "solve":
+            fallback = found.fallback
+        if found.fallback == "keep":
             steps.append(0.0)
             at = at if problem.guards else problem.tick.iterate(problem.tick.brake)
             break
@@ -92,7 +92,7 @@ def solve_level(problem: Problem, at: Iterate) -> Solved:
     return Solved(
         at,
         found.solution.status,
-        rung,
+        fallback,
         residual,
         tuple(steps),
         unsolved,
@@ -109,11 +109,11 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     rows, bought = problem.with_slack(at, problem.rows(at))
     own = tick.settings.solver == "daqp" and tick.method.begin(H)
     solution = _solve(problem, H, g, rows, bought, own)
-    rung = "solve"
+    fallback = "solve"
     if not solution.solved:
         # Below the first level d = 0, on it full braking: these satisfy everything that is left.
         safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
-        rung = "widened"
+        fallback = "widened"
         solution = _solve(problem, H, g, rows.widened(safe, bought), bought, own)
     if not solution.solved:
         return _Direction(np.zeros_like(at.U), 0.0, solution, rows, "keep", H, g, own)
@@ -121,7 +121,7 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     slope = float(g @ solution.x[:size])
     if bought:
         slope += PENALTY * (float(solution.x[size:].sum()) - float(at.depths.sum()))
-    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, rows, rung, H, g, own)
+    return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, rows, fallback, H, g, own)
 
 
 def _solve(problem: Problem, H: Array, g: Array, rows: Rows, bought: int, own: bool) -> QPSolution:

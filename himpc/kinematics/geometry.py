@@ -27,10 +27,10 @@ class Geometry(NamedTuple):
     """
 
     parent: Indices
-    turn: Array
-    shift: Array
+    rotation: Array
+    translation: Array
     axis: Array
-    turns: Indices
+    is_revolute: Indices
     moves: Array
 
 
@@ -41,12 +41,12 @@ def geometry(robot: Robot) -> Geometry:
     data = model.createData()
     # One radian or metre from zero shows the axis of any kind of joint.
     pin.forwardKinematics(model, data, np.ones(n))
-    axis, turns, moves = np.zeros((n + 1, 3)), np.zeros(n + 1, np.intp), np.zeros((n + 1, n))
+    axis, is_revolute, moves = np.zeros((n + 1, 3)), np.zeros(n + 1, np.intp), np.zeros((n + 1, n))
     for joint in range(1, n + 1):
         motion = model.jointPlacements[joint].actInv(data.liMi[joint])
         turning = pin.log3(motion.rotation)
-        turns[joint] = int(float(np.linalg.norm(turning)) > 0.5)
-        axis[joint] = turning if turns[joint] else motion.translation
+        is_revolute[joint] = int(float(np.linalg.norm(turning)) > 0.5)
+        axis[joint] = turning if is_revolute[joint] else motion.translation
         axis[joint] /= np.linalg.norm(axis[joint])
         moves[joint, [other - 1 for other in model.supports[joint] if other > 0]] = 1.0
     return Geometry(
@@ -54,6 +54,6 @@ def geometry(robot: Robot) -> Geometry:
         np.array([placement.rotation for placement in model.jointPlacements]),
         np.array([placement.translation for placement in model.jointPlacements]),
         axis,
-        turns,
+        is_revolute,
         moves,
     )

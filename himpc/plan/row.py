@@ -15,7 +15,7 @@ from himpc.plan.plan import Plan
 from himpc.references import Preview
 from himpc.rotation import quaternion
 from himpc.tasks.axes import AXES
-from himpc.telemetry import PER_LEVEL, RUNGS, Layout
+from himpc.telemetry import FALLBACKS, PER_LEVEL, Layout
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
         evidence[start : start + len(PER_LEVEL)] = (
             level.cost,
             level.kkt_residual,
-            RUNGS.index(level.rung),
+            FALLBACKS.index(level.fallback),
             level.time_us,
             level.leak,
             level.active.row.size,

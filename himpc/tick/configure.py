@@ -162,12 +162,12 @@ def write_curve(arena: Arena, place: int, span: slice, reference: Reference) -> 
 
 def _write_geometry(arena: Arena, robot: Robot, frames: Sequence[str]) -> None:
     f, i, tree = arena.f, arena.i, geometry(robot)
-    i["parent"][:], i["turns"][:] = tree.parent, tree.turns
-    f["turn"][:], f["shift"][:], f["axis"][:] = tree.turn, tree.shift, tree.axis
+    i["parent"][:], i["is_revolute"][:] = tree.parent, tree.is_revolute
+    f["rotation"][:], f["translation"][:], f["axis"][:] = tree.rotation, tree.translation, tree.axis
     for place, name in enumerate(frames):
         frame = robot.model.frames[robot.frame_id(name)]
         i["frame_joint"][place] = frame.parentJoint
-        f["frame_turn"][place], f["frame_shift"][place] = (
+        f["frame_rotation"][place], f["frame_translation"][place] = (
             frame.placement.rotation,
             frame.placement.translation,
         )

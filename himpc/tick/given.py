@@ -17,7 +17,7 @@ from robots import Robot
 
 
 class GivenRows:
-    """The tasks that `is_built_in` does not name. What they find stands in the arena before `look` reads it.
+    """The tasks that `is_built_in` does not name. Their rows are in the arena before `linearize` reads them.
 
     Attributes:
         spans: the other tasks, whose rows the kernel finds itself.

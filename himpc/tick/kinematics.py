@@ -12,7 +12,7 @@ from himpc.references import Preview
 from himpc.tasks import Damping, FrameOrientation, Task
 from himpc.tick.configure import write_tasks
 from himpc.tick.kernel.arena import Array
-from himpc.tick.kernel.look import look
+from himpc.tick.kernel.linearize import linearize
 from robots import Robot
 
 _NUDGES = 3
@@ -65,7 +65,7 @@ class Kinematics:
                     f["R_d"][place] = value
                 else:
                     f["x_d"][span] = value
-        if not look(*self._arena.arguments):
+        if not linearize(*self._arena.arguments):
             raise np.linalg.LinAlgError("the kinematics are not finite")
         J, ahead, behind = f["B"][:, : self._solved]
         R, value, error = f["R_now"].copy(), f["value"].copy(), f["error"].copy()

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from himpc.cascade.level import NO_ROWS, ActiveRows, LevelProblem, LevelSolution, Rung
+from himpc.cascade.level import NO_ROWS, ActiveRows, Fallback, LevelProblem, LevelSolution
 from himpc.limits.rows import Rows
+from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.kernel.arena import Arena, Array, Snapshot
-from himpc.tick.kernel.conclude import conclude
-from himpc.tick.kernel.solve import solve
-from himpc.tick.ladder import Asks, solve_levels
+from himpc.tick.kernel.finish_tick import finish_tick
+from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.tables import LevelTable, budget_of, sizes, write_effects, write_levels
 
 
@@ -22,9 +22,9 @@ def solve_problems(
 ) -> list[LevelSolution]:
     """`himpc.cascade.cascade.solve_cascade` by the kernel; arguments as there."""
     arena = arena_of(problems, rows, previous)
-    rungs = solve_levels(arena, rows.kinds, Asks())
-    conclude(*arena.arguments, False)
-    return solutions([problem.name for problem in problems], arena.found(), rungs)
+    fallbacks = solve_levels(arena, rows.kinds, FallbackBudget())
+    finish_tick(*arena.arguments, False)
+    return solutions([problem.name for problem in problems], arena.found(), fallbacks)
 
 
 def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str, LevelSolution]) -> Arena:
@@ -54,11 +54,11 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
 def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
     """The optimum of one level alone, (N, n); None if there is none."""
     arena = arena_of([problem], rows, {})
-    return arena.f["U"][0] if solve(*arena.arguments, 0, 0.0) else None
+    return arena.f["U"][0] if solve_level(*arena.arguments, 0, 0.0) else None
 
 
 def solutions(
-    names: Sequence[str], found: Snapshot, rungs: Sequence[tuple[Rung, float]]
+    names: Sequence[str], found: Snapshot, fallbacks: Sequence[tuple[Fallback, float]]
 ) -> list[LevelSolution]:
     """The evidence of all levels, from what a tick found."""
     U, cost, kkt, leak, left = (found(name) for name in ("U", "cost", "kkt", "leak", "left"))
@@ -69,26 +69,26 @@ def solutions(
             float(cost[place]),
             active_rows(found, place),
             float(kkt[place]),
-            "unsolved" if rung not in ("solve", "soften") else "optimal" if left[place] else "empty",
-            rung,
+            "unsolved" if fallback not in ("solve", "soften") else "optimal" if left[place] else "empty",
+            fallback,
             time_us,
             0.0,
             float(leak[place]),
         )
-        for place, (name, (rung, time_us)) in enumerate(zip(names, rungs, strict=True))
+        for place, (name, (fallback, time_us)) in enumerate(zip(names, fallbacks, strict=True))
     ]
 
 
 def press(arena: Arena, place: int, active: ActiveRows) -> None:
     """The rows that a level starts from."""
     fits = active.row < len(arena.f["lower"])
-    k = min(int(fits.sum()), arena.f["pressed"].shape[1])
-    arena.i["pressed_count"][place] = k
-    arena.i["pressed_row"][place, :k], arena.i["pressed_joint"][place, :k] = (
+    k = min(int(fits.sum()), arena.f["warm_multiplier"].shape[1])
+    arena.i["warm_count"][place] = k
+    arena.i["warm_row"][place, :k], arena.i["warm_joint"][place, :k] = (
         active.row[fits][:k],
         active.joint[fits][:k],
     )
-    arena.f["pressed"][place, :k] = active.multiplier[fits][:k]
+    arena.f["warm_multiplier"][place, :k] = active.multiplier[fits][:k]
 
 
 def active_rows(found: Snapshot, place: int) -> ActiveRows:

@@ -8,7 +8,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from himpc.cascade.level import LevelProblem, LevelSolution, Rung
+from himpc.cascade.level import Fallback, LevelProblem, LevelSolution
 from himpc.formulation.forms import StackForm
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
@@ -19,13 +19,13 @@ from himpc.references import Outlook, Preview, Reference, Target
 from himpc.tasks import Damping, Task
 from himpc.telemetry import Layout
 from himpc.tick.configure import arena_for, write_curve, write_limits, write_preview
+from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
 from himpc.tick.kernel.arena import NOW, Array, Snapshot
-from himpc.tick.kernel.conclude import conclude
-from himpc.tick.kernel.look import look
+from himpc.tick.kernel.finish_tick import finish_tick
+from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.references import SAMPLED
-from himpc.tick.ladder import Asks, solve_levels
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, budget_of, write_effects
 from robots import Robot
@@ -76,7 +76,7 @@ class CompiledTick:
         memory = memory or Memory.start(q, v, T_s)
         f, i = self.arena.f, self.arena.i
         f["q_was"][:], f["v_was"][:], f["scalars"][0] = memory.q, memory.v, memory.period
-        i["known"][:], i["pressed_count"][:], f["U_was"][:] = 0, 0, 0.0
+        i["known"][:], i["warm_count"][:], f["U_was"][:] = 0, 0, 0.0
         if memory.x_dot is not None and memory.form is self._form:
             f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
         if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
@@ -102,8 +102,8 @@ class CompiledTick:
             return None
         f, i = self.arena.f, self.arena.i
         known = bool(i["known"][0])
-        rungs: list[tuple[Rung, float]] = [("solve", math.nan)] * len(self._levels)
-        levels = self._solutions(self.arena.found(), rungs) if i["known"][1] else []
+        fallbacks: list[tuple[Fallback, float]] = [("solve", math.nan)] * len(self._levels)
+        levels = self._solutions(self.arena.found(), fallbacks) if i["known"][1] else []
         return Memory(
             f["q_was"].copy(),
             f["v_was"].copy(),
@@ -158,8 +158,8 @@ class CompiledTick:
         """
         self._take(q, v, previews, tau_0, limits)
         arena = self.arena
-        rungs: list[tuple[Rung, float]] = []
-        change, iterations, asks = math.inf, 0, Asks()
+        fallbacks: list[tuple[Fallback, float]] = []
+        change, iterations, budget = math.inf, 0, FallbackBudget()
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
@@ -169,21 +169,21 @@ class CompiledTick:
             else:
                 before = None
             self._given.write(previews)
-            if not look(*arena.arguments):
+            if not linearize(*arena.arguments):
                 return None
             self._looked = True
-            rungs = solve_levels(arena, self._kinds, asks) if self._levels else []
+            fallbacks = solve_levels(arena, self._kinds, budget) if self._levels else []
             iterations += 1
             once = self._most == 1
-            if not conclude(*arena.arguments, once):
+            if not finish_tick(*arena.arguments, once):
                 return None
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
-            if not asks.spared or any(rung != "solve" for rung, _ in rungs):
+            if not budget.spared or any(fallback != "solve" for fallback, _ in fallbacks):
                 break  # what is no optimum leads to none by being solved again; what is hard takes its time
         if self._most > 1:
-            conclude(*arena.arguments, True)
-        return self._plan(rungs, tau_0, limits, iterations, started)
+            finish_tick(*arena.arguments, True)
+        return self._plan(fallbacks, tau_0, limits, iterations, started)
 
     def _take(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_0: Array, limits: LimitsInForce
@@ -227,28 +227,30 @@ class CompiledTick:
         (f["x_d"][span] if target.raw.ndim == 1 else f["R_d"][place].reshape(9))[:] = x_d
         return True
 
-    def _solutions(self, found: Snapshot, rungs: Sequence[tuple[Rung, float]]) -> list[LevelSolution]:
-        return solutions([level.name for level in self._form.levels], found, rungs) if self._levels else []
+    def _solutions(self, found: Snapshot, fallbacks: Sequence[tuple[Fallback, float]]) -> list[LevelSolution]:
+        return (
+            solutions([level.name for level in self._form.levels], found, fallbacks) if self._levels else []
+        )
 
     def _plan(
         self,
-        rungs: list[tuple[Rung, float]],
+        fallbacks: list[tuple[Fallback, float]],
         tau_0: Array,
         limits: LimitsInForce,
         iterations: int,
         started: int,
     ) -> Plan:
         ticks, unsolved, idle_us = self._ticks, 0, 0.0
-        for rung, time_us in rungs:
-            unsolved += rung != "solve"
+        for fallback, time_us in fallbacks:
+            unsolved += fallback != "solve"
             idle_us += time_us
         # Levels that stand alone are evidence but for the last one, which is applied.
-        idle_us = idle_us - rungs[-1][1] if rungs and self._levels[0].alone else 0.0
+        idle_us = idle_us - fallbacks[-1][1] if fallbacks and self._levels[0].alone else 0.0
 
         def evidence() -> Evidence:
             if self._ticks != ticks:
                 raise RuntimeError("the controller has gone on since this plan: keep plan.freeze() instead")
-            return self._evidence(rungs)
+            return self._evidence(fallbacks)
 
         return Plan(
             tau=self.arena.f["tau"].copy(),
@@ -263,12 +265,12 @@ class CompiledTick:
             M_bar=self.arena.f["M_bar"].copy() if self._settings.M_bar_adapt else None,
         )
 
-    def _evidence(self, rungs: Sequence[tuple[Rung, float]]) -> Evidence:
+    def _evidence(self, fallbacks: Sequence[tuple[Fallback, float]]) -> Evidence:
         found = self.arena.found()
         R, value, error = found("R_now"), found("value"), found("error")
         stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
         return Evidence(
-            levels=tuple(self._solutions(found, rungs)),
+            levels=tuple(self._solutions(found, fallbacks)),
             q=found("predicted"),
             errors={task.name: error[span] for _, task, span in self._spans},
             values={

@@ -46,13 +46,13 @@ def _rms(error: Array) -> list[float]:
     return [float(x) for x in np.sqrt((error**2).mean(axis=0))] if len(error) else []
 
 
-def qp_figures(recording: Recording, rungs: Sequence[str]) -> dict[str, Any]:
+def qp_figures(recording: Recording, fallbacks: Sequence[str]) -> dict[str, Any]:
     """How the QPs went. rungs: what was needed to solve a level, in the order of need."""
     layout = recording.layout
     counts: Counter[str] = Counter()
     for name in layout.levels:
         codes = recording[f"rung/{name}"][:, 0]
-        counts.update(rungs[int(code)] for code in codes[np.isfinite(codes)] if code > 0)
+        counts.update(fallbacks[int(code)] for code in codes[np.isfinite(codes)] if code > 0)
     return {
         "solves": int(sum(np.isfinite(recording[f"kkt/{name}"]).sum() for name in layout.levels)),
         "unsolved": int(np.nansum(recording["unsolved"])),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.telemetry import RUNGS
+from himpc.telemetry import FALLBACKS
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
 from lessons.settings.values import peak
@@ -29,7 +29,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "solver": {
             "backend": settings.solver,
             "route": settings.route,
-            **qp_figures(recording, RUNGS),
+            **qp_figures(recording, FALLBACKS),
             "iterations": {"mean": float(iterations.mean()), "max": float(iterations.max())},
         },
         "dynamic_leak_max": peak(recording["dynamic_leak"]),

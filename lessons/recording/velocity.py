@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
-from lessons.session.velocity_rows import RUNGS
+from lessons.session.velocity_rows import FALLBACKS
 from lessons.settings.values import peak
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "solver": {
             "backend": session.settings.htmpc.solver,
             "route": "condensed",
-            **qp_figures(recording, RUNGS),
+            **qp_figures(recording, FALLBACKS),
         },
         "dynamic_leak_max": None,
         "bound_active_share": float((active > 0).any(axis=1).mean()),

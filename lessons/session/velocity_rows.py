@@ -60,7 +60,7 @@ def layout_of(robot: Robot, roles: Stack) -> Layout:
     return arranged(robot, roles, levels, _SCALARS, _PER_JOINT, _PER_LEVEL, per_task=("level",))
 
 
-RUNGS = ("solve", "widened", "keep")
+FALLBACKS = ("solve", "widened", "keep")
 """What was needed to solve a level, in the order of need; see `himpc.htmpc.plan.LevelEvidence`."""
 
 
@@ -85,7 +85,7 @@ def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | No
         if role in layout.levels:
             row[fields[f"cost/{role}"]] = level.cost
             row[fields[f"kkt/{role}"]] = level.kkt_residual
-            row[fields[f"rung/{role}"]] = RUNGS.index(level.rung)
+            row[fields[f"rung/{role}"]] = FALLBACKS.index(level.fallback)
             row[fields[f"time_us/{role}"]] = level.time_us
             row[fields[f"step/{role}"]] = float(np.mean(level.steps)) if level.steps else np.nan
             row[fields[f"active/{role}"]] = len(level.felt.kind)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc import qp
 from himpc.cascade import explicit
-from himpc.tick import ladder, problems
+from himpc.tick import fallbacks, problems
 
 Array = NDArray[np.float64]
 
@@ -35,11 +35,11 @@ def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
 
 def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
     """The kernel finds no optimum, at one level or at all, and the printed QP is of no help."""
-    healthy = ladder.solve
+    healthy = fallbacks.solve_level
 
     def broken(*arguments: Any) -> bool:
         return arguments[4] != place and place is not None and healthy(*arguments)
 
-    monkeypatch.setattr(ladder, "solve", broken)
-    monkeypatch.setattr(ladder, "solve_explicit", lambda *_: None)
-    monkeypatch.setattr(problems, "solve", broken)
+    monkeypatch.setattr(fallbacks, "solve_level", broken)
+    monkeypatch.setattr(fallbacks, "solve_explicit", lambda *_: None)
+    monkeypatch.setattr(problems, "solve_level", broken)

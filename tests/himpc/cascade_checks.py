@@ -17,7 +17,7 @@ def assert_sound(hierarchy: Hierarchy, solutions: list[LevelSolution], tolerance
     """Every level solved its printed problem: KKT conditions, priorities and bounds."""
     above = np.zeros(hierarchy.shape)
     for level, solution in enumerate(solutions):
-        assert solution.rung == "solve"
+        assert solution.fallback == "solve"
         assert solution.kkt_residual <= tolerance
         assert kkt_violation(hierarchy, level, solution, above) <= tolerance
         above = solution.U
@@ -63,6 +63,6 @@ def off(solutions: list[LevelSolution], exact: list[Array]) -> float:
 def second_opinion(hierarchy: Hierarchy, compiled: list[LevelSolution]) -> list[Array]:
     """The optima by the explicit route; where it gives up on one, which it may, by `exact_increments`."""
     explicit = hierarchy.solve("explicit")
-    if all(solution.rung == "solve" for solution in explicit):
+    if all(solution.fallback == "solve" for solution in explicit):
         return [solution.U for solution in explicit]
     return exact_increments(hierarchy, compiled, explicit)

@@ -22,8 +22,8 @@ from himpc.cascade.level import LevelProblem
 from himpc.cascade.null_space import RANK_TOLERANCE
 from himpc.limits import Rows
 from himpc.qp import is_installed
-from himpc.tick.kernel.active_set import TOLERANCE
-from himpc.tick.kernel.solve import solve
+from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
+from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.problems import arena_of
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def test_proxqp_agrees_where_it_solves(seed: int, n: int, N: int, levels: int) -
     for problem, solution in zip(hierarchy.problems, proxqp, strict=True):
         H, f = quadratic(problem)
         scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(solution.U)), float(np.linalg.norm(f)))
-        assume(solution.rung == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6)
+        assume(solution.fallback == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6)
     assert_agree(hierarchy.solve("compiled"), proxqp)
 
 
@@ -72,7 +72,7 @@ def test_qpoases_agrees(seed: int) -> None:
     """The paper's own solver finds the same increments on the explicit QPs."""
     hierarchy = random_hierarchy(seed, 5, 4, 3)
     qpoases = hierarchy.solve("explicit", "qpoases")
-    assert all(solution.rung == "solve" for solution in qpoases)
+    assert all(solution.fallback == "solve" for solution in qpoases)
     assert_agree(hierarchy.solve("compiled"), qpoases)
 
 
@@ -110,7 +110,7 @@ def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade
     hierarchy = singular_hierarchy(seed, n, N, size)
     compiled, explicit = hierarchy.solve("compiled"), hierarchy.solve("explicit")
     assert_sound(hierarchy, compiled)
-    assert all(solution.rung == "solve" for solution in explicit)
+    assert all(solution.fallback == "solve" for solution in explicit)
     assert largest_difference(compiled, explicit) <= 1e-6
 
 
@@ -120,7 +120,7 @@ def test_near_the_rank_tolerance_points_are_still_sound(seed: int, n: int, N: in
     """Near the tolerance either reading of the rank is right; residual, leak and bounds hold."""
     hierarchy = singular_hierarchy(seed, n, N, 10**decade)
     for solution in hierarchy.solve():
-        assert solution.rung == "solve"
+        assert solution.fallback == "solve"
         assert solution.kkt_residual <= 1e-6
         assert solution.leak <= 1e-6
         assert_within(hierarchy.rows, solution.U)
@@ -135,7 +135,7 @@ def test_no_freedom_left_keeps_the_upper_levels() -> None:
     for route in ("compiled", "explicit"):
         first, last = stack.solve(route)
         np.testing.assert_array_equal(first.U, last.U)
-        assert (last.rung, last.status) == ("solve", "empty")
+        assert (last.fallback, last.status) == ("solve", "empty")
 
 
 def replace_rows(problem: LevelProblem, B: Array) -> LevelProblem:
@@ -177,10 +177,10 @@ def test_a_level_that_is_tried_once_more_still_follows_its_own_tasks(seed: int) 
     hierarchy = random_hierarchy(seed, 6, 4, 3)
     arena = arena_of(hierarchy.problems, hierarchy.rows, {})
     for place in range(3):
-        assert solve(*arena.arguments, place, 0.0)
+        assert solve_level(*arena.arguments, place, 0.0)
         first = arena.f["U"][place].copy()
         if place:
-            assert solve(*arena.arguments, place, TOLERANCE)
+            assert solve_level(*arena.arguments, place, TOLERANCE)
             assert np.abs(arena.f["U"][place] - first).max() <= 1e-4
             arena.f["U"][place] = first
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from himpc.catalog import CONTROLLERS
-from himpc.compilation.compiled import told
+from himpc.compilation.compiled import on_compiled
 from himpc.compilation.compiling import compile_all, compiled_functions
 from himpc.compilation.sources import sources_of
 from himpc.tick.kernel.linear import dot
@@ -30,13 +30,13 @@ ROOT = Path(__file__).parents[2]
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 SMALL = """
-from himpc.compilation.compiled import NUMBER, entry, piece
+from himpc.compilation.compiled import NUMBER, inline_kernel, kernel
 
-@piece
+@inline_kernel
 def _twice(x):
     return 2.0 * x
 
-@entry(NUMBER)
+@kernel(NUMBER)
 def twice(x):
     return _twice(x)
 """
@@ -44,9 +44,9 @@ def twice(x):
 LOAD = """
 import os, sys
 from himpc.catalog import CONTROLLERS
-from himpc.compilation.compiled import told
+from himpc.compilation.compiled import on_compiled
 found = []
-with told(found.append):
+with on_compiled(found.append):
     import small
 assert small.twice(2.0) == 4.0
 print(len(found), small.twice.stats.cache_path)
@@ -162,14 +162,14 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
     """When it changes, or a constant that it imports, those that call it are compiled afresh."""
     for folder in ("install/parts/below", "home", "tmp"):
         (tmp_path / folder).mkdir(parents=True)
-    above, below = SMALL.split("\n\n@entry")
+    above, below = SMALL.split("\n\n@kernel")
     above = f"from parts.below.constants import TWO\n{above.replace('2.0', 'TWO')}"
     constants = tmp_path / "install" / "parts" / "below" / "constants.py"
     constants.write_text("TWO = 1.0")
     (tmp_path / "install" / "parts" / "part.py").write_text(above)
     (tmp_path / "install" / "small.py").write_text(
-        "from himpc.compilation.compiled import NUMBER, entry\nfrom parts.part import _twice\n\n"
-        f"@entry{below}"
+        "from himpc.compilation.compiled import NUMBER, kernel\nfrom parts.part import _twice\n\n"
+        f"@kernel{below}"
     )
     wrong = start(tmp_path)
     assert "AssertionError" in wrong.communicate(timeout=120)[1]  # of LOAD: what is compiled gives half
@@ -252,7 +252,7 @@ def test_no_setting_compiles_in_the_middle_of_a_run() -> None:
         *(Set("controller", name) for name in CONTROLLERS),
         *(Set("controller", "himpc"), Set("route", "explicit")),
     ]
-    with told(late.append):
+    with on_compiled(late.append):
         for change in changes:
             session.post(change)
             for _ in range(3):

@@ -60,7 +60,7 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
         assert session.plan is not None
         assert [level.name for level in session.plan.levels] == ["position", "orientation", "q1"]
         last = session.plan.levels[-1]
-        assert (last.rung, last.status) == ("solve", "empty")
+        assert (last.fallback, last.status) == ("solve", "empty")
         np.testing.assert_array_equal(last.U, session.plan.levels[1].U)
         assert np.nanmax(field(session, rows, "priority_leak")) <= 1e-6
         assert np.nansum(field(session, rows, "unsolved")) == 0
@@ -163,10 +163,10 @@ def test_a_state_that_is_not_finite_holds_the_torque(iiwa: Robot) -> None:
     controller.reset(tau)
     plan = controller.step(np.full(7, np.nan), np.zeros(7), holds(iiwa, 5))
     np.testing.assert_array_equal(plan.tau, tau)
-    assert plan.levels[0].rung == "hold"
+    assert plan.levels[0].fallback == "hold"
     assert plan.unsolved == 1
     plan = controller.step(iiwa.home, np.zeros(7), holds(iiwa, 5))
-    assert [level.rung for level in plan.levels] == ["solve"] * 3
+    assert [level.fallback for level in plan.levels] == ["solve"] * 3
 
 
 def test_the_controller_sees_no_mass(iiwa: Robot) -> None:

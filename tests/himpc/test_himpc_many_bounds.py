@@ -88,6 +88,6 @@ def test_an_arm_whose_solver_always_fails_is_braked(monkeypatch: pytest.MonkeyPa
         session.tick()
         assert session.plan is not None
         assert k % 10 or rows_kept(session.plan.rows, session.plan.levels[-1].U)
-    assert {level.rung for level in session.plan.levels} == {"brake", "inherit"}  # pyright: ignore
+    assert {level.fallback for level in session.plan.levels} == {"brake", "inherit"}  # pyright: ignore
     assert fast > 0.1
     assert np.abs(session.plant.v).max() <= 0.05 * fast

@@ -120,5 +120,5 @@ def test_a_level_below_one_that_used_up_nearly_all_freedom_is_solved(
     contradiction: of 49,095 such hierarchies the explicit route once left 210 without a point."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
     explicit = hierarchy.solve("explicit")
-    assert all(solution.rung == "solve" for solution in explicit)
+    assert all(solution.fallback == "solve" for solution in explicit)
     assert off(explicit, exact_increments(hierarchy, explicit)) <= 1e-6

@@ -25,10 +25,10 @@ print(*(name for name in ours if f"himpc.compilation.{name}" in sys.modules))
 
 VIEWS = """
 import numpy as np
-from himpc.compilation.compiled import VECTOR, WHOLE, entry
+from himpc.compilation.compiled import VECTOR, WHOLE, kernel
 from himpc.compilation.views import borrowed, matrices, matrix, vector
 
-@entry(VECTOR, WHOLE)
+@kernel(VECTOR, WHOLE)
 def double(data, n):
     for x in vector(data, 1, n):
         data[0] += x

@@ -133,7 +133,7 @@ def test_osf_is_the_operational_space_law(seed: int) -> None:
     for level, torque in zip(plan.levels, expected, strict=True):
         np.testing.assert_allclose(level.U[0] + 1.0, bias + torque, rtol=1e-5, atol=1e-4)
     np.testing.assert_allclose(plan.tau, bias + expected[-1], rtol=1e-5, atol=1e-4)
-    assert [level.rung for level in plan.levels] == ["solve"] * 3
+    assert [level.fallback for level in plan.levels] == ["solve"] * 3
     assert all(np.isnan(level.kkt_residual) for level in plan.levels)
 
 
@@ -296,7 +296,7 @@ def test_a_failing_qp_is_data(monkeypatch: pytest.MonkeyPatch) -> None:
     at = moment(4)
     plan = make_controller("hqp", robot(), settings()).step(at.q, 40.0 * at.v, at.previews)
     assert plan.unsolved == 3
-    assert [level.rung for level in plan.levels] == ["brake", "inherit", "inherit"]
+    assert [level.fallback for level in plan.levels] == ["brake", "inherit", "inherit"]
     assert {level.status for level in plan.levels} == {"no idea"}
     assert (np.abs(plan.tau) <= robot().tau_limit).all()
     assert (np.abs(plan.tau) == robot().tau_limit).any()
@@ -318,7 +318,7 @@ def test_an_unusable_state_holds_the_torque(name: str) -> None:
     ):
         plan = controller.step(q, v, previews)
         np.testing.assert_array_equal(plan.tau, good.tau)
-        assert plan.levels[0].rung == "hold" and plan.unsolved == 1
+        assert plan.levels[0].fallback == "hold" and plan.unsolved == 1
     after = controller.step(at.q, at.v, at.previews, good.tau)
     assert np.isfinite(after.tau).all() and after.unsolved == 0
 

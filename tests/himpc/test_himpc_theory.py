@@ -49,7 +49,7 @@ M_bar, limits = np.array(settings.M_bar), in_force(robot, settings.limits)
 rows = build_rows(JointState(q, v, 0.0 * v), 0.0 * v, M_bar, settings.limits, limits, 5, settings.T_s)
 problems = [level.problem(J / M_bar, free, form.root_Q * free, 1.0) for level in form.levels]
 solved = solve_cascade(problems, rows, {}, "daqp")
-assert [level.rung for level in solved] == ["solve"] * len(problems) and len(problems) > 2
+assert [level.fallback for level in solved] == ["solve"] * len(problems) and len(problems) > 2
 assert max(level.kkt_residual for level in solved) < 1e-6 and np.abs(solved[-1].U).max() > 1e-3
 assert not [name for name in sys.modules if name.startswith(("himpc.tick", "himpc.compilation"))]
 print(layout_of(robot, settings.stack).size)

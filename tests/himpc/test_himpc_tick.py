@@ -18,9 +18,9 @@ from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settin
 from himpc.catalog import Route
 from himpc.plan import write_plan
 from himpc.references import Circle, FigureEight, Hold, Outlook, Phase, Reference, Sinusoid
-from himpc.tick.kernel.conclude import conclude
-from himpc.tick.kernel.look import look
-from himpc.tick.kernel.solve import solve
+from himpc.tick.kernel.finish_tick import finish_tick
+from himpc.tick.kernel.linearize import linearize
+from himpc.tick.kernel.solve_level import solve_level
 from lessons.events import MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
@@ -139,7 +139,7 @@ def test_torques_are_those_of_the_printed_route(
         assert printed.plan is not None
         worst = max(worst, float(np.abs(compiled.plan.tau - printed.plan.tau).max()))
         for one, other in zip(compiled.plan.levels, printed.plan.levels, strict=True):
-            assert one.rung == "solve"
+            assert one.fallback == "solve"
             assert one.leak <= 1e-6 or controller == "weighted"
             assert one.kkt_residual <= 1e-6
             assert one.cost == pytest.approx(other.cost, rel=1e-6, abs=1e-6)
@@ -272,5 +272,5 @@ def test_nothing_is_compiled_while_a_robot_moves() -> None:
     """One compiled form of each entry serves every layout."""
     for name in ("iiwa14-circle", "planar3-hold"):
         TorqueSession(torque_scene(name)).tick()
-    for compiled in (look, solve, conclude):
+    for compiled in (linearize, solve_level, finish_tick):
         assert len(compiled.signatures) == 1

@@ -247,7 +247,7 @@ def test_a_reference_that_is_not_finite_makes_it_brake(robot: Robot) -> None:
     broken = {"ee": Hold(np.full(3, np.nan)), "base": Hold(SIDE)}
     for _ in range(15):
         plan = controller.step(q, v, previews(broken, 0.0, controller.settings))
-        assert plan.levels[0].rung == "keep"
+        assert plan.levels[0].fallback == "keep"
         assert plan.unsolved > 0
         q, v = plan.motion.position(0.1), plan.command
     assert np.abs(v).max() < 0.05
@@ -266,7 +266,7 @@ def test_noise_and_wild_states_never_break_it(robot: Robot) -> None:
         plan = controller.step(*seen, previews(references, 0.1 * tick, controller.settings))
         assert np.isfinite(plan.u).all()
         assert plan.kkt_residual <= 1e-6
-        assert all(level.rung in ("solve", "widened", "keep") for level in plan.levels)
+        assert all(level.fallback in ("solve", "widened", "keep") for level in plan.levels)
         q, v = plan.motion.position(0.1), plan.motion.velocity(0.1)
         if tick < 40:
             assert (np.abs(plan.u[0]) <= robot.a_max + 1e-6).all()

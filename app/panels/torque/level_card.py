@@ -14,7 +14,7 @@ from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
-from himpc.telemetry import RUNGS
+from himpc.telemetry import FALLBACKS
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -84,9 +84,9 @@ class LevelCard:
             for task in level.tasks
         )
         notes = "" if level.enabled else " " + badge("OFF", DAMPING)
-        rung = now.number(f"rung/{level.name}")
-        if level.enabled and rung == rung and rung > 0:
-            notes += " " + badge(RUNGS[int(rung)], BAD)
+        fallback = now.number(f"rung/{level.name}")
+        if level.enabled and fallback == fallback and fallback > 0:
+            notes += " " + badge(FALLBACKS[int(fallback)], BAD)
         self._live.content = block(
             f"{swatch(self._colour)}{errors}{notes}{_rank(now.status.ranks.get(level.name))}",
             f"border-left:3px solid {css(self._colour)}",

@@ -14,7 +14,7 @@ from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import Snapshot
 from himpc.stack import Level
 from lessons.events import Set
-from lessons.session.velocity_rows import RUNGS
+from lessons.session.velocity_rows import FALLBACKS
 from lessons.settings.velocity import VelocitySettings
 
 
@@ -95,9 +95,9 @@ class _Card:
         notes = "" if level.enabled else " " + badge("OFF", DAMPING)
         if not inside:
             text, notes = "no task of it in the window", ""
-        rung = now.number(f"rung/{level.name}")
-        if rung == rung and rung > 0:
-            notes += " " + badge(RUNGS[int(rung)], BAD)
+        fallback = now.number(f"rung/{level.name}")
+        if fallback == fallback and fallback > 0:
+            notes += " " + badge(FALLBACKS[int(fallback)], BAD)
         self._live.content = block(
             f"{swatch(self._colour)}{text}{notes}", f"border-left:3px solid {css(self._colour)}"
         )

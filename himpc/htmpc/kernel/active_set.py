@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, entry, piece
+from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.compilation.views import borrowed
 from himpc.tick.kernel.linear import (
     backward,
@@ -40,7 +40,7 @@ _ROUNDING = 1e-7
 """By how much a row that depends on the others may be missed: more is a contradiction."""
 
 
-@piece
+@inline_kernel
 def residual_of(
     H: Array,
     g: Array,
@@ -72,40 +72,54 @@ def residual_of(
     return worst if math.isfinite(total) else math.inf
 
 
-@piece
+@inline_kernel
 def bounds_of(active: Indices, side: Array, count: int, lower: Array, upper: Array, beta: Array) -> None:
     """β of the rows held."""
     for c in range(count):
         beta[c] = lower[active[c]] if side[c] > 0.0 else -upper[active[c]]
 
 
-@piece
+@inline_kernel
 def at_rows(
-    corner: Array, basis: Array, z_0: Array, beta: Array, y: Array, u: Array, z: Array, count: int
+    cholesky_factor: Array,
+    orthonormal_basis: Array,
+    z_0: Array,
+    beta: Array,
+    y: Array,
+    u: Array,
+    z: Array,
+    count: int,
 ) -> None:
-    """z and u for the rows held as equalities: corner (y + basis z₀) = β, z = z₀ + basisᵀy, cornerᵀu = y."""
+    """z and u for the rows held as equalities: F (y + B z₀) = β, z = z₀ + Bᵀy, Fᵀu = y, with
+    the Cholesky factor F and the orthonormal basis B."""
     n = len(z)
     copy(beta, y, count)
-    forward(corner, y, count)
+    forward(cholesky_factor, y, count)
     copy(z_0, z, n)
     for i in range(count):
-        y[i] -= dot(basis[i], z_0, n)
-        subtract(-y[i], basis[i], z, n)
+        y[i] -= dot(orthonormal_basis[i], z_0, n)
+        subtract(-y[i], orthonormal_basis[i], z, n)
     copy(y, u, count)
-    backward(corner, u, count)
+    backward(cholesky_factor, u, count)
 
 
-@piece
+@inline_kernel
 def let_go(
-    corner: Array, basis: Array, active: Indices, side: Array, u: Array, place: int, count: int
+    cholesky_factor: Array,
+    orthonormal_basis: Array,
+    active: Indices,
+    side: Array,
+    u: Array,
+    index: int,
+    count: int,
 ) -> None:
     """Lets go of the row at a place."""
-    for c in range(place, count - 1):
+    for c in range(index, count - 1):
         active[c], side[c], u[c] = active[c + 1], side[c + 1], u[c + 1]
-    close_gap(corner, basis, place, count, basis.shape[1])
+    close_gap(cholesky_factor, orthonormal_basis, index, count, orthonormal_basis.shape[1])
 
 
-@entry(MATRIX, MATRIX)
+@kernel(MATRIX, MATRIX)
 def factor(H: Array, L: Array) -> bool:
     """H = LLᵀ, in the lower triangle of L (n, n); False if H is not positive definite."""
     H, L = borrowed(H), borrowed(L)
@@ -113,7 +127,7 @@ def factor(H: Array, L: Array) -> bool:
     return factorise(L, len(L))
 
 
-@entry(
+@kernel(
     *(MATRIX, MATRIX, VECTOR, MATRIX, VECTOR, VECTOR),
     *(INDICES, VECTOR, WHOLE, MATRIX, MATRIX, MATRIX, INDICES, INDICES, VECTOR, VECTOR),
 )
@@ -127,8 +141,8 @@ def solve(
     active: Indices,
     side: Array,
     count: int,
-    corner: Array,
-    basis: Array,
+    cholesky_factor: Array,
+    orthonormal_basis: Array,
     scratch: Array,
     watched: Indices,
     seen: Indices,
@@ -141,15 +155,15 @@ def solve(
     Args:
         L, H, g, A, lower, upper: the QP, H = LLᵀ (n, n).
         active, side, count: the rows held, room for n; those of the QP before.
-        corner, basis: the same, see `linear`, room for n + 1.
+        cholesky_factor, orthonormal_basis: the same, see `linear`, room for n + 1.
         scratch: (SCRATCH, n + 1).
-        watched, seen: scratch, as long as A; seen is zero.
+        watched, projected_jacobian: scratch, as long as A; seen is zero.
         x: (n,), the result.
         multipliers: as long as A, zero; the result.
     """
     n, rows = len(g), len(A)
     A, H, L, scratch = borrowed(A), borrowed(H), borrowed(L), borrowed(scratch)
-    corner, basis = borrowed(corner), borrowed(basis)
+    cholesky_factor, orthonormal_basis = borrowed(cholesky_factor), borrowed(orthonormal_basis)
     z_0, z, normal = scratch[0, :n], scratch[1, :n], scratch[2, :n]
     r, u, y, beta = scratch[3], scratch[4], scratch[5], scratch[6]
     for i in range(n):
@@ -169,7 +183,7 @@ def solve(
     # Rows held from before are kept as far as their multipliers have the right sign here.
     while True:
         bounds_of(active, side, count, lower, upper, beta)
-        at_rows(corner, basis, z_0, beta, y, u, z, count)
+        at_rows(cholesky_factor, orthonormal_basis, z_0, beta, y, u, z, count)
         least, worst = 0.0, -1
         for c in range(count):
             free = lower[active[c]] < upper[active[c]]
@@ -179,15 +193,15 @@ def solve(
                 least, worst = u[c], c
         if worst < 0:
             break
-        let_go(corner, basis, active, side, u, worst, count)
+        let_go(cholesky_factor, orthonormal_basis, active, side, u, worst, count)
         count -= 1
     status, steps = LIMIT, 0
     while steps < MOST_STEPS:
         copy(z, x, n)
         backward(L, x, n)
         p, excess, sign = -1, 0.0, 0.0
-        for place in range(watching):
-            i = watched[place]
+        for index in range(watching):
+            i = watched[index]
             value = dot(A[i], x, n)
             missing = max(lower[i] - value, value - upper[i])
             if missing > max(excess, _SATISFIED) and seen[i] != 2:
@@ -196,7 +210,7 @@ def solve(
         if p < 0:
             # What adding up steps has lost comes back before the other rows are looked at.
             bounds_of(active, side, count, lower, upper, beta)
-            at_rows(corner, basis, z_0, beta, y, u, z, count)
+            at_rows(cholesky_factor, orthonormal_basis, z_0, beta, y, u, z, count)
             copy(z, x, n)
             backward(L, x, n)
             more = False
@@ -218,10 +232,10 @@ def solve(
         own, size = 0.0, dot(normal, normal, n)
         while steps < MOST_STEPS:
             steps += 1
-            shares, rest = corner[count], basis[count]
-            across = split(normal, basis, count, n, shares, rest, _ENOUGH)
+            shares, rest = cholesky_factor[count], orthonormal_basis[count]
+            across = split(normal, orthonormal_basis, count, n, shares, rest, _ENOUGH)
             copy(shares, r, count)
-            backward(corner, r, count)
+            backward(cholesky_factor, r, count)
             first, blocking = math.inf, -1
             for c in range(count):
                 if r[c] > 0.0 and lower[active[c]] < upper[active[c]] and u[c] < first * r[c]:
@@ -247,7 +261,7 @@ def solve(
                 active[count], side[count], u[count] = p, sign, own
                 count += 1
                 break
-            let_go(corner, basis, active, side, u, blocking, count)
+            let_go(cholesky_factor, orthonormal_basis, active, side, u, blocking, count)
             count -= 1
     for c in range(count):
         multipliers[active[c]] -= side[c] * u[c]

@@ -14,8 +14,8 @@ from himpc.compilation.compiled import (
     MATRIX,
     NUMBER,
     VECTOR,
-    entry,
-    piece,
+    inline_kernel,
+    kernel,
 )
 from himpc.compilation.views import borrowed
 from himpc.tick.kernel.kinematics import points
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-@piece
+@inline_kernel
 def from_ball(x: float, y: float, h: float, radius: float, u: Array) -> float:
     """Distance of a point from a ball about the origin; u: the unit vector away from it."""
     away = math.sqrt(x * x + y * y + h * h)
@@ -36,28 +36,28 @@ def from_ball(x: float, y: float, h: float, radius: float, u: Array) -> float:
     return away - radius
 
 
-@piece
-def from_box(x: float, y: float, h: float, turn: Array, half: Array, u: Array) -> float:
+@inline_kernel
+def from_box(x: float, y: float, h: float, rotation: Array, half: Array, u: Array) -> float:
     """The same for a box: from its nearest point; inside, minus the distance to the nearest face."""
     nearest, face, squares = -math.inf, 0, 0.0
     for a in range(3):
-        out = abs(turn[0, a] * x + turn[1, a] * y + turn[2, a] * h) - half[a]
+        out = abs(rotation[0, a] * x + rotation[1, a] * y + rotation[2, a] * h) - half[a]
         if out > nearest:
             nearest, face = out, a
         squares += max(out, 0.0) ** 2
     length = math.sqrt(squares)
     u[0] = u[1] = u[2] = 0.0
     for a in range(3):
-        here = turn[0, a] * x + turn[1, a] * y + turn[2, a] * h
+        here = rotation[0, a] * x + rotation[1, a] * y + rotation[2, a] * h
         share = max(abs(here) - half[a], 0.0) / length if length > 0.0 else 0.0
         if length == 0.0 and a == face:
             share = 1.0
         for b in range(3):
-            u[b] += turn[b, a] * (share if here >= 0.0 else -share)
+            u[b] += rotation[b, a] * (share if here >= 0.0 else -share)
     return length if length > 0.0 else nearest
 
 
-@entry(
+@kernel(
     *(MATRICES, MATRICES, INDICES, MATRIX, INDICES, MATRIX, VECTOR),
     *(INDICES, INDICES, MATRICES, MATRIX, MATRIX, FLAGS, NUMBER),
     *(MATRICES, INDICES, INDICES, INDICES, VECTOR, MATRIX, MATRIX),
@@ -65,14 +65,14 @@ def from_box(x: float, y: float, h: float, turn: Array, half: Array, u: Array) -
 def near(
     placed: Array,
     z: Array,
-    turns: Indices,
+    is_revolute: Indices,
     moves: Array,
     joint: Indices,
     centre: Array,
     radius: Array,
     kind: Indices,
     carrier: Indices,
-    turn: Array,
+    rotation: Array,
     middle: Array,
     half: Array,
     meets: NDArray[np.bool_],
@@ -91,8 +91,8 @@ def near(
     shape to the centre, on the motion of the one against the other.
 
     Args:
-        placed, z: (K, n+1, …) joints, see `place`. turns, moves: see `Geometry`.
-        joint, centre, radius, kind, carrier, turn, middle, half, meets: see `Surroundings`.
+        placed, z: (K, n+1, …) joints, see `forward_kinematics`. is_revolute, moves: see `Geometry`.
+        joint, centre, radius, kind, carrier, rotation, middle, half, meets: see `Surroundings`.
         centres: scratch, (K, S, 3).
         knot, sphere, shape: of each pair, room for all; the result.
         distance, normal: m, and the unit vector, world axes; the result.
@@ -100,7 +100,7 @@ def near(
     """
     K, n, S, B = len(placed), moves.shape[1], len(radius), len(kind)
     placed, z, centres, normal = borrowed(placed), borrowed(z), borrowed(centres), borrowed(normal)
-    turn, middle, half, slopes = borrowed(turn), borrowed(middle), borrowed(half), borrowed(slopes)
+    rotation, middle, half, slopes = borrowed(rotation), borrowed(middle), borrowed(half), borrowed(slopes)
     for k in range(K):
         points(placed[k], joint, centre, centres[k])
     count = 0
@@ -123,7 +123,7 @@ def near(
                     found = h
                     u[0], u[1], u[2] = 0.0, 0.0, 1.0
                 elif kind[o] == BOX:
-                    found = from_box(x, y, h, turn[o], half[o], u)
+                    found = from_box(x, y, h, rotation[o], half[o], u)
                 else:
                     found = from_ball(x, y, h, half[o, 0], u)
                 found -= radius[s]
@@ -145,7 +145,7 @@ def near(
             if sign == 0.0:
                 continue
             w, on = z[k, j], placed[k, j]
-            if turns[j]:
+            if is_revolute[j]:
                 x, y, h = C[0] - on[9], C[1] - on[10], C[2] - on[11]
                 along = (
                     u[0] * (w[1] * h - w[2] * y) + u[1] * (w[2] * x - w[0] * h) + u[2] * (w[0] * y - w[1] * x)

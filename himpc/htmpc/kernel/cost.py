@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.compilation.compiled import FIXED, GIVEN_MATRIX, MATRICES, MATRIX, NUMBER, VECTOR, entry
+from himpc.compilation.compiled import FIXED, GIVEN_MATRIX, MATRICES, MATRIX, NUMBER, VECTOR, kernel
 
 Array = NDArray[np.float64]
 
 
-@entry(
+@kernel(
     *(MATRICES, GIVEN_MATRIX, GIVEN_MATRIX, FIXED, MATRIX, NUMBER, NUMBER),
     *(MATRICES, MATRIX, MATRIX, VECTOR),
 )
@@ -31,7 +31,7 @@ def model(
 
     Args:
         J, Q, e, T_q, effort, share, ridge: see there.
-        weighted, pull: J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero.
+        weighted, multiplier: J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero.
         H, g: the result; g is zero.
     """
     N, m, n = J.shape

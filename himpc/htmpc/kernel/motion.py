@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.compilation.compiled import GIVEN_VECTOR, MATRIX, NUMBER, entry
+from himpc.compilation.compiled import GIVEN_VECTOR, MATRIX, NUMBER, kernel
 
 Array = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ _NO_JERK_BOUND = 1e9
 """Stands in for an infinite jerk where it is multiplied by a speed that may be zero."""
 
 
-@entry(
+@kernel(
     *(GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, NUMBER, NUMBER),
     *(GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, MATRIX),
 )

@@ -20,7 +20,7 @@ from himpc.compilation.compiled import (
     TABLE,
     VECTOR,
     WHOLE,
-    entry,
+    kernel,
 )
 from himpc.compilation.views import borrowed
 from himpc.htmpc.kernel.kinds import ACCELERATION, JERK, LEXICOGRAPHIC, POSITION, RAMP, STOP, VELOCITY
@@ -34,17 +34,17 @@ STOP_STEPS = 40
 """Braking is watched for at most this many knots beyond the horizon."""
 
 
-@entry(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
-def spread(A: Array, place: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
+@kernel(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
+def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
     """From a place on, the rows of A (…, N·n) whose values at knots (r,) have slopes (r, n) in q."""
     n = slopes.shape[1]
     for r in range(len(knot)):
         for s in range(len(T_q)):
             for j in range(n):
-                A[place + r, s * n + j] = T_q[knot[r], s] * slopes[r, j]
+                A[index + r, s * n + j] = T_q[knot[r], s] * slopes[r, j]
 
 
-@entry(MATRIX, MATRIX, VECTOR, WHOLE, MATRIX)
+@kernel(MATRIX, MATRIX, VECTOR, WHOLE, MATRIX)
 def about(A: Array, bounds: Array, u: Array, count: int, room: Array) -> None:
     """The bounds of the first rows for the change d of u, u + d: A d in [lower − Au, upper − Au] = `room`."""
     A, u = borrowed(A), borrowed(u)
@@ -53,14 +53,14 @@ def about(A: Array, bounds: Array, u: Array, count: int, room: Array) -> None:
         room[0, r], room[1, r] = bounds[0, r] - value, bounds[1, r] - value
 
 
-@entry(MATRICES, GIVEN_MATRIX, GIVEN_MATRIX, FLAG, FIXED, WHOLE, MATRIX, MATRIX, TABLE)
+@kernel(MATRICES, GIVEN_MATRIX, GIVEN_MATRIX, FLAG, FIXED, WHOLE, MATRIX, MATRIX, TABLE)
 def guard(
     J: Array,
     e: Array,
     best: Array,
     strict: bool,
     T_q: Array,
-    place: int,
+    index: int,
     A: Array,
     room: Array,
     labels: NDArray[np.int64],
@@ -75,7 +75,7 @@ def guard(
     N, m, n = J.shape
     for k in range(N):
         for p in range(m):
-            r = place + k * m + p
+            r = index + k * m + p
             if not strict:
                 for s in range(N):
                     for j in range(n):
@@ -87,7 +87,7 @@ def guard(
             labels[0, r], labels[1, r], labels[2, r] = LEXICOGRAPHIC, k + 1, p
 
 
-@entry(
+@kernel(
     *(FIXED, FIXED, FIXED_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR),
     *(GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, NUMBER, NUMBER),
     *(MATRIX, MATRIX, TABLE),

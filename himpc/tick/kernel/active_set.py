@@ -1,233 +1,211 @@
-"""The dual active-set method of Goldfarb and Idnani (1983) for one level, from the rows of the tick before.
-
-The method keeps a point that is optimal under the rows taken so far, as equalities whose multipliers push the
-right way, and takes one violated row after the other; the cost only grows, so no set comes twice and it ends.
-A row that depends on those taken replaces the one it relieves.
-"""
+"""Rows taken as equalities: an orthonormal account of them, their multipliers, and the point they hold."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array, Whole
-from himpc.tick.kernel.bounds import sums
-from himpc.tick.kernel.level import Level, increments
-from himpc.tick.kernel.linear import backward
-from himpc.tick.kernel.taken import Taken, balance, fix, move, normal_of, refine, resolve, settle, without
-from himpc.tick.kernel.violated import farthest, lengths, worst
+from himpc.tick.kernel.level import Level
+from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
+from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
 
-TOLERANCE = 1e-9
-"""N·m: a row violated by less counts as met."""
-_NOISE = 1e-12
-"""Multipliers that change by less than this share of the one that changes most do not change."""
-_ROUNDED = 1e-7
-"""N·m: a row that nothing can move any more and that is violated by less is met, up to rounding."""
-
-_ROUGH = 1e-6
-"""N·m: a point that is not refined may seem to miss a row by as much. Where many rows meet, rows taken for
-that come and go, the same ones again and again, until the budget is spent."""
-_MANY = 12
-"""Rows taken in one attempt from which on it pays to know how far away each violated row is: whoever goes for
-the farthest takes fewer in all than whoever goes for the one that is missed by most newton metres."""
-_HARD = 0.5
-"""Share of the hardest pull from which a row is let go together with that one."""
-
-FAILED = -1.0
+_DEPENDENT = 1e-10
+"""A row of which less than this share is new depends on those taken before."""
+_ROUNDS = 4
+"""The normal equations lose digits on long horizons; refinement brings them back."""
+_ROUNDING = 2e-14
+"""A gradient below this share of ‖G‖‖e‖ is rounding: no better point can be told from this one."""
+_MET = 1e-11
+"""N·m: how exactly rows that are taken as equalities are met."""
+_WORTH = 1e-8
+"""What the cost may gain by what they are missed by."""
 
 
-@piece
-def warm_rows(
-    level: Level,
-    taken: Taken,
-    count: int,
-    row: Whole,
-    joint: Whole,
-    pressed: Array,
-    L: Array,
-    low: Array,
-    high: Array,
-    budget: Array,
-) -> int:
-    """Takes the rows that pressed a tick ago, but for those that depend on others; returns how many."""
-    d, D = level.offset[len(level.start)], level.rest[len(level.start)]
-    enough = 0.5 * budget[0]
-    k = 0
-    for p in range(count):
-        taken.row[k], taken.joint[k] = row[p], joint[p]
-        taken.side[k] = 1 if pressed[p] > 0.0 else -1
-        bound = high[row[p], joint[p]] if pressed[p] > 0.0 else low[row[p], joint[p]]
-        if k >= D or not math.isfinite(bound) or budget[0] < enough:
-            continue
-        normal_of(level, taken, k, L, low, high)
-        budget[0] -= 0.5 * d * d
-        length = resolve(taken, k, D, budget)
-        if length > 0.0:
-            fix(taken, k, length, D)
-            k += 1
-    return k
+class ActiveSet(NamedTuple):
+    """Rows a'x ≤ b that hold the point as equalities, k of room for many.
 
-
-@piece
-def release(level: Level, taken: Taken, k: int, ideal: Array, budget: Array) -> int:
-    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay.
-
-    Those that pull hardest go first: where a row goes, the multipliers of its neighbours often turn, and rows
-    that all go at once have to be taken again one by one.
+    Attributes:
+        row, joint, side: which they are, and whether the upper (1) or the lower bound (−1).
+        normal: their a, in the coordinates of `Level`.
+        scaled_normal: the same where the Hessian is one: F⁻¹ a, a'/√ρ.
+        orthonormal_basis, cholesky_factor: orthonormal rows, and the lower triangle of
+            scaled_normal = cholesky_factor · orthonormal_basis.
+        target: their b.
+        multiplier: their multipliers.
+        violation: by how much the point misses them.
+        change: scratch.
     """
-    d, D = level.offset[len(level.start)], level.rest[len(level.start)]
-    while True:
-        wrong = -1.0
-        for p in range(k):
-            wrong = max(wrong, -taken.pull[p] * taken.side[p])
-        kept = k
-        for p in range(k - 1, -1, -1):
-            push = taken.pull[p] * taken.side[p]
-            if not push > 0.0 and not push > -_HARD * wrong:
-                without(taken, p, kept, D, budget)
-                kept -= 1
-        if kept == k:
-            return k
-        k = kept
-        budget[0] -= k * (d + float(k))
-        balance(level, taken, k, ideal)
+
+    row: Whole
+    joint: Whole
+    side: Whole
+    normal: Array
+    scaled_normal: Array
+    orthonormal_basis: Array
+    cholesky_factor: Array
+    target: Array
+    multiplier: Array
+    violation: Array
+    change: Array
 
 
-@piece
-def take(level: Level, taken: Taken, k: int, excess: float, budget: Array) -> tuple[bool, int]:
-    """Takes the row at place k, violated by `excess`, as an equality: the dual step. Returns whether a point
-    meets this row and the others, within the budget, and how many rows are taken then."""
-    D = level.rest[len(level.start)]
-    side = float(taken.side[k])
-    taken.pull[k] = 0.0
-    length = resolve(taken, k, D, budget)
-    if length > 0.0:
-        fix(taken, k, length, D)
-    while True:
-        budget[0] -= float(k) * k
-        change = taken.change
-        for q in range(k):
-            change[q] = taken.corner[k, q]
-        backward(taken.corner, change, k)
-        # How far until the first multiplier is used up, and how far until the row is met.
-        first, reach, noise = -1, math.inf, 0.0
-        for q in range(k):
-            noise = max(noise, _NOISE * abs(change[q]))
-        for q in range(k):
-            rate = side * change[q] * taken.side[q]
-            if rate > noise:
-                far = taken.pull[q] * taken.side[q] / rate
-                if far < reach:
-                    first, reach = q, far
-        whole = excess / (length * length) if length > 0.0 else math.inf
-        step = min(reach, whole)
-        if not step < math.inf or budget[0] < 0.0:
-            return False, k
-        for q in range(k):
-            taken.pull[q] -= step * side * change[q]
-        taken.pull[k] += step * side
-        if whole <= reach:
-            return True, k + 1
-        excess -= step * length * length
-        taken.pull[first] = 0.0
-        if length > 0.0:
-            # The rotations that close the gap turn this row, too: nothing has to be resolved anew.
-            without(taken, first, k + 1, D, budget)
-            k -= 1
-            length = taken.corner[k, k]
-        else:
-            without(taken, first, k, D, budget)
-            move(taken, k, k - 1, D)
-            k -= 1
-            length = resolve(taken, k, D, budget)
-            if length > 0.0:
-                fix(taken, k, length, D)
+@inline_kernel
+def normal_of(level: Level, active: ActiveSet, index: int, L: Array, low: Array, high: Array) -> None:
+    """Coefficients, scaled coefficients and target of row `index`."""
+    r, a = active.row[index], active.joint[index]
+    normal, scaled_normal = active.normal[index], active.scaled_normal[index]
+    N = len(level.start)
+    limit = high[r, a] if active.side[index] > 0 else low[r, a]
+    for j in range(N):
+        limit -= L[r, j] * level.fixed[j, a]
+        weight = L[r, j] * level.metric[a]
+        start = level.start[j]
+        mine, others = level.offset[j + 1] - level.offset[j], level.rest[j + 1] - level.rest[j]
+        for c in range(mine):
+            normal[level.offset[j] + c] = weight * level.Q[j, a, start + c]
+        for c in range(others):
+            normal[level.rest[j] + c] = weight * level.Q[j, a, start + mine + c]
+    active.target[index] = limit
+    d, D = level.offset[N], level.rest[N]
+    for c in range(d):
+        scaled_normal[c] = normal[c]
+    forward(level.F, scaled_normal, d)
+    share = 1.0 / math.sqrt(level.rho)
+    for c in range(d, D):
+        scaled_normal[c] = share * normal[c]
 
 
-@piece
-def optimum(
-    level: Level,
-    taken: Taken,
-    count: int,
-    row: Whole,
-    joint: Whole,
-    pressed: Array,
-    L: Array,
-    low: Array,
-    high: Array,
-    ideal: Array,
-    U: Array,
-    value: Array,
-    length: Array,
-    budget: Array,
-) -> tuple[float, int]:
-    """The level's optimum under low ≤ L U ≤ high: its KKT residual and how many rows hold it; FAILED if none
-    was found, and how many rows it got to within the budget, 0 if more of it would be of no help.
+@inline_kernel
+def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
+    """Row `index` in terms of those before it: its coefficients go into `cholesky_factor`, the new
+    direction into `orthonormal_basis`, not yet of length one. Returns the length of what is new, 0 if the row
+    depends on the others."""
+    budget[0] -= 4.0 * D * (index + 1.0)
+    scaled_normal = active.scaled_normal[index]
+    left = split(
+        scaled_normal,
+        active.orthonormal_basis,
+        index,
+        D,
+        active.cholesky_factor[index],
+        active.orthonormal_basis[index],
+        1.0,
+    )
+    length, whole = math.sqrt(left), math.sqrt(dot(scaled_normal, scaled_normal, D))
+    return length if length > _DEPENDENT * whole and length > 1e-14 else 0.0
 
-    Args:
-        level: prepared.
-        taken: scratch; holds the active rows and their multipliers afterwards.
-        count, row, joint, pressed: the rows active a tick ago and their multipliers.
-        L, low, high: all bounds.
-        ideal: from `prepare`.
-        U: the increments found, (N, n).
-        value: L U, (b, n).
-        length: scratch, (b, n).
-        budget: how many multiplications are left, one number: time, but the same on every machine.
-    """
+
+@inline_kernel
+def fix(active: ActiveSet, index: int, length: float, D: int) -> None:
+    """Makes what `resolve` found for row `index` part of the orthonormal rows."""
+    active.cholesky_factor[index, index] = length
+    for c in range(D):
+        active.orthonormal_basis[index, c] /= length
+
+
+@inline_kernel
+def move(active: ActiveSet, source: int, to: int, D: int) -> None:
+    """Copies a row to another place."""
+    active.row[to], active.joint[to], active.side[to] = (
+        active.row[source],
+        active.joint[source],
+        active.side[source],
+    )
+    active.target[to], active.multiplier[to] = active.target[source], active.multiplier[source]
+    copy(active.normal[source], active.normal[to], D)
+    copy(active.scaled_normal[source], active.scaled_normal[to], D)
+
+
+@inline_kernel
+def without(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> None:
+    """Lets row `index` of k go; those behind it move up, and rotations make `cholesky_factor` triangular."""
+    budget[0] -= 6.0 * D * (k - index)
+    for p in range(index, k - 1):
+        move(active, p + 1, p, D)
+    close_gap(active.cholesky_factor, active.orthonormal_basis, index, k, D)
+
+
+@inline_kernel
+def update_multipliers(level: Level, active: ActiveSet, k: int, ideal: Array) -> None:
+    """Multipliers of k rows as equalities; `ideal` is the white point without any row."""
+    d = level.offset[len(level.start)]
+    for p in range(k):
+        active.multiplier[p] = dot(active.scaled_normal[p], ideal, d) - active.target[p]
+    forward(active.cholesky_factor, active.multiplier, k)
+    backward(active.cholesky_factor, active.multiplier, k)
+
+
+@inline_kernel
+def point_from_multipliers(level: Level, active: ActiveSet, k: int, ideal: Array) -> None:
+    """The point that belongs to the multipliers of k rows."""
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
-    look = float(d * d + U.size * U.shape[1] + 4 * value.size)
-    k = warm_rows(level, taken, count, row, joint, pressed, L, low, high, budget)
-    balance(level, taken, k, ideal)
-    k = release(level, taken, k, ideal, budget)
-    settle(level, taken, k, ideal)
-    changes = 0
-    while True:
-        budget[0] -= 3.0 * look + 4.0 * k * D
-        kkt = refine(level, taken, k)
-        if budget[0] < 0.0:
-            return FAILED, k
-        if kkt < 0.0:
-            return FAILED, 0
-        kept = release(level, taken, k, ideal, budget)
-        if kept < k:
-            k = kept
-            settle(level, taken, k, ideal)
-            continue
-        increments(level, U)
-        sums(U, value)
-        excess, r, a, side = worst(value, low, high)
-        if not excess > TOLERANCE:
-            return kkt, k
-        exact = True
-        while excess > (TOLERANCE if exact else _ROUGH):
-            if not excess < math.inf:
-                return FAILED, 0
-            changes += 1
-            if changes == _MANY:
-                lengths(level, taken, k, length, budget)
-            if changes >= _MANY:
-                excess, r, a, side = farthest(value, low, high, length, TOLERANCE if exact else _ROUGH)
-            taken.row[k], taken.joint[k], taken.side[k] = r, a, side
-            budget[0] -= look + 2.0 * k * D
-            normal_of(level, taken, k, L, low, high)
-            met, k = take(level, taken, k, excess, budget)
-            if not met:
-                if budget[0] < 0.0:
-                    return FAILED, k
-                if exact and excess > _ROUNDED:
-                    return FAILED, 0
-                if exact and side > 0:
-                    high[r, a] += excess
-                elif exact:
-                    low[r, a] -= excess
-                balance(level, taken, k, ideal)
-                k = release(level, taken, k, ideal, budget)
-            settle(level, taken, k, ideal)
-            if not met and not exact:
-                break  # at a vertex the rounding of a point that is not refined looks like an excess
-            increments(level, U)
-            sums(U, value)
-            excess, r, a, side = worst(value, low, high)
-            exact = False
+    x = level.x
+    for c in range(D):
+        x[c] = ideal[c] if c < d else 0.0
+    for p in range(k):
+        subtract(active.multiplier[p], active.scaled_normal[p], x, D)
+    backward(level.F, x, d)
+    share = 1.0 / math.sqrt(level.rho)
+    for c in range(d, D):
+        x[c] *= share
+
+
+@inline_kernel
+def refine(level: Level, active: ActiveSet, k: int) -> float:
+    """The optimum with the first k rows as equalities, from a point and multipliers near it. Returns its KKT
+    residual, −1 if there is none within reach.
+
+    Iterative refinement: the conditions are evaluated afresh and the factors correct what they miss.
+    """
+    first, last, rho = level.first, level.last, level.rho
+    N = len(level.start)
+    d, D = level.offset[N], level.rest[N]
+    x, z, slope = level.x, level.z, level.slope
+    gradient, violation, worth, share = math.inf, math.inf, math.inf, 1.0 / math.sqrt(rho)
+    for attempt in range(_ROUNDS + 1):
+        apply(level.projected_jacobian, x, first, last, level.start, level.offset, level.pushed)
+        for j in range(N):
+            for i in range(first, last):
+                level.e_1[j, i] = level.e_0[j, i]
+        add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_1)
+        gather_effects(level.C, level.e_1, first, last, level.row_knots, level.pushed)
+        gather(level.projected_jacobian, level.pushed, first, last, level.start, level.offset, slope)
+        for c in range(d, D):
+            slope[c] = 0.0
+        subtract(-rho, x, slope, D)
+        violation = worth = 0.0
+        for p in range(k):
+            subtract(-active.multiplier[p], active.normal[p], slope, D)
+            active.violation[p] = dot(active.normal[p], x, D) - active.target[p]
+            violation, worth = (
+                max(violation, abs(active.violation[p])),
+                max(worth, abs(active.multiplier[p] * active.violation[p])),
+            )
+        gradient = math.sqrt(dot(slope, slope, D))
+        met = violation <= _MET and worth <= _WORTH
+        if met and gradient <= level.accuracy:
+            return gradient
+        if met and gradient <= _ROUNDING * level.size[0] * level.size[1]:
+            break
+        if attempt == _ROUNDS:
+            break
+        for c in range(D):
+            z[c] = -slope[c] if c < d else -share * slope[c]
+        forward(level.F, z, d)
+        for p in range(k):
+            active.change[p] = dot(active.scaled_normal[p], z, D) + active.violation[p]
+        forward(active.cholesky_factor, active.change, k)
+        backward(active.cholesky_factor, active.change, k)
+        for p in range(k):
+            subtract(active.change[p], active.scaled_normal[p], z, D)
+            active.multiplier[p] += active.change[p]
+        backward(level.F, z, d)
+        for c in range(D):
+            x[c] += z[c] if c < d else share * z[c]
+    scale = max(1.0, (rho + level.size[0] * level.size[0]) * math.sqrt(dot(x, x, d)))
+    scale = max(scale, level.size[0] * level.size[1])
+    residual = max(gradient / scale, violation)
+    return residual if residual <= 1e-6 else -1.0

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.constants import RANK_TOLERANCE
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.linear import dot, subtract
 
 
-@piece
+@inline_kernel
 def no_directions(Q: Array) -> None:
     """Q (n, n) of a knot before any level took part: the identity."""
     Q[:] = 0.0
@@ -18,9 +18,9 @@ def no_directions(Q: Array) -> None:
         Q[a, a] = 1.0
 
 
-@piece
-def seen_rows(
-    B: Array, metric: Array, reflector: Array, count: int, first: int, last: int, seen: Array
+@inline_kernel
+def projected_rows(
+    B: Array, metric: Array, reflector: Array, count: int, first: int, last: int, projected_jacobian: Array
 ) -> None:
     """Rows of one knot in its coordinates: seen_i = (b_i ∘ metric) Q.
 
@@ -29,26 +29,28 @@ def seen_rows(
         metric: √(ρ/R) per joint: U = metric ∘ V makes the effort ρ‖V‖².
         reflector, count: the reflections whose product is Q so far.
         first, last: which rows.
-        seen: (m, n), the result.
+        projected_jacobian: (m, n), the result.
     """
     n = metric.size
     for i in range(first, last):
-        row = seen[i]
+        row = projected_jacobian[i]
         for a in range(n):
             row[a] = B[i, a] * metric[a]
         for c in range(count):
             reflect(reflector[c], row, c)
 
 
-@piece
+@inline_kernel
 def reflect(v: Array, x: Array, first: int) -> None:
     """x ← (1 − v vᵀ) x from index `first` on; ‖v‖² = 2."""
     n = x.size - first
     subtract(dot(v[first:], x[first:], n), v[first:], x[first:], n)
 
 
-@piece
-def take_directions(seen: Array, first: int, last: int, count: int, reflector: Array, Q: Array) -> int:
+@inline_kernel
+def take_directions(
+    projected_jacobian: Array, first: int, last: int, count: int, reflector: Array, Q: Array
+) -> int:
     """Householder QR of a level's rows within what the levels above left, one knot; returns how many
     directions are taken then. The level sees those before that number only; the rest is left to lower levels.
 
@@ -56,7 +58,7 @@ def take_directions(seen: Array, first: int, last: int, count: int, reflector: A
     less than RANK_TOLERANCE of the size of its rows are left to lower levels.
 
     Args:
-        seen: the level's rows in the coordinates so far, (m, n); then in the new ones.
+        projected_jacobian: the level's rows in the coordinates so far, (m, n); then in the new ones.
         first, last: which rows.
         count: how many directions the levels above took.
         reflector: (n, n), one more reflection for each direction.
@@ -65,17 +67,17 @@ def take_directions(seen: Array, first: int, last: int, count: int, reflector: A
     n = len(Q)
     size = 0.0
     for i in range(first, last):
-        size += dot(seen[i], seen[i], n)
+        size += dot(projected_jacobian[i], projected_jacobian[i], n)
     # Each row once: a row that was taken has nothing left beyond its direction but rounding.
     for _ in range(min(last - first, n - count)):
         best, most = first, -1.0
         for i in range(first, last):
-            left = dot(seen[i, count:], seen[i, count:], n - count)
+            left = dot(projected_jacobian[i, count:], projected_jacobian[i, count:], n - count)
             if left > most:
                 best, most = i, left
         if not most > RANK_TOLERANCE * RANK_TOLERANCE * size:
             break
-        v, row = reflector[count], seen[best]
+        v, row = reflector[count], projected_jacobian[best]
         for a in range(count, n):
             v[a] = row[a]
         v[count] += math.copysign(math.sqrt(most), row[count])
@@ -83,7 +85,7 @@ def take_directions(seen: Array, first: int, last: int, count: int, reflector: A
         for a in range(count, n):
             v[a] *= scale
         for i in range(first, last):
-            reflect(v, seen[i], count)
+            reflect(v, projected_jacobian[i], count)
         for a in range(count + 1, n):
             row[a] = 0.0
         for a in range(n):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.constants import RETURN_RATE
 from himpc.tick.kernel.arena import Array
 
@@ -12,7 +12,7 @@ VIABILITY, PAPER, OFF = range(3)
 """How position limits are kept."""
 
 
-@piece
+@inline_kernel
 def viable_speed(room: float, v_limit: float, a_max: float, reaction: float) -> float:
     """The speed from which a joint can still stop within `room`, see `limits.viability`; past the limit the
     speed of return, negative."""
@@ -21,7 +21,7 @@ def viable_speed(room: float, v_limit: float, a_max: float, reaction: float) -> 
     return reach + max(RETURN_RATE * min(room, 0.0), -v_limit)
 
 
-@piece
+@inline_kernel
 def bounds(
     q: Array,
     v: Array,
@@ -75,8 +75,8 @@ def bounds(
                 upper[2 * N + j, a] = (limits[4, a] - free) * (scale / T_s)
 
 
-@piece
-def sums(U: Array, value: Array) -> None:
+@inline_kernel
+def constraint_values(U: Array, value: Array) -> None:
     """L U, (b, n): torque rows are running sums of the increments, velocity rows of these, and position rows,
     one knot later, of those."""
     N, n = U.shape

@@ -2,60 +2,68 @@
 
 from __future__ import annotations
 
-from himpc.compilation.compiled import piece
-from himpc.tick.kernel.active_set import FAILED, optimum
+from himpc.compilation.compiled import inline_kernel
+from himpc.tick.kernel.active_set import ActiveSet
 from himpc.tick.kernel.arena import Array, Whole
-from himpc.tick.kernel.bases import no_directions, seen_rows, take_directions
-from himpc.tick.kernel.bounds import sums
+from himpc.tick.kernel.bases import no_directions, projected_rows, take_directions
+from himpc.tick.kernel.bounds import constraint_values
+from himpc.tick.kernel.goldfarb_idnani import FAILED, optimum
 from himpc.tick.kernel.level import Level, prepare
 from himpc.tick.kernel.linear import copy_rows, dot
-from himpc.tick.kernel.taken import Taken
 
 FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
 """Columns of the table of levels: its rows; how many knots it counts; whether its efforts are measured unlike
 those of the level above, so that directions must be found anew; whether (33) does not bind it; and the rows
 and knots that its evidence is about, which are its own also where priorities are left out."""
 SOFTENED = 1.0
-"""The last of `RUNGS` that applies an optimum."""
+"""The last of `FALLBACKS` that applies an optimum."""
 
 
-@piece
+@inline_kernel
 def own_directions(
-    place: int,
+    index: int,
     levels: Whole,
     B: Array,
     metric: Array,
     reflector: Array,
     Q: Array,
-    seen: Array,
+    projected_jacobian: Array,
     count: Whole,
     start: Whole,
 ) -> None:
     """Directions of a level at every knot: those of the levels above up to `start`, its own up to `count`."""
     N, _, n = B.shape
-    above = 0 if levels[place, ALONE] else place
-    afresh = above == 0 or levels[place, AFRESH]
-    first, last = levels[place, FIRST], levels[place, LAST]
+    above = 0 if levels[index, ALONE] else index
+    afresh = above == 0 or levels[index, AFRESH]
+    first, last = levels[index, FIRST], levels[index, LAST]
     # What the last level leaves nobody needs: if it may want all that is left, it takes part as it is.
-    whole = place == len(levels) - 1 or levels[place, ALONE]
+    whole = index == len(levels) - 1 or levels[index, ALONE]
     for j in range(N):
         if afresh:
             no_directions(Q[j])
             count[j] = 0
             for p in range(above):
-                seen_rows(B[j], metric, reflector[j], count[j], levels[p, FIRST], levels[p, LAST], seen[j])
+                projected_rows(
+                    B[j],
+                    metric,
+                    reflector[j],
+                    count[j],
+                    levels[p, FIRST],
+                    levels[p, LAST],
+                    projected_jacobian[j],
+                )
                 count[j] = take_directions(
-                    seen[j], levels[p, FIRST], levels[p, LAST], count[j], reflector[j], Q[j]
+                    projected_jacobian[j], levels[p, FIRST], levels[p, LAST], count[j], reflector[j], Q[j]
                 )
         start[j] = count[j]
-        seen_rows(B[j], metric, reflector[j], count[j], first, last, seen[j])
+        projected_rows(B[j], metric, reflector[j], count[j], first, last, projected_jacobian[j])
         if whole and last - first >= n - count[j]:
             count[j] = n
         else:
-            count[j] = take_directions(seen[j], first, last, count[j], reflector[j], Q[j])
+            count[j] = take_directions(projected_jacobian[j], first, last, count[j], reflector[j], Q[j])
 
 
-@piece
+@inline_kernel
 def keep_above(level: Level, U_above: Array, knots: int) -> None:
     """What (33) fixes of U_{i−1}, (N, n): its part in the directions of the levels above; all of it beyond
     the level's own horizon (Remark 8)."""
@@ -72,7 +80,7 @@ def keep_above(level: Level, U_above: Array, knots: int) -> None:
                 fixed[j, a] += metric[a] * Q[j, a, c] * along
 
 
-@piece
+@inline_kernel
 def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Whole, rest: Whole) -> int:
     """Where own coordinates and those beyond stand, see `Level`; returns how many there are."""
     N = len(start)
@@ -85,12 +93,12 @@ def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Wh
     return rest[N]
 
 
-@piece
-def solve_level(
-    place: int,
+@inline_kernel
+def solve_problem(
+    index: int,
     levels: Whole,
     level: Level,
-    taken: Taken,
+    active: ActiveSet,
     B: Array,
     free: Array,
     root_Q: Array,
@@ -98,7 +106,7 @@ def solve_level(
     count: int,
     row: Whole,
     joint: Whole,
-    pressed: Array,
+    warm_multiplier: Array,
     L: Array,
     lower: Array,
     upper: Array,
@@ -114,42 +122,55 @@ def solve_level(
     no optimum was found.
 
     Args:
-        place, levels: i and the table of levels.
-        level, taken, ideal, value, length: scratch, see `optimum`.
+        index, levels: i and the table of levels.
+        level, active, ideal, value, length: scratch, see `optimum`.
         B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
         U: (r, N, n) increments of all levels, those above known.
-        count, row, joint, pressed: the rows active a tick ago.
+        count, row, joint, warm_multiplier: the rows active a tick ago.
         L, lower, upper: all bounds.
         low, high: what they are for this level.
         budget: multiplications left.
         room: N·m, how far bounds give way around U_{i−1}.
     """
     _, N, n = U.shape
-    alone = place == 0 or levels[place, ALONE] == 1
-    knots = levels[place, KNOTS]
+    alone = index == 0 or levels[index, ALONE] == 1
+    knots = levels[index, KNOTS]
     if alone:
         level.fixed[:] = 0.0
         copy_rows(lower, low)
         copy_rows(upper, high)
     else:
-        keep_above(level, U[place - 1], knots)
+        keep_above(level, U[index - 1], knots)
         # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
-        sums(U[place - 1], value)
+        constraint_values(U[index - 1], value)
         for r in range(len(value)):
             for a in range(n):
                 low[r, a] = min(lower[r, a], value[r, a] - room)
                 high[r, a] = max(upper[r, a], value[r, a] + room)
         if level.rest[N] == 0:
-            copy_rows(U[place - 1], U[place])
+            copy_rows(U[index - 1], U[index])
             return 0.0, 0
     if not prepare(level, B, free, root_Q, ideal):
         return FAILED, 0
     return optimum(
-        level, taken, count, row, joint, pressed, L, low, high, ideal, U[place], value, length, budget
+        level,
+        active,
+        count,
+        row,
+        joint,
+        warm_multiplier,
+        L,
+        low,
+        high,
+        ideal,
+        U[index],
+        value,
+        length,
+        budget,
     )
 
 
-@piece
+@inline_kernel
 def predict(
     q: Array, v: Array, v_was: Array, U: Array, M_bar: Array, period: float, T_s: float, path: Array
 ) -> None:
@@ -164,7 +185,7 @@ def predict(
             path[j + 1, a] = position
 
 
-@piece
+@inline_kernel
 def finite(x: Array) -> bool:
     """Finite, and small enough that its squares and the bounds' differences stay so."""
     return dot(x, x, x.size) < 1e18

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.cascade import OWN_FIRST, OWN_LAST
 from himpc.tick.kernel.kinematics import ORIENTATION
 
 
-@piece
+@inline_kernel
 def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whole, knots: int) -> float:
     """The value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
     total = 0.0
@@ -24,19 +24,19 @@ def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whol
     return total
 
 
-@piece
-def leak_of(place: int, levels: Whole, effect: Array) -> float:
+@inline_kernel
+def leak_of(index: int, levels: Whole, effect: Array) -> float:
     """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect (r, N, m) is J M̄⁻¹ Δτ."""
     most = 0.0
     N = effect.shape[1]
-    for p in range(place):
+    for p in range(index):
         for j in range(N):
             for i in range(levels[p, OWN_FIRST], levels[p, OWN_LAST]):
-                most = max(most, abs(effect[place, j, i] - effect[p, j, i]))
+                most = max(most, abs(effect[index, j, i] - effect[p, j, i]))
     return most
 
 
-@piece
+@inline_kernel
 def bounds_met(
     N: int, count: int, row: Whole, joint: Whole, multiplier: Array, stopping: Array, at_bound: Array
 ) -> None:
@@ -56,7 +56,7 @@ def bounds_met(
         at_bound[a] = float(int(at_bound[a]) | bit)
 
 
-@piece
+@inline_kernel
 def quaternions(task: Whole, R: Array, out: Array) -> None:
     """Unit quaternions x y z w, w ≥ 0, of rotations (T, 3, 3), for tasks about orientation."""
     for t in range(len(task)):
@@ -64,7 +64,7 @@ def quaternions(task: Whole, R: Array, out: Array) -> None:
             quaternion(R[t], out[t])
 
 
-@piece
+@inline_kernel
 def quaternion(R: Array, out: Array) -> None:
     """x y z w of a rotation, w ≥ 0: its largest component comes from a root."""
     xx, yy, zz = R[0, 0], R[1, 1], R[2, 2]

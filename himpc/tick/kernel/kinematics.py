@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.linear import copy
 
@@ -12,9 +12,16 @@ POSITION, ORIENTATION, JOINTS, DAMPING, GIVEN = range(5)
 """Kinds of tasks; rows of a GIVEN one are handed in, with its value and error."""
 
 
-@piece
-def place(
-    q: Array, parent: Whole, turns: Whole, turn: Array, shift: Array, axis: Array, placed: Array, z: Array
+@inline_kernel
+def forward_kinematics(
+    q: Array,
+    parent: Whole,
+    is_revolute: Whole,
+    rotation: Array,
+    translation: Array,
+    axis: Array,
+    placed: Array,
+    z: Array,
 ) -> None:
     """Where all joints are at q: `placed` (n+1, 12), the rotation row by row, then the point, world axes; the
     world first. z (n+1, 3) are the joints' axes in the world.
@@ -22,8 +29,8 @@ def place(
     Args:
         q: (n,) rad or m.
         parent: the place each one is fixed to; it always comes before.
-        turns: whether the joint is revolute, not prismatic.
-        turn, shift: from the parent to the joint at q = 0.
+        is_revolute: whether the joint is revolute, not prismatic.
+        rotation, translation: from the parent to the joint at q = 0.
         axis: of the joint, in its own axes.
         placed, z: the result.
     """
@@ -32,37 +39,37 @@ def place(
     for j in range(1, q.size + 1):
         before, here = placed[parent[j]], placed[j]
         x, y, w, angle = axis[j, 0], axis[j, 1], axis[j, 2], q[j - 1]
-        cos, sin = (math.cos(angle), math.sin(angle)) if turns[j] else (1.0, 0.0)
-        gone = 0.0 if turns[j] else angle
+        cos, sin = (math.cos(angle), math.sin(angle)) if is_revolute[j] else (1.0, 0.0)
+        gone = 0.0 if is_revolute[j] else angle
         for a in range(3):
             left, middle, right = before[3 * a], before[3 * a + 1], before[3 * a + 2]
-            f = left * turn[j, 0, 0] + middle * turn[j, 1, 0] + right * turn[j, 2, 0]
-            g = left * turn[j, 0, 1] + middle * turn[j, 1, 1] + right * turn[j, 2, 1]
-            h = left * turn[j, 0, 2] + middle * turn[j, 1, 2] + right * turn[j, 2, 2]
+            f = left * rotation[j, 0, 0] + middle * rotation[j, 1, 0] + right * rotation[j, 2, 0]
+            g = left * rotation[j, 0, 1] + middle * rotation[j, 1, 1] + right * rotation[j, 2, 1]
+            h = left * rotation[j, 0, 2] + middle * rotation[j, 1, 2] + right * rotation[j, 2, 2]
             z[j, a] = f * x + g * y + h * w
             along = (1.0 - cos) * z[j, a]
             here[3 * a] = cos * f + along * x + sin * (g * w - h * y)
             here[3 * a + 1] = cos * g + along * y + sin * (h * x - f * w)
             here[3 * a + 2] = cos * h + along * w + sin * (f * y - g * x)
-            point = left * shift[j, 0] + middle * shift[j, 1] + right * shift[j, 2]
+            point = left * translation[j, 0] + middle * translation[j, 1] + right * translation[j, 2]
             here[9 + a] = before[9 + a] + point + gone * z[j, a]
 
 
-@piece
-def points(placed: Array, frame_joint: Whole, frame_shift: Array, point: Array) -> None:
+@inline_kernel
+def points(placed: Array, frame_joint: Whole, frame_translation: Array, point: Array) -> None:
     """Origins of the frames in the world, (F, 3) m."""
     for f in range(frame_joint.size):
-        on, r = placed[frame_joint[f]], frame_shift[f]
+        on, r = placed[frame_joint[f]], frame_translation[f]
         for a in range(3):
             point[f, a] = on[9 + a] + on[3 * a] * r[0] + on[3 * a + 1] * r[1] + on[3 * a + 2] * r[2]
 
 
-@piece
+@inline_kernel
 def jacobian(
     task: Whole,
     part: Whole,
     parent: Whole,
-    turns: Whole,
+    is_revolute: Whole,
     placed: Array,
     z: Array,
     frame_joint: Whole,
@@ -75,7 +82,7 @@ def jacobian(
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
         part: (M,) which axis, joint or given row a row is about.
-        parent, turns, placed, z: as in `place`.
+        parent, is_revolute, placed, z: as in `forward_kinematics`.
         frame_joint, point: the joint that carries each frame, and its origin.
         given: rows that are handed in, (G, n).
         J: the result.
@@ -95,8 +102,8 @@ def jacobian(
             j = frame_joint[frame]
             while j > 0:
                 if kind == ORIENTATION:
-                    J[i, j - 1] = z[j, c] if turns[j] else 0.0
-                elif turns[j]:
+                    J[i, j - 1] = z[j, c] if is_revolute[j] else 0.0
+                elif is_revolute[j]:
                     x, y = point[frame, a] - placed[j, 9 + a], point[frame, b] - placed[j, 9 + b]
                     J[i, j - 1] = z[j, a] * y - z[j, b] * x
                 else:
@@ -104,24 +111,26 @@ def jacobian(
                 j = parent[j]
 
 
-@piece
-def frame_rotation(on: Array, turn: Array, R: Array) -> None:
+@inline_kernel
+def rotation_of_frame(on: Array, rotation: Array, R: Array) -> None:
     """R of a frame in the world, (3, 3); `on` is the place of the joint that carries it."""
     for a in range(3):
         for b in range(3):
-            R[a, b] = on[3 * a] * turn[0, b] + on[3 * a + 1] * turn[1, b] + on[3 * a + 2] * turn[2, b]
+            R[a, b] = (
+                on[3 * a] * rotation[0, b] + on[3 * a + 1] * rotation[1, b] + on[3 * a + 2] * rotation[2, b]
+            )
 
 
-@piece
+@inline_kernel
 def about_one_axis(
     task: Whole,
     part: Whole,
     parent: Whole,
-    turns: Whole,
+    is_revolute: Whole,
     placed: Array,
     z: Array,
     frame_joint: Whole,
-    frame_turn: Array,
+    frame_rotation: Array,
     R_d: Array,
     R_now: Array,
     w: Array,
@@ -131,8 +140,8 @@ def about_one_axis(
     see `OrientationTask`; `jacobian` has written aᵀ times it.
 
     Args:
-        task, part, parent, turns, placed, z, frame_joint, J: as in `jacobian`.
-        frame_turn, R_d: of each frame, of each task.
+        task, part, parent, is_revolute, placed, z, frame_joint, J: as in `jacobian`.
+        frame_rotation, R_d: of each frame, of each task.
         R_now, w: room for a rotation per task, and for three numbers.
     """
     for t in range(len(task)):
@@ -140,7 +149,7 @@ def about_one_axis(
             continue
         i = task[t, 2]
         a, j = part[i], frame_joint[task[t, 1]]
-        frame_rotation(placed[j], frame_turn[task[t, 1]], R_now[t])
+        rotation_of_frame(placed[j], frame_rotation[task[t, 1]], R_now[t])
         turned_away(R_now[t], R_d[t], w)
         square = dot3(w, w)
         angle = math.sqrt(square)
@@ -153,12 +162,12 @@ def about_one_axis(
             bent * w[a] * w[c] - 0.5 * w[b],
         )
         while j > 0:
-            if turns[j]:
+            if is_revolute[j]:
                 J[i, j - 1] = on_a * z[j, a] + on_b * z[j, b] + on_c * z[j, c]
             j = parent[j]
 
 
-@piece
+@inline_kernel
 def leans(R: Array, D: Array, f: int, out: Array) -> None:
     """φ (f × p)/‖f × p‖ of p = R Dᵀ f, (3,) rad: the residual of an orientation task with axis f free."""
     g, h = (f + 1) % 3, (f + 2) % 3
@@ -174,7 +183,7 @@ def leans(R: Array, D: Array, f: int, out: Array) -> None:
         out[g] = math.pi
 
 
-@piece
+@inline_kernel
 def turned_away(R: Array, D: Array, out: Array) -> None:
     """log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
 
@@ -202,7 +211,7 @@ def turned_away(R: Array, D: Array, out: Array) -> None:
     out[0], out[1], out[2] = share * x, share * y, share * z
 
 
-@piece
+@inline_kernel
 def dot3(a: Array, b: Array) -> float:
     """aᵀb of three numbers."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.linear import dot, factorise, forward
 from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian
@@ -23,7 +23,7 @@ class Level(NamedTuple):
         rho: ρ, the weight of the increments.
         accuracy: the gradient that its point may have.
         C, S, row_knots: see `residual`.
-        seen: B in coordinates, (N, m, n).
+        projected_jacobian: B in coordinates, (N, m, n).
         e_0, e_1: √Q e for x = 0, and at the point, (N, m).
         pushed: scratch, (N, m).
         start: (N,) its first own coordinate of a knot.
@@ -45,7 +45,7 @@ class Level(NamedTuple):
     C: Array
     S: Array
     row_knots: Whole
-    seen: Array
+    projected_jacobian: Array
     e_0: Array
     e_1: Array
     pushed: Array
@@ -62,7 +62,7 @@ class Level(NamedTuple):
     size: Array
 
 
-@piece
+@inline_kernel
 def prepare(level: Level, B: Array, free: Array, root_Q: Array, ideal: Array) -> bool:
     """e₀, the factor F and `ideal`, the optimum without any row in white coordinates Fᵀx. False if the
     Hessian is not positive: nothing is finite then."""
@@ -76,10 +76,12 @@ def prepare(level: Level, B: Array, free: Array, root_Q: Array, ideal: Array) ->
     add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_0)
     for k in range(N):
         total += dot(level.e_0[k, first:last], level.e_0[k, first:last], last - first)
-    trace = hessian(level.S, level.seen, first, last, level.start, level.offset, level.rho, level.F)
+    trace = hessian(
+        level.S, level.projected_jacobian, first, last, level.start, level.offset, level.rho, level.F
+    )
     level.size[0], level.size[1] = math.sqrt(trace), math.sqrt(total)
     gather_effects(level.C, level.e_0, first, last, level.row_knots, level.pushed)
-    gather(level.seen, level.pushed, first, last, level.start, level.offset, level.slope)
+    gather(level.projected_jacobian, level.pushed, first, last, level.start, level.offset, level.slope)
     d = level.offset[N]
     if not factorise(level.F, d):
         return False
@@ -89,7 +91,7 @@ def prepare(level: Level, B: Array, free: Array, root_Q: Array, ideal: Array) ->
     return True
 
 
-@piece
+@inline_kernel
 def increments(level: Level, U: Array) -> None:
     """U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j), (N, n) N·m."""
     N, n = U.shape

@@ -1,18 +1,18 @@
 """The linear algebra of small dense matrices, compiled: at these sizes a call costs more than the work.
 
-Rows that a point is held by are kept as corner · basis: `basis` has orthonormal rows, `corner` is lower
-triangular, and rows come and go one by one.
+Rows that a point is held by are kept as cholesky_factor · orthonormal_basis: a lower triangle times
+orthonormal rows. Rows come and go one by one.
 """
 
 from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array
 
 
-@piece
+@inline_kernel
 def dot(a: Array, b: Array, n: int) -> float:
     """aᵀb over the first n."""
     total = 0.0
@@ -21,28 +21,28 @@ def dot(a: Array, b: Array, n: int) -> float:
     return total
 
 
-@piece
+@inline_kernel
 def subtract(share: float, x: Array, y: Array, n: int) -> None:
     """y ← y − share · x over the first n."""
     for i in range(n):
         y[i] -= share * x[i]
 
 
-@piece
+@inline_kernel
 def copy(x: Array, y: Array, n: int) -> None:
     """y ← x over the first n. (`y[:] = x` would be compiled with all that it takes to word an error.)"""
     for i in range(n):
         y[i] = x[i]
 
 
-@piece
+@inline_kernel
 def copy_rows(X: Array, Y: Array) -> None:
     """Y ← X, as many rows as Y has."""
     for i in range(len(Y)):
         copy(X[i], Y[i], Y.shape[1])
 
 
-@piece
+@inline_kernel
 def factorise(H: Array, d: int) -> bool:
     """The lower Cholesky factor F of H = F Fᵀ in place of its lower triangle; False if H is not positive.
 
@@ -78,7 +78,7 @@ def factorise(H: Array, d: int) -> bool:
     return True
 
 
-@piece
+@inline_kernel
 def forward(F: Array, x: Array, d: int) -> None:
     """x ← F⁻¹ x, F lower triangular; what is zero at the beginning stays zero."""
     first = 0
@@ -88,7 +88,7 @@ def forward(F: Array, x: Array, d: int) -> None:
         x[a] = (x[a] - dot(F[a, first:], x[first:], a - first)) / F[a, a]
 
 
-@piece
+@inline_kernel
 def backward(F: Array, x: Array, d: int) -> None:
     """x ← F⁻ᵀ x, F lower triangular."""
     for a in range(d - 1, -1, -1):
@@ -96,12 +96,14 @@ def backward(F: Array, x: Array, d: int) -> None:
         subtract(x[a], F[a], x, a)
 
 
-@piece
-def split(row: Array, basis: Array, count: int, n: int, share: Array, rest: Array, enough: float) -> float:
-    """A row (n,) as a combination of the first `count` orthonormal ones of `basis`, and a rest.
+@inline_kernel
+def split(
+    row: Array, orthonormal_basis: Array, count: int, n: int, share: Array, rest: Array, enough: float
+) -> float:
+    """A row (n,) as a combination of the first `count` orthonormal ones of `orthonormal_basis`, and a rest.
 
     Args:
-        row, basis, count, n: see there.
+        row, orthonormal_basis, count, n: see there.
         share: the coefficients, (count,).
         rest: what is left, (n,).
         enough: a second round takes out what rounding left of them, unless this share of ‖row‖² is left.
@@ -115,30 +117,30 @@ def split(row: Array, basis: Array, count: int, n: int, share: Array, rest: Arra
     before = after = dot(row, row, n)
     for _ in range(2):
         for q in range(count):
-            along = dot(basis[q], rest, n)
+            along = dot(orthonormal_basis[q], rest, n)
             share[q] += along
-            subtract(along, basis[q], rest, n)
+            subtract(along, orthonormal_basis[q], rest, n)
         after = dot(rest, rest, n)
         if after > enough * before:
             break
     return after
 
 
-@piece
-def close_gap(corner: Array, basis: Array, place: int, count: int, n: int) -> None:
-    """Takes row `place` out of `count` rows corner · basis; those behind it move up, and rotations make
-    `corner` lower triangular again."""
-    for p in range(place, count - 1):
+@inline_kernel
+def close_gap(cholesky_factor: Array, orthonormal_basis: Array, index: int, count: int, n: int) -> None:
+    """Takes row `index` out of `count` rows; those behind it move up, and rotations make `cholesky_factor`
+    lower triangular again."""
+    for p in range(index, count - 1):
         for q in range(p + 2):
-            corner[p, q] = corner[p + 1, q]
-    for q in range(place, count - 1):
-        length = math.hypot(corner[q, q], corner[q, q + 1])
+            cholesky_factor[p, q] = cholesky_factor[p + 1, q]
+    for q in range(index, count - 1):
+        length = math.hypot(cholesky_factor[q, q], cholesky_factor[q, q + 1])
         if length == 0.0:
             continue
-        cos, sin = corner[q, q] / length, corner[q, q + 1] / length
+        cos, sin = cholesky_factor[q, q] / length, cholesky_factor[q, q + 1] / length
         for p in range(q, count - 1):
-            x, y = corner[p, q], corner[p, q + 1]
-            corner[p, q], corner[p, q + 1] = cos * x + sin * y, cos * y - sin * x
+            x, y = cholesky_factor[p, q], cholesky_factor[p, q + 1]
+            cholesky_factor[p, q], cholesky_factor[p, q + 1] = cos * x + sin * y, cos * y - sin * x
         for c in range(n):
-            x, y = basis[q, c], basis[q + 1, c]
-            basis[q, c], basis[q + 1, c] = cos * x + sin * y, cos * y - sin * x
+            x, y = orthonormal_basis[q, c], orthonormal_basis[q + 1, c]
+            orthonormal_basis[q, c], orthonormal_basis[q + 1, c] = cos * x + sin * y, cos * y - sin * x

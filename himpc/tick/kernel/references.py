@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array, Whole
 
 SAMPLED, UNIFORM, EASED = range(3)
@@ -12,7 +12,7 @@ SAMPLED, UNIFORM, EASED = range(3)
 φ = ωt − sin ωt + φ₀."""
 
 
-@piece
+@inline_kernel
 def curves(
     t: float,
     T_s: float,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.linear import dot
 
 
-@piece
+@inline_kernel
 def free_motion(
     error: Array,
     x_dot: Array,
@@ -47,7 +47,7 @@ def free_motion(
     return total
 
 
-@piece
+@inline_kernel
 def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
     """B_j U_j of some rows, (N, m): the change of ẍ by the increments of one knot."""
     N, _, n = B.shape
@@ -56,7 +56,7 @@ def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
             pushed[j, i] = dot(B[j, i], U[j], n)
 
 
-@piece
+@inline_kernel
 def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole, e: Array) -> None:
     """e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots that a row counts.
 
@@ -75,7 +75,7 @@ def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole
             e[k, i] = total
 
 
-@piece
+@inline_kernel
 def gather_effects(C: Array, e: Array, first: int, last: int, row_knots: Whole, pulled: Array) -> None:
     """The transpose of `add_effects`: pulled_j = Σ_{k≥j} √Q c_{k−j} e_{k+1}."""
     N = len(e)
@@ -87,9 +87,16 @@ def gather_effects(C: Array, e: Array, first: int, last: int, row_knots: Whole, 
             pulled[j, i] = total
 
 
-@piece
+@inline_kernel
 def hessian(
-    S: Array, seen: Array, first: int, last: int, start: Whole, offset: Whole, rho: float, H: Array
+    S: Array,
+    projected_jacobian: Array,
+    first: int,
+    last: int,
+    start: Whole,
+    offset: Whole,
+    rho: float,
+    H: Array,
 ) -> float:
     """H = ρ + GᵀG of a level in its own coordinates, upper triangle; returns the trace of GᵀG.
 
@@ -98,7 +105,7 @@ def hessian(
 
     Args:
         S: (m, N, N).
-        seen: b, the rows of B in the level's coordinates, (N, m, n).
+        projected_jacobian: b, the rows of B in the level's coordinates, (N, m, n).
         first, last: the level's rows.
         start, offset: where its own coordinates of a knot begin among all of the knot, and among its own.
         rho: ρ, the weight R of the increments.
@@ -111,32 +118,34 @@ def hessian(
             row = H[a]
             row[a : offset[N]] = 0.0
             for i in range(first, last):
-                mine = seen[j, i, start[j] + a - offset[j]]
+                mine = projected_jacobian[j, i, start[j] + a - offset[j]]
                 for k in range(j, N):
                     weight = S[i, j, k] * mine
                     begin = start[k] - offset[k]
                     for b in range(max(a, offset[k]), offset[k + 1]):
-                        row[b] += weight * seen[k, i, begin + b]
+                        row[b] += weight * projected_jacobian[k, i, begin + b]
             trace += row[a]
             row[a] += rho
     return trace
 
 
-@piece
-def apply(seen: Array, x: Array, first: int, last: int, start: Whole, offset: Whole, pushed: Array) -> None:
+@inline_kernel
+def apply(
+    projected_jacobian: Array, x: Array, first: int, last: int, start: Whole, offset: Whole, pushed: Array
+) -> None:
     """B_j of own coordinates x, (N, m)."""
     for j in range(len(start)):
         begin = start[j] - offset[j]
         for i in range(first, last):
             total = 0.0
             for a in range(offset[j], offset[j + 1]):
-                total += seen[j, i, begin + a] * x[a]
+                total += projected_jacobian[j, i, begin + a] * x[a]
             pushed[j, i] = total
 
 
-@piece
+@inline_kernel
 def gather(
-    seen: Array, pulled: Array, first: int, last: int, start: Whole, offset: Whole, slope: Array
+    projected_jacobian: Array, pulled: Array, first: int, last: int, start: Whole, offset: Whole, slope: Array
 ) -> None:
     """The transpose of `apply`: slope = Σ_i b_ji pulled_ji."""
     for j in range(len(start)):
@@ -144,5 +153,5 @@ def gather(
         for a in range(offset[j], offset[j + 1]):
             total = 0.0
             for i in range(first, last):
-                total += seen[j, i, begin + a] * pulled[j, i]
+                total += projected_jacobian[j, i, begin + a] * pulled[j, i]
             slope[a] = total

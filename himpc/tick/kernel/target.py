@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, entry, piece
+from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.constants import APPROACH_RATE, STILL, VELOCITY_RATE
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.kinematics import turned_away
 from himpc.tick.kernel.linear import copy, dot
 
 
-@piece
+@inline_kernel
 def shorten(x: Array, cap: float, m: int) -> None:
     """x, shortened to `cap` if it is longer."""
     length = math.sqrt(dot(x, x, m))
@@ -20,8 +20,8 @@ def shorten(x: Array, cap: float, m: int) -> None:
             x[a] *= cap / length
 
 
-@piece
-def turn(w: Array, now: Array, then: Array) -> None:
+@inline_kernel
+def rotate(w: Array, now: Array, then: Array) -> None:
     """exp(w) R of a rotation R, row by row, by Rodrigues' formula."""
     angle = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     half = math.sin(0.5 * angle)
@@ -35,7 +35,7 @@ def turn(w: Array, now: Array, then: Array) -> None:
         then[6 + c] = z + first * d + second * (w[0] * b - w[1] * a)
 
 
-@piece
+@inline_kernel
 def jerked(
     velocity: Array,
     acceleration: Array,
@@ -74,7 +74,7 @@ def jerked(
         change[a] += along * (velocity[a] / speed)
 
 
-@piece
+@inline_kernel
 def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: int, width: int) -> None:
     """The sample after this one: one period under one acceleration within the caps."""
     velocity, acceleration = now[width : width + m], now[width + m : width + 2 * m]
@@ -108,13 +108,13 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     then[width + 3 * m] = 0.0
     step = then[width + 2 * m :]
     if width > m:
-        turn(step, now, then)
+        rotate(step, now, then)
     else:
         for a in range(m):
             then[a] = now[a] + step[a]
 
 
-@entry(MATRIX, WHOLE, VECTOR, VECTOR, NUMBER, GIVEN_MATRICES)
+@kernel(MATRIX, WHOLE, VECTOR, VECTOR, NUMBER, GIVEN_MATRICES)
 def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: Array) -> None:
     """Rolls the filter forward with the raw target frozen, and gathers its preview.
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import piece
+from himpc.compilation.compiled import inline_kernel
+from himpc.tick.kernel.active_set import ActiveSet
 from himpc.tick.kernel.arena import Array
 from himpc.tick.kernel.level import Level
 from himpc.tick.kernel.linear import dot, forward, subtract
-from himpc.tick.kernel.taken import Taken
 
 _SHORT = 1e-9
 """Share of the longest row: a shorter one is as far away as one of this length."""
 
 
-@piece
-def worst(value: Array, low: Array, high: Array) -> tuple[float, int, int, int]:
+@inline_kernel
+def most_violated(value: Array, low: Array, high: Array) -> tuple[float, int, int, int]:
     """The row that is violated most: by how much, row, joint and side. What is not a number is violated."""
     most, row, joint, side = 0.0, -1, -1, 0
     for r in range(len(value)):
@@ -30,11 +30,11 @@ def worst(value: Array, low: Array, high: Array) -> tuple[float, int, int, int]:
     return most, row, joint, side
 
 
-@piece
+@inline_kernel
 def farthest(
     value: Array, low: Array, high: Array, length: Array, least: float
 ) -> tuple[float, int, int, int]:
-    """The row, violated by more than `least`, to which it is farthest; returns what `worst` does."""
+    """The row, violated by more than `least`, to which it is farthest; returns what `most_violated` does."""
     most, excess, row, joint, side = 0.0, 0.0, -1, -1, 0
     for r in range(len(value)):
         for a in range(value.shape[1]):
@@ -48,14 +48,14 @@ def farthest(
     return excess, row, joint, side
 
 
-@piece
-def lengths(level: Level, taken: Taken, k: int, length: Array, budget: Array) -> None:
+@inline_kernel
+def lengths(level: Level, active: ActiveSet, k: int, length: Array, budget: Array) -> None:
     """How long the white coefficients of all rows are, (b, n); behind `k` rows there is room to work."""
     N, n = level.fixed.shape
     d, D = level.offset[N], level.rest[N]
     kinds = len(length) // N
     budget[0] -= N * n * (d * d / 6.0 + 8.0 * D)
-    one, torque, velocity, position = taken.white[k], level.z, level.slope, taken.change
+    one, torque, velocity, position = active.scaled_normal[k], level.z, level.slope, active.change
     share, longest = 1.0 / math.sqrt(level.rho), 0.0
     for a in range(n):
         for c in range(D):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, VECTOR, entry
+from himpc.compilation.compiled import INDICES, VECTOR, kernel
 from himpc.compilation.views import matrices, matrix, vector
 from himpc.tick.kernel.arena import AT, NOW, PERIOD, REACTION, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.bounds import bounds
@@ -15,11 +15,11 @@ from himpc.tick.kernel.kinematics import (
     JOINTS,
     ORIENTATION,
     about_one_axis,
-    frame_rotation,
+    forward_kinematics,
     jacobian,
     leans,
-    place,
     points,
+    rotation_of_frame,
     turned_away,
 )
 from himpc.tick.kernel.linear import dot
@@ -27,8 +27,8 @@ from himpc.tick.kernel.references import curves
 from himpc.tick.kernel.residual import free_motion
 
 
-@entry(VECTOR, INDICES, INDICES, INDICES)
-def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
+@kernel(VECTOR, INDICES, INDICES, INDICES)
+def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     """The measured state and the references as the data of all QPs: kinematics along the last prediction
     (30), residuals, free motion (15) and bounds (32d)–(32f). False if they are not finite.
 
@@ -41,16 +41,19 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     q, v = vector(data, where[AT.q], n), vector(data, where[AT.v], n)
     q_was, v_was = vector(data, where[AT.q_was], n), vector(data, where[AT.v_was], n)
     tau_0, M_bar = vector(data, where[AT.tau_0], n), vector(data, where[AT.M_bar], n)
-    parent, turns = (
+    parent, is_revolute = (
         vector(whole, whole_where[WHOLE_AT.parent], n + 1),
-        vector(whole, whole_where[WHOLE_AT.turns], n + 1),
+        vector(whole, whole_where[WHOLE_AT.is_revolute], n + 1),
     )
-    turn, shift = matrices(data, where[AT.turn], n + 1, 3, 3), matrix(data, where[AT.shift], n + 1, 3)
+    rotation, translation = (
+        matrices(data, where[AT.rotation], n + 1, 3, 3),
+        matrix(data, where[AT.translation], n + 1, 3),
+    )
     axis = matrix(data, where[AT.axis], n + 1, 3)
     frame_joint = vector(whole, whole_where[WHOLE_AT.frame_joint], F)
-    frame_turn, frame_shift = (
-        matrices(data, where[AT.frame_turn], F, 3, 3),
-        matrix(data, where[AT.frame_shift], F, 3),
+    frame_rotation, frame_translation = (
+        matrices(data, where[AT.frame_rotation], F, 3, 3),
+        matrix(data, where[AT.frame_translation], F, 3),
     )
     task, part = matrix(whole, whole_where[WHOLE_AT.task], T, 4), vector(whole, whole_where[WHOLE_AT.part], M)
     placed, z = matrix(data, where[AT.placed], n + 1, 12), matrix(data, where[AT.axis_now], n + 1, 3)
@@ -69,11 +72,11 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
 
     known = vector(whole, whole_where[WHOLE_AT.known], 2)
     if not known[0]:
-        place(q_was, parent, turns, turn, shift, axis, placed, z)
-        points(placed, frame_joint, frame_shift, point)
-        jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[N], B[0])
+        forward_kinematics(q_was, parent, is_revolute, rotation, translation, axis, placed, z)
+        points(placed, frame_joint, frame_translation, point)
+        jacobian(task, part, parent, is_revolute, placed, z, frame_joint, point, given[N], B[0])
         about_one_axis(
-            task, part, parent, turns, placed, z, frame_joint, frame_turn, R_d, R_now, turned, B[0]
+            task, part, parent, is_revolute, placed, z, frame_joint, frame_rotation, R_d, R_now, turned, B[0]
         )
         for i in range(M):
             x_dot_was[i] = dot(B[0, i], v_was, n)
@@ -81,11 +84,11 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     for j in range(N - 1, -1, -1):  # the measured state last: places and axes are then its own
         for a in range(n):
             at[a] = path[1 + j, a] + (q[a] - path[1, a]) if j else q[a]
-        place(at, parent, turns, turn, shift, axis, placed, z)
-        points(placed, frame_joint, frame_shift, point)
-        jacobian(task, part, parent, turns, placed, z, frame_joint, point, given[j], B[j])
+        forward_kinematics(at, parent, is_revolute, rotation, translation, axis, placed, z)
+        points(placed, frame_joint, frame_translation, point)
+        jacobian(task, part, parent, is_revolute, placed, z, frame_joint, point, given[j], B[j])
         about_one_axis(
-            task, part, parent, turns, placed, z, frame_joint, frame_turn, R_d, R_now, turned, B[j]
+            task, part, parent, is_revolute, placed, z, frame_joint, frame_rotation, R_d, R_now, turned, B[j]
         )
     motion = matrices(data, where[AT.motion], 3, N + 1, M)
     displacement, velocity_d, acceleration_d = motion[0], motion[1], motion[2]
@@ -104,7 +107,7 @@ def look(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     for t in range(T):
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
         if kind == ORIENTATION:
-            frame_rotation(placed[frame_joint[frame]], frame_turn[frame], R_now[t])
+            rotation_of_frame(placed[frame_joint[frame]], frame_rotation[frame], R_now[t])
             if size == 2:
                 leans(R_now[t], R_d[t], 3 - part[first] - part[first + 1], turned)
             else:

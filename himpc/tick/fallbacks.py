@@ -9,15 +9,15 @@ import numpy as np
 
 from himpc.cascade.explicit import solve_explicit
 from himpc.cascade.last_resort import containing, last_resort, softened, towards
-from himpc.cascade.level import NO_ROWS, RUNGS, Point, Rung
+from himpc.cascade.level import FALLBACKS, NO_ROWS, Fallback, Point
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
 from himpc.limits.rows import Kind, coming_to_rest
 from himpc.prediction.joint import JointState
-from himpc.tick.kernel.active_set import TOLERANCE
 from himpc.tick.kernel.arena import PERIOD, T_S, Arena, Array
 from himpc.tick.kernel.cascade import ALONE, LAST, SOFTENED
-from himpc.tick.kernel.solve import solve
+from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
+from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.printed import printed_problem
 
 _SMALL = 40
@@ -30,7 +30,7 @@ _LEAK = 1e-7
 
 
 @dataclass
-class Asks:
+class FallbackBudget:
     """How often the printed QP may still be asked in this tick."""
 
     left: int = 3
@@ -41,46 +41,49 @@ class Asks:
         return self.left >= 2
 
 
-def solve_levels(arena: Arena, kinds: tuple[Kind, ...], asks: Asks) -> list[tuple[Rung, float]]:
-    """Solves all levels of an arena whose problems are there; returns for each one the rung that its U stands
-    on and its time, microseconds.
+def solve_levels(
+    arena: Arena, kinds: tuple[Kind, ...], budget: FallbackBudget
+) -> list[tuple[Fallback, float]]:
+    """Solves all levels of an arena whose problems are there; returns for each one the fallback that gave its
+    U ("solve" if none was needed) and its time, microseconds.
 
-    The ladder is that of `solve_cascade`, and one rung more: where the kernel has got somewhere before its
+    The fallbacks are those of `solve_cascade`, and one more: where the kernel has got somewhere before its
     time was over, the level goes as far that way as the rows allow ("feasible"). All levels share the budget
     that the arena was granted: what one used up the next ones do not get, and then they stand on lower rungs.
     So the time of a tick is bounded.
 
     Args:
-        arena: `look` has filled it. The rows may be wider afterwards: levels below keep what a rung needed.
+        arena: filled by `linearize`. The rows may be wider afterwards: levels below keep what a fallback
+            needed.
         kinds: of the rows.
         asks: of this tick; what is asked is taken off.
     """
-    found: list[tuple[Rung, float]] = []
+    found: list[tuple[Fallback, float]] = []
     for place in range(int(arena.i["sizes"][4])):
         started = perf_counter_ns()
         arena.f["U"][place, 0, 0] = (
             np.nan
         )  # where the kernel gets nowhere, what it found before is no way to go
-        solved = solve(*arena.arguments, place, 0.0)
-        rung = "solve" if solved else _climb_down(arena, place, kinds, asks)
+        solved = solve_level(*arena.arguments, place, 0.0)
+        fallback = "solve" if solved else _climb_down(arena, place, kinds, budget)
         time_us = (perf_counter_ns() - started) / 1e3
-        arena.f["rung"][place], arena.f["time_us"][place] = RUNGS.index(rung), time_us
-        found.append((rung, time_us))
+        arena.f["rung"][place], arena.f["time_us"][place] = FALLBACKS.index(fallback), time_us
+        found.append((fallback, time_us))
     return found
 
 
-def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], asks: Asks) -> Rung:
+def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], budget: FallbackBudget) -> Fallback:
     f = arena.f
     rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
     wanted = f["U"][place].copy()
-    point = _as_printed(arena, place, rows, asks)
+    point = _as_printed(arena, place, rows, budget)
     if point is not None:
         _put(arena, place, point)
         return "solve"
     alone = place == 0 or bool(arena.i["level"][place, ALONE])
     if not alone:
         # Where U_{i−1} is all but the only point that the rows admit, a little room tells them apart.
-        if solve(*arena.arguments, place, TOLERANCE):
+        if solve_level(*arena.arguments, place, TOLERANCE):
             return "solve"
         above = f["U"][place - 1]
         return _on_the_way(arena, place, containing(rows, above), "inherit", above, f["U"][place].copy())
@@ -88,9 +91,9 @@ def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], asks: Asks) -
     widened = softened(rows)
     if widened is not None:
         _write(arena, widened)
-        solved = bool(solve(*arena.arguments, place, 0.0))
+        solved = bool(solve_level(*arena.arguments, place, 0.0))
         wanted = f["U"][place].copy()
-        point = None if solved else _as_printed(arena, place, widened, asks)
+        point = None if solved else _as_printed(arena, place, widened, budget)
         if point is not None:
             _put(arena, place, point)
         if solved or point is not None:
@@ -98,13 +101,15 @@ def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], asks: Asks) -
                 _write(arena, rows)
             return "soften"
     optimal = bool(arena.i["known"][1]) and f["rung"][place] <= SOFTENED
-    rung, U = last_resort(widened or rows, f["U_was"][place].copy() if optimal else None)
-    rung = _on_the_way(arena, place, widened or rows, rung, U, wanted)
+    fallback, U = last_resort(widened or rows, f["U_was"][place].copy() if optimal else None)
+    fallback = _on_the_way(arena, place, widened or rows, fallback, U, wanted)
     _write(arena, rows if place else containing(rows, f["U"][place]))
-    return rung
+    return fallback
 
 
-def _on_the_way(arena: Arena, place: int, rows: Rows, rung: Rung, U: Array, wanted: Array) -> Rung:
+def _on_the_way(
+    arena: Arena, place: int, rows: Rows, fallback: Fallback, U: Array, wanted: Array
+) -> Fallback:
     """Puts in place of U, which meets the rows, what is better on the way to where the kernel got; returns
     the rung: the one given if nothing is."""
     f = arena.f
@@ -116,9 +121,9 @@ def _on_the_way(arena: Arena, place: int, rows: Rows, rung: Rung, U: Array, want
     if on_the_way is not None:
         problem = printed_problem(arena, place)
         if problem.cost(on_the_way) < problem.cost(U):
-            rung, U = "feasible", on_the_way
+            fallback, U = "feasible", on_the_way
     _put(arena, place, Point(U, NO_ROWS, 0.0, "unsolved"))
-    return rung
+    return fallback
 
 
 def _coming_to_rest(arena: Arena) -> Array:
@@ -128,12 +133,12 @@ def _coming_to_rest(arena: Arena) -> Array:
     return coming_to_rest(state, f["M_bar"], len(f["L"][0]), float(f["scalars"][T_S]))
 
 
-def _as_printed(arena: Arena, place: int, rows: Rows, asks: Asks) -> Point | None:
+def _as_printed(arena: Arena, place: int, rows: Rows, budget: FallbackBudget) -> Point | None:
     """The level's optimum by the printed route, if that is a small matter and not done too often already."""
     N, n = arena.f["U"][place].shape
-    if N * n > _SMALL or asks.left <= 0:
+    if N * n > _SMALL or budget.left <= 0:
         return None
-    asks.left -= 1
+    budget.left -= 1
     alone = bool(arena.i["level"][place, ALONE])
     upper = [] if alone else [printed_problem(arena, p).B for p in range(place)]
     U_above = np.zeros((N, n)) if alone or not place else arena.f["U"][place - 1]

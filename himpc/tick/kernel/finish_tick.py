@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, entry
+from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, kernel
 from himpc.compilation.views import matrices, matrix, vector
 from himpc.tick.kernel.arena import AT, PERIOD, T_S, WHOLE_AT, Whole
 from himpc.tick.kernel.cascade import (
@@ -22,8 +22,8 @@ from himpc.tick.kernel.linear import copy, copy_rows
 from himpc.tick.kernel.residual import add_effects, effects
 
 
-@entry(VECTOR, INDICES, INDICES, INDICES, WHOLE)
-def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
+@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE)
+def finish_tick(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
     """Evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18). False if the
     torque is not finite; else the tick is remembered, if it is to be kept."""
     s = vector(whole, whole_where[WHOLE_AT.sizes], 10)
@@ -92,17 +92,17 @@ def conclude(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: in
             copy_rows(U[i], U_was[i])
         data[where[AT.scalars] + PERIOD] = data[where[AT.scalars] + T_S]
         whole[whole_where[WHOLE_AT.known] + 1] = 1
-        pressed_row, pressed_joint = (
-            matrix(whole, whole_where[WHOLE_AT.pressed_row], r, k),
-            matrix(whole, whole_where[WHOLE_AT.pressed_joint], r, k),
+        warm_row, warm_joint = (
+            matrix(whole, whole_where[WHOLE_AT.warm_row], r, k),
+            matrix(whole, whole_where[WHOLE_AT.warm_joint], r, k),
         )
-        pressed = matrix(data, where[AT.pressed], r, k)
+        warm_multiplier = matrix(data, where[AT.warm_multiplier], r, k)
         for i in range(r):
             if data[where[AT.rung] + i] > SOFTENED:
                 continue  # what the attempt left is there already
             active = whole[whole_where[WHOLE_AT.active_count] + i]
-            whole[whole_where[WHOLE_AT.pressed_count] + i] = active
+            whole[whole_where[WHOLE_AT.warm_count] + i] = active
             for p in range(active):
-                pressed_row[i, p], pressed_joint[i, p] = active_row[i, p], active_joint[i, p]
-                pressed[i, p] = multiplier[i, p]
+                warm_row[i, p], warm_joint[i, p] = active_row[i, p], active_joint[i, p]
+                warm_multiplier[i, p] = multiplier[i, p]
     return True

@@ -21,7 +21,7 @@ from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.braking import least_slack
 from himpc.references import Outlook
-from himpc.tick import ladder
+from himpc.tick import fallbacks
 from himpc.tick.tables import BUDGET, budget_of
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
@@ -50,7 +50,7 @@ def test_infeasible_rows_are_softened_by_the_least(seed: int, route: Route) -> N
     hierarchy = unreachable(random_hierarchy(seed, 5, 4, 3))
     N, _ = hierarchy.shape
     solutions = hierarchy.solve(route)
-    assert [solution.rung for solution in solutions] == ["soften", "solve", "solve"]
+    assert [solution.fallback for solution in solutions] == ["soften", "solve", "solve"]
     for solution in solutions:
         value = hierarchy.rows.L @ solution.U
         assert value[N, 0] == pytest.approx(1.0, abs=1e-6)
@@ -86,7 +86,7 @@ def pressed() -> Hierarchy:
     rows = containing(tight.rows, np.zeros(tight.shape))
     hierarchy = Hierarchy(tight.problems, rows.widened(np.full(rows.lower.shape, 0.01)))
     assert not least_slack(hierarchy.rows).any()
-    assert hierarchy.solve()[0].rung == "solve"
+    assert hierarchy.solve()[0].fallback == "solve"
     assert len(hierarchy.solve()[0].active)
     return hierarchy
 
@@ -101,8 +101,8 @@ def test_a_broken_solver_falls_to_the_previous_plan(
     previous = {s.name: s._replace(U=1e-4 * s.U) for s in pressed.solve()}
     break_solver(monkeypatch, kind)
     solutions = pressed.solve("explicit", solver, previous)
-    assert solutions[0].rung == "previous"
-    assert {solution.rung for solution in solutions[1:]} <= {"inherit", "solve"}
+    assert solutions[0].fallback == "previous"
+    assert {solution.fallback for solution in solutions[1:]} <= {"inherit", "solve"}
     shifted = np.vstack([previous[solutions[0].name].U[1:], np.zeros((1, pressed.shape[1]))])
     np.testing.assert_array_equal(solutions[0].U, shifted)
     for solution in solutions:
@@ -118,7 +118,7 @@ def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
     rows, (N, n) = pressed.rows, pressed.shape
     sound = {s.name: s._replace(U=np.zeros((N, n))) for s in pressed.solve()}
     if stale == "rung":
-        sound = {name: s._replace(rung="previous") for name, s in sound.items()}
+        sound = {name: s._replace(fallback="previous") for name, s in sound.items()}
         moved = pressed
     else:
         lower = rows.lower.copy()
@@ -130,7 +130,7 @@ def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
         assert_within(moved.rows.torque_only(), np.zeros((N, n)))
     break_solver(monkeypatch, "unsolved")
     solutions = moved.solve("explicit", "daqp", sound)
-    assert solutions[0].rung == "brake"
+    assert solutions[0].fallback == "brake"
     for solution in solutions:
         assert_within(moved.rows, solution.U)
 
@@ -146,7 +146,7 @@ def test_a_broken_solver_without_a_plan_brakes(
     if route == "compiled":
         break_kernel(monkeypatch)
     solutions = pressed.solve(route)
-    assert solutions[0].rung == "brake"
+    assert solutions[0].fallback == "brake"
     for solution in solutions:
         assert np.isfinite(solution.U).all()
         assert_within(pressed.rows, solution.U)
@@ -162,7 +162,7 @@ def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) ->
     break_kernel(monkeypatch, place=1)
     solutions = hierarchy.solve()
     np.testing.assert_array_equal(solutions[0].U, sound[0].U)
-    assert [solution.rung for solution in solutions][:2] == ["solve", "inherit"]
+    assert [solution.fallback for solution in solutions][:2] == ["solve", "inherit"]
     np.testing.assert_array_equal(solutions[1].U, solutions[0].U)
     for solution in solutions:
         assert_within(hierarchy.rows, solution.U)
@@ -179,7 +179,7 @@ def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, posit
     shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
     contradictory = boxed(Hierarchy(hierarchy.problems, shifted), past=float(rng.choice([0.0, 0.3])))
     solutions = contradictory.solve()
-    assert solutions[0].rung in ("solve", "soften", "feasible", "brake")
+    assert solutions[0].fallback in ("solve", "soften", "feasible", "brake")
     for solution in solutions:
         assert np.isfinite(solution.U).all()
         assert solution.kkt_residual <= 1e-6
@@ -282,9 +282,9 @@ def test_nhimpc_asks_the_printed_route_a_few_times_a_tick(monkeypatch: pytest.Mo
         asked.append("printed")
         return solves(*given)
 
-    solves = ladder.solve_explicit
-    monkeypatch.setattr(ladder, "solve_explicit", counted)
-    monkeypatch.setattr(ladder, "solve", lambda *_: False)
+    solves = fallbacks.solve_explicit
+    monkeypatch.setattr(fallbacks, "solve_explicit", counted)
+    monkeypatch.setattr(fallbacks, "solve_level", lambda *_: False)
     scene = torque_scene("iiwa14-circle-paper")
     session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=3, controller="nhimpc")))
     rng, most = np.random.default_rng(0), 0
