@@ -14,7 +14,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.server.server import PageServer
-from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
+from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
 from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from app.client.decimated import Window
 from app.client.ghost import Ghost
-from app.client.learner import Learner
 from app.client.simulation import Simulation
+from app.client.simulation_client import SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
@@ -50,7 +50,7 @@ class Moment:
     ghost: GhostState | None
 
 
-def moment_of(learner: Learner, past: float | None, curves: bool = True) -> Moment | None:
+def moment_of(learner: SimulationClient, past: float | None, curves: bool = True) -> Moment | None:
     """The instant to show, after taking over what is new; None while nothing was reported yet.
 
     Args:

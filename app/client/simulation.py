@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
 from app.client.decimated import History
-from app.client.poses import Frame, Tape
+from app.client.pose_history import Frame, PoseHistory
 from app.client.rows import Record
-from app.client.score import Score
+from app.client.run_statistics import RunStatistics
 from app.client.trouble import Trouble, trouble_of
 from app.link.messages import Command, Failed, Loading, Ready, Refused, Report, Status
 from app.link.process import Process
@@ -39,8 +39,8 @@ class Simulation(ABC):
         self.settings: Settings | None = None
         self.failure: str | None = None
         self.changed = 0
-        self.tape = Tape()
-        self.score: Score | None = None
+        self.tape = PoseHistory()
+        self.score: RunStatistics | None = None
         self.record: Record | None = None
         self._refusals: list[str] = []
         self._notices: list[str] = []
@@ -123,13 +123,13 @@ class Simulation(ABC):
         if not ready.again:
             self.status = None
             self.tape.clear()
-        self.score = Score(ready.layout)
+        self.score = RunStatistics(ready.layout)
         if ready.again and record is not None and history is not None:
             self.record = record.under(ready.layout)
-            self._history = history.under(self._block, ready.layout, self.score.take, self.record.take)
+            self._history = history.under(self._block, ready.layout, self.score.append_rows, self.record.take)
         else:
             self.record = Record(ready.layout)
-            self._history = History(self._block, ready.layout, self.score.take, self.record.take)
+            self._history = History(self._block, ready.layout, self.score.append_rows, self.record.take)
         self.changed += 1
 
     def _free(self) -> None:

@@ -13,9 +13,9 @@ import numpy as np
 import viser
 
 from app.client.ghost import Ghost
-from app.client.learner import Learner
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
 from app.html.palette import level_colours, recoloured
 from app.html.text import PHONE
@@ -52,7 +52,7 @@ class Stage:
     def __init__(
         self,
         client: viser.ClientHandle,
-        learner: Learner,
+        learner: SimulationClient,
         ready: Ready,
         scenes: Mapping[str, str],
         dark: bool,

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import viser
 
-from app.client.learner import Learner
 from app.client.moment import Moment
+from app.client.simulation_client import SimulationClient
 from app.html.palette import RGB
 from app.link.messages import Post, Ready, Status
 from app.panels.widgets.in_view import InView
@@ -28,7 +28,7 @@ class Context:
 
     client: viser.ClientHandle
     in_view: InView
-    learner: Learner
+    learner: SimulationClient
     ready: Ready
     colours: dict[str, RGB]
     bindings: Bindings[Any]

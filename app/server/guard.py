@@ -18,7 +18,7 @@ from websockets.http11 import Request, Response
 
 from app.server import budget
 from app.server.budget import Budget
-from app.server.crowd import Crowd
+from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade, secured
 from app.server.peers import ends_of
 from app.server.uploads import TRANSFER, Uploads
@@ -40,7 +40,7 @@ class Guard:
     """Given to `open_server`. Refuses everybody until it is opened."""
 
     def __init__(self, door: Door) -> None:
-        self.crowd = Crowd()
+        self.crowd = ConnectionLimits()
         self.refused = 0
         self.taken = 0
         """Messages that reached viser."""

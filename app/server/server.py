@@ -17,11 +17,11 @@ import viser
 
 from app.adapter import private
 from app.link.choice import SceneChoice
-from app.server.arenas import few_arenas, large_arrays_apart
 from app.server.classroom import Classroom
 from app.server.door import Door, as_origin, names_of_this_machine
 from app.server.greeting import greeting
 from app.server.guard import Guard
+from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.opening import opened_in_a_browser
 from app.server.passes import Passes, new_token
 from app.server.sessions import GRACE, Sessions

@@ -7,7 +7,7 @@ from typing import final
 
 from app.link.messages import Begin, Command, Follow, Loading, Quit, Reached, Refused
 from app.link.wire import Wire
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.session.ghost import GhostDriver, ghost_scene
 from robots import InputError
 
@@ -25,7 +25,7 @@ class GhostBody:
         """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
         scene = ghost_scene(begin.choice.scene(), begin.settings, own)
         # A lesson judges the robot, not its ghost.
-        self.body = Body(begin.choice, scene, judged=False)
+        self.body = SimulationRunner(begin.choice, scene, judged=False)
         self.driver = GhostDriver(self.body.session, begin.settings, own)
 
     def catch_up(self, until: float) -> bool:

@@ -14,7 +14,7 @@ from app.link.messages import Command, Failed, Follow, Load, Loading, Quit, Refu
 from app.link.wire import Wire, packed
 from app.worker.ghost import follow
 from app.worker.pacing import Pacer
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -34,7 +34,7 @@ _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
 def rehearse() -> None:
     """Both kinds of controllers run for a moment: what is loaded on first use is there afterwards."""
     for scene in _USUAL:
-        body = Body(SceneChoice(RunSpec(scene)))
+        body = SimulationRunner(SceneChoice(RunSpec(scene)))
         body.tick(3)
         packed(body.ready())
         packed(body.status())
@@ -77,7 +77,7 @@ def _serve(wire: Wire) -> None:
         body.block.close()
 
 
-def _first(wire: Wire) -> Body | Follow | None:
+def _first(wire: Wire) -> SimulationRunner | Follow | None:
     while True:
         command: Command = wire.recv()
         if isinstance(command, Quit):
@@ -90,10 +90,10 @@ def _first(wire: Wire) -> Body | Follow | None:
                 return body
 
 
-def _try(wire: Wire, choice: SceneChoice) -> Body | None:
+def _try(wire: Wire, choice: SceneChoice) -> SimulationRunner | None:
     wire.send(Loading())
     try:
-        body = Body(choice)
+        body = SimulationRunner(choice)
     except InputError as error:
         wire.send(Refused(str(error)))
         return None
@@ -101,7 +101,7 @@ def _try(wire: Wire, choice: SceneChoice) -> Body | None:
     return body
 
 
-def _simulate(wire: Wire, body: Body) -> None:
+def _simulate(wire: Wire, body: SimulationRunner) -> None:
     pacer = Pacer(time.perf_counter())
     next_pose = next_status = next_script = 0.0
     while True:
@@ -146,7 +146,7 @@ def _simulate(wire: Wire, body: Body) -> None:
             wire.poll(_BEAT if body.busy else _IDLE)
 
 
-def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:
+def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:
     """Runs up to so many steps, and returns how many it were."""
     for ran in range(due):
         step_s = body.session.step_s

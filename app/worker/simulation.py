@@ -42,7 +42,7 @@ from robots import InputError
 
 
 @final
-class Body:
+class SimulationRunner:
     """A session, whether it plays and how fast, and the memory its telemetry goes to."""
 
     def __init__(self, choice: SceneChoice, scene: Scene | None = None, judged: bool = True) -> None:

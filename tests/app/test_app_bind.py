@@ -15,7 +15,7 @@ import pytest
 import viser
 from viser import _messages
 
-from app.client.wish import Wish
+from app.client.pending_edit import PendingEdit
 from app.panels.torque.controller import ControllerPanel
 from app.panels.widgets import mirror as bind
 from app.panels.widgets.mirror import Bindings
@@ -117,7 +117,7 @@ def test_controls_are_reminded_of_what_the_session_has(
 
 def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two quick presses of a toggle end where they began."""
-    wish: Wish[bool] = Wish()
+    wish: PendingEdit[bool] = PendingEdit()
     assert wish.now(True) is True
     assert wish.ask(not wish.now(True)) is False
     assert wish.ask(not wish.now(True)) is True

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from app.client.learner import Learner
 from app.client.moment import Moment
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise
 from app.link.messages import Load
@@ -110,7 +110,7 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
             page.write(again, value=True)
             assert eventually(lambda: page.shows("RUNNING"))
             learner = server.sessions.learners[0]
-            assert isinstance(learner, Learner) and learner.failure is None
+            assert isinstance(learner, SimulationClient) and learner.failure is None
     finally:
         server.close()
     assert "no <place> for it" in capfd.readouterr().err  # whoever started it can see where

@@ -27,7 +27,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server import budget
 from app.server.budget import Bucket, Budget
-from app.server.crowd import Crowd
+from app.server.connection_limits import ConnectionLimits
 from app.server.door import Door
 from app.server.guard import FIRST_WORD, Guard, GuardedConnection
 from app.server.passes import QUERY
@@ -328,7 +328,7 @@ def test_files_that_are_complete_hold_nothing() -> None:
 
 
 def test_the_silent_make_room() -> None:
-    crowd, left = Crowd(total=4, per_address=2), []
+    crowd, left = ConnectionLimits(total=4, per_address=2), []
     for key in "ab":
         assert crowd.enter(key, "1", lambda key=key: left.append(key))
     crowd.spoke("b")

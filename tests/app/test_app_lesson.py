@@ -14,7 +14,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Curve, Exercise, Lecture
 from app.link.messages import Command, Load, Play, Post, Predict, Ready, Refused, ResetAll, RunStep
 from app.worker.lesson.rows import BUCKETS, Record, thinned
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from himpc.telemetry import Layout
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
@@ -32,7 +32,7 @@ class Learner:
     """A body, driven by hand; `lecture` is the last that was reported."""
 
     def __init__(self, exercise: Exercise) -> None:
-        self.body = Body(SceneChoice.of_lesson(exercise))
+        self.body = SimulationRunner(SceneChoice.of_lesson(exercise))
         self.lecture = self.look()
 
     def look(self) -> Lecture:
@@ -189,7 +189,7 @@ def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
     code = encode(state_of(replace(run, seed=3), solved.settings, lesson="deadlines", step=last))
     choice = SceneChoice.of_state(decode(code))
     assert choice.exercise == Exercise("deadlines", last - 1) and choice.run.seed == 3
-    body = Body(choice)
+    body = SimulationRunner(choice)
     assert body.session.settings == solved.settings and not body.running
     body.handle(RunStep(fast=True))
     while not body.running:

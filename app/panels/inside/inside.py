@@ -8,8 +8,8 @@ from dataclasses import replace
 import viser
 
 from app.client.moment import Moment
+from app.client.pending_edit import Send
 from app.client.watching import Watching
-from app.client.wish import Send
 from app.html.palette import RGB
 from app.html.text import block
 from app.link.inside import Watch

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.client.moment import Moment
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import block, esc, figure, swatch
 from app.link.inside import Inside, Watch

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, Lecture
 from app.panels.lesson.cards import add_cards, add_invitation
@@ -24,7 +24,7 @@ class Course:
     def __init__(
         self,
         gui: viser.GuiApi,
-        learner: Learner,
+        learner: SimulationClient,
         exercise: Exercise | None,
         notebook: Notebook,
         choose: Callable[[SceneChoice], None],

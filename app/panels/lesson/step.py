@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.html.palette import LEVELS
 from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, Lecture, parts_of
@@ -38,7 +38,7 @@ class LessonPanel:
         tab: viser.GuiTabHandle,
         pictures: viser.GuiHtmlHandle,
         exercise: Exercise,
-        learner: Learner,
+        learner: SimulationClient,
         choose: Callable[[SceneChoice], None],
         all_lessons: Callable[[], None],
         notebook: Notebook,

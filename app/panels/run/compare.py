@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
-from app.client.score import Result
+from app.client.run_statistics import RunFigures
+from app.client.simulation_client import SimulationClient
 from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
@@ -31,7 +31,7 @@ class ComparePanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        learner: Learner,
+        learner: SimulationClient,
         settings: Settings,
         colours: dict[str, RGB],
     ) -> None:
@@ -130,7 +130,7 @@ class ComparePanel:
             return
         self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
 
-    def _results(self, now: Snapshot[Settings], mine: Result, its: Result) -> str:
+    def _results(self, now: Snapshot[Settings], mine: RunFigures, its: RunFigures) -> str:
         places = {level.name: place for place, level in enumerate(now.settings.levels, start=1)}
         tasks = sorted(now.ready.layout.tasks, key=lambda task: places.get(task.level, 99))
         rows = [

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import GOOD, RGB, css
 from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import Status, TaskView

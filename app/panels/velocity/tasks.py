@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.wish import Wish
+from app.client.pending_edit import PendingEdit
 from app.html.palette import BAD, DAMPING, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.panels.widgets.controls import Controls
@@ -31,7 +31,7 @@ class RolesPanel:
     ) -> None:
         self._current = current
         self._order = tuple(level.name for level in settings.levels)
-        self._enabled: dict[str, Wish[bool]] = {name: Wish() for name in self._order}
+        self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
         gui.add_html(
             block("The levels come in the order of the tasks in the mission's window: change it in the tab "
                   "<b>Mission</b>. The numbers are keys.")

@@ -11,7 +11,7 @@ import viser
 from viser import uplot
 
 from app.adapter import private
-from app.client.corners import corners
+from app.client.decimate import decimate
 from app.client.decimated import BUCKETS, WINDOW, Window
 from app.html.palette import RGB, css
 from app.html.text import block
@@ -132,7 +132,7 @@ class Chart:
             start = int(np.argmax(known))
             values[:, :start] = values[:, start : start + 1]
         values = (values - low) * (_TOP / (high - low))
-        kept = corners(values, self._tolerance, window.first)
+        kept = decimate(values, self._tolerance, window.first)
         self._send(kept, values[:, kept], window.ages()[kept])
 
     def _send(self, kept: np.ndarray, values: np.ndarray, ages: np.ndarray) -> None:

@@ -14,7 +14,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Exercise, parts_of
 from app.link.messages import Post
 from app.server.server import PageServer
-from browsing.hands import eventually, key, open_page, press
+from browsing.browser_actions import eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @final
-class Learner(Simulation):
+class SimulationClient(Simulation):
     """The simulation of one browser tab, and the ghost that follows it, if there is one."""
 
     who = "The simulation"
