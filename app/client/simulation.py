@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 from app.client.decimated import History
 from app.client.pose_history import Frame, PoseHistory
-from app.client.rows import Record
+from app.client.rows import RowHistory
 from app.client.run_statistics import RunStatistics
 from app.client.trouble import Trouble, trouble_of
-from app.link.messages import Command, Failed, Loading, Ready, Refused, Report, Status
+from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
 from app.link.process import Process
 from app.link.ring import Block
 from app.link.spares import Spares
@@ -41,7 +41,7 @@ class Simulation(ABC):
         self.changed = 0
         self.tape = PoseHistory()
         self.score: RunStatistics | None = None
-        self.record: Record | None = None
+        self.record: RowHistory | None = None
         self._refusals: list[str] = []
         self._notices: list[str] = []
         self._spares = spares
@@ -104,9 +104,9 @@ class Simulation(ABC):
                     self.status = report
                     self.settings = report.settings or self.settings
                     self._notices += report.notices
-                case Refused(sentence):
+                case LoadRefused(sentence):
                     self._refusals.append(sentence)
-                case Failed(sentence):
+                case SimulationFailed(sentence):
                     self.failure = sentence
                 case _:
                     pass
@@ -128,7 +128,7 @@ class Simulation(ABC):
             self.record = record.under(ready.layout)
             self._history = history.under(self._block, ready.layout, self.score.append_rows, self.record.take)
         else:
-            self.record = Record(ready.layout)
+            self.record = RowHistory(ready.layout)
             self._history = History(self._block, ready.layout, self.score.append_rows, self.record.take)
         self.changed += 1
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from app.client.decimated import History
-from app.client.ghost import Ghost
+from app.client.ghost import GhostClient
 from app.client.pose_history import PoseHistory
-from app.client.rows import Record
+from app.client.rows import RowHistory
 from app.client.run_statistics import RunStatistics
 from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
@@ -69,7 +69,7 @@ class Watcher:
         return self._shown.score
 
     @property
-    def record(self) -> Record | None:
+    def record(self) -> RowHistory | None:
         return self._shown.record
 
     @property
@@ -81,7 +81,7 @@ class Watcher:
         return self._shown.lecture
 
     @property
-    def ghost(self) -> Ghost | None:
+    def ghost(self) -> GhostClient | None:
         return self._shown.ghost
 
     @property

@@ -36,7 +36,7 @@ _PAGE = (
 )
 
 
-class Guard:
+class ConnectionGuard:
     """Given to `open_server`. Refuses everybody until it is opened."""
 
     def __init__(self, door: Door) -> None:
@@ -114,7 +114,7 @@ class GuardedConnection(ServerConnection):
     serves, `refuse` tells its user what was not taken, `is_owners` says whether who started the server
     opened it."""
 
-    def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
+    def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
         super().__init__(*of, **more)
         self.uploads: Uploads | None = None
         self.refuse: Callable[[str], object] = _nothing_said

@@ -24,7 +24,7 @@ from app.server.sessions import Sessions
 from app.server.uploads import Uploads
 from app.server.workers import Workers
 from lessons.own.folder import Folder
-from lessons.replay.progress import Progress
+from lessons.replay.progress import LearnerProgress
 from lessons.replay.progress import found as found_progress
 
 STORAGE = 5.0
@@ -56,7 +56,7 @@ class Visit:
         self._left = False
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
-        self._notebook = Notebook(Progress(), lambda _: None)
+        self._notebook = Notebook(LearnerProgress(), lambda _: None)
         self._workers = Workers()
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)

@@ -17,7 +17,7 @@ from app.html.palette import RGB
 from app.link.messages import Ready
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
 from app.view.reachability import Question, Reachability, ReachabilityWorker
-from app.view.target import Frames, TargetGizmo
+from app.view.target import TargetFrames, TargetGizmo
 from lessons.events import MoveTarget
 from lessons.settings.torque import TorqueSettings
 
@@ -160,7 +160,7 @@ class Hand:
 
     def show(
         self,
-        frames: Frames,
+        frames: TargetFrames,
         settings: TorqueSettings,
         latest: np.ndarray,
         fields: dict[str, slice],

@@ -10,7 +10,7 @@ import traceback
 from contextlib import suppress
 
 from app.link.choice import SceneChoice
-from app.link.messages import Command, Failed, Follow, Load, Loading, Quit, Refused
+from app.link.messages import Command, FollowLeader, Load, Loading, LoadRefused, Quit, SimulationFailed
 from app.link.wire import Wire, packed
 from app.worker.ghost import follow
 from app.worker.pacing import Pacer
@@ -53,7 +53,7 @@ def main(wire: Wire) -> None:
         return  # the page is gone
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        wire.send(Failed(_sentence(error)))
+        wire.send(SimulationFailed(_sentence(error)))
 
 
 def _let_ticks_end() -> None:
@@ -66,7 +66,7 @@ def _let_ticks_end() -> None:
 
 def _serve(wire: Wire) -> None:
     body = _first(wire)
-    if isinstance(body, Follow):
+    if isinstance(body, FollowLeader):
         follow(wire, body)
         return
     if body is None:
@@ -77,12 +77,12 @@ def _serve(wire: Wire) -> None:
         body.block.close()
 
 
-def _first(wire: Wire) -> SimulationRunner | Follow | None:
+def _first(wire: Wire) -> SimulationRunner | FollowLeader | None:
     while True:
         command: Command = wire.recv()
         if isinstance(command, Quit):
             return None
-        if isinstance(command, Follow):
+        if isinstance(command, FollowLeader):
             return command
         if isinstance(command, Load):
             body = _try(wire, command.choice)
@@ -95,7 +95,7 @@ def _try(wire: Wire, choice: SceneChoice) -> SimulationRunner | None:
     try:
         body = SimulationRunner(choice)
     except InputError as error:
-        wire.send(Refused(str(error)))
+        wire.send(LoadRefused(str(error)))
         return None
     wire.send(body.ready())
     return body

@@ -19,7 +19,7 @@ from app.client.pending_edit import PendingEdit
 from app.panels.torque.controller import ControllerPanel
 from app.panels.widgets import mirror as bind
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.window import Window
+from app.panels.widgets.window import PopupWindow
 from lessons.events import Event, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.settings.torque import TorqueSettings
@@ -137,7 +137,7 @@ def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
 
     gui: Any = MagicMock()
     gui.add_modal.return_value.__exit__.return_value = False
-    window = Window(gui, "All lessons", "L", fill)
+    window = PopupWindow(gui, "All lessons", "L", fill)
     window.open()
     window.open()
     assert len(filled) == gui.add_modal.call_count == 2

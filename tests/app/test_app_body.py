@@ -10,8 +10,8 @@ import pytest
 
 from app.client.decimated import BUCKETS, History
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
-from app.link.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
+from app.link.exercise import LessonPlace
+from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTicks
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
@@ -61,13 +61,13 @@ def test_pause_step_speed(body: SimulationRunner) -> None:
     body.handle(Play(False))
     assert not body.running
     body.handle(Play(True))
-    body.handle(Step())
+    body.handle(StepTicks())
     assert not body.running and body.take_steps() == 1 and body.take_steps() == 0
     body.handle(Post(Reset()))
     assert body.take_steps() == 1  # a reset shows while paused
     body.handle(Play(True))
     body.handle(Post(Reset()))
-    body.handle(Step())
+    body.handle(StepTicks())
     assert body.take_steps() == 1  # one press, one tick
     body.handle(Speed(0.5))
     assert body.status().speed == 0.5
@@ -121,7 +121,7 @@ def test_another_scene_or_a_sentence(body: SimulationRunner) -> None:
         SceneChoice(RunSpec("no-such-scene")),
     ):
         answer = body.handle(Load(choice))
-        assert isinstance(answer, Refused) and answer.sentence and "Traceback" not in answer.sentence
+        assert isinstance(answer, LoadRefused) and answer.sentence and "Traceback" not in answer.sentence
         assert body.session is kept
     old = body.block
     answer = body.handle(Load(SceneChoice(RunSpec("planar3-hold"))))
@@ -198,7 +198,7 @@ def test_a_choice_may_bring_settings_and_a_seed() -> None:
     assert made.session.settings.levels[0].name == "posture"
     assert made.session.seed == 4
     refused = made.handle(Load(SceneChoice(RunSpec("planar3-hold", set=("horizn=3",)))))
-    assert isinstance(refused, Refused) and "horizon" in refused.sentence
+    assert isinstance(refused, LoadRefused) and "horizon" in refused.sentence
     made.close()
 
 
@@ -238,7 +238,7 @@ def test_another_stack_has_memory_of_its_own(body: SimulationRunner) -> None:
 
 
 def test_in_a_lesson_the_stack_stays() -> None:
-    lesson = SimulationRunner(SceneChoice.of_lesson(Exercise("a-redundant-arm")))
+    lesson = SimulationRunner(SceneChoice.of_lesson(LessonPlace("a-redundant-arm")))
     before = lesson.session.settings.levels
     lesson.handle(Post(Set("stack.remove", "posture")))
     lesson.settle()

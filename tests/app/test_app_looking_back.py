@@ -14,7 +14,7 @@ import pytest
 
 from app.client.decimated import KEPT, WINDOW, History
 from app.client.pose_history import Frame, PoseHistory
-from app.client.rows import MOST, Record
+from app.client.rows import MOST, RowHistory
 from app.client.run_statistics import RunStatistics
 from app.link.choice import SceneChoice
 from app.link.ring import Block
@@ -176,7 +176,7 @@ def test_the_score_counts_every_tick_of_the_run(layout: Layout) -> None:
 
 
 def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
-    record = Record(layout)
+    record = RowHistory(layout)
     for minute in range(8):
         times = 60.0 * minute + 0.002 * np.arange(30_000)
         record.take(rows_at(layout, times, "step_us", times**2))
@@ -193,7 +193,7 @@ def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
 
 @pytest.fixture(scope="module")
 def run(body: SimulationRunner) -> Recorded:
-    record = Record(body.session.layout)
+    record = RowHistory(body.session.layout)
     history = History(body.block, body.session.layout, record.take)
     for _ in range(6):
         body.tick(50)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.messages import Lead, Load, Post, Ready, Refused
+from app.link.messages import Lead, Load, LoadRefused, Post, Ready
 from app.link.process import wait_until
 from app.server.server import PageServer
 from app.worker.ghost import GhostBody
@@ -185,7 +185,7 @@ def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
     for choice in (SceneChoice.starting(str(scene)), SceneChoice.opening(str(lesson))):
         body = SimulationRunner(choice)
         body.tick(3)
-        assert not isinstance(body.ready(), Refused)
+        assert not isinstance(body.ready(), LoadRefused)
         body.close()
 
 
@@ -207,7 +207,7 @@ def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> No
 
         stack = f'stack=[{{"task": "{path}"}}]'
         refused = body.handle(Load(replace(elsewhere, run=elsewhere.run.but(stack))))
-        assert isinstance(refused, Refused) and "link_4" in refused.sentence
+        assert isinstance(refused, LoadRefused) and "link_4" in refused.sentence
         again = body.handle(Load(choice))
         assert isinstance(again, Ready) and again.left_out == ()
         assert own_tasks(body) == [str(path)]

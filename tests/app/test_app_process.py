@@ -13,9 +13,9 @@ import pytest
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from app.link.forkserver import ForkServer
-from app.link.messages import Load, Play, Post, Speed, Step
+from app.link.messages import Load, Play, Post, Speed, StepTicks
 from app.link.process import wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Sessions
@@ -63,7 +63,7 @@ def test_play_pause_step_speed_reset(start: Callable[[str], SimulationClient]) -
     assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
     held = ticks(learner)
     assert not wait_until(lambda: ticks(learner) != held, 0.4)
-    learner.send(Step())
+    learner.send(StepTicks())
     assert wait_until(lambda: ticks(learner) == held + 1, LONG)
     learner.send(Speed(0.1))
     learner.send(Post(Set("horizon", 8)))
@@ -88,14 +88,14 @@ def test_a_page_that_shows_the_scene_before_keeps_its_settings(
     before = learner.ready
     assert before is not None
     assert wait_until(lambda: learner.settings_of(before).horizon == 8, LONG)  # pyright: ignore
-    learner.send(Load(SceneChoice.of_lesson(Exercise("first-hold-then-reach"))))
+    learner.send(Load(SceneChoice.of_lesson(LessonPlace("first-hold-then-reach"))))
     assert wait_until(lambda: learner.ready is not before, LONG)
     now = learner.ready
     assert now is not None
     assert learner.settings_of(before) is before.settings
     assert learner.settings_of(now) is learner.settings is not before.settings
     assert learner.choice_of(before).exercise is None
-    later = Exercise("first-hold-then-reach", 1)
+    later = LessonPlace("first-hold-then-reach", 1)
     learner.send(Load(SceneChoice.of_lesson(later)))
     assert wait_until(lambda: learner.choice_of(now).exercise == later, LONG)
     assert learner.ready is now

@@ -212,9 +212,9 @@ def test_a_thing_that_goes_while_it_is_dragged_is_told_of(capfd: pytest.CaptureF
 
 
 def test_a_paused_lesson_says_how_to_go_on() -> None:
-    from app.link.exercise import Exercise
+    from app.link.exercise import LessonPlace
 
-    server = PageServer(SceneChoice.of_lesson(Exercise("one-task")), port=0, max_sessions=1)
+    server = PageServer(SceneChoice.of_lesson(LessonPlace("one-task")), port=0, max_sessions=1)
     try:
         with Wire(server.link) as page:
             assert eventually(lambda: page.find("Run this step") is not None)

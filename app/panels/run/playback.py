@@ -15,10 +15,10 @@ from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
 from app.html.palette import GOOD, LEVELS
 from app.html.text import badge, block, in_trouble
-from app.link.messages import Play, Post, Speed, Step
+from app.link.messages import Play, Post, Speed, StepTicks
 from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import on_scale
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Reset
 from lessons.settings.settings import Settings
 
@@ -82,7 +82,7 @@ class PlaybackPanel:
             learner.send(Play(self._running.ask(not running)))
         elif choice == _STEP:
             self._running.ask(False)
-            learner.send(Step())
+            learner.send(StepTicks())
         elif choice == _RESET and learner.trouble() is None:
             learner.send(Post(Reset()))
         else:
@@ -108,7 +108,7 @@ class PlaybackPanel:
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 
-    def update(self, now: Snapshot[Settings]) -> None:
+    def update(self, now: SessionSnapshot[Settings]) -> None:
         status = now.status
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:

@@ -13,7 +13,7 @@ from app.html.text import block, esc, quantity
 from app.link.messages import Ready
 from app.panels.torque.guide import guide
 from app.panels.widgets.command import add_command
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.reachability import Reachability
 from lessons.events import Push, Set
 from lessons.settings.torque import TorqueSettings
@@ -130,7 +130,7 @@ class StartPanel:
             text += " This orientation cannot be met there: the lower level gives way."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: Snapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
         """The guide names the levels as they are; the button offers what is not the case."""
         told = guide(now.ready.tasks, now.settings.levels, colours, self._dragged)
         if self._guide.content != told:

@@ -14,7 +14,7 @@ from app.panels.torque.add_task import AddTask
 from app.panels.torque.joint_targets import Targets
 from app.panels.torque.level_card import LevelCard
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Event, MoveLevel, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -141,7 +141,7 @@ class TasksPanel:
             self._order.ask(tuple(names))
             self._post(MoveLevel(name, to))
 
-    def update(self, now: Snapshot[TorqueSettings]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         for place, level in enumerate(now.settings.levels):
             for card in self._cards:
                 if card.name == level.name:

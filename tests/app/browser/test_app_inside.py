@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.inside import Watch
+from app.link.inside import InsideRequest
 from app.link.messages import Play, Post
 from app.panels.inside.matrix import TITLE as HESSIAN
 from app.panels.inside.plane import TITLE as PLANE
@@ -213,5 +213,5 @@ def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
     expect(page.get_by_text("Later knots are held")).to_be_hidden()
     learner.send(Post(Set("controller", "osf")))
     expect(page.get_by_text("osf solves no such QP")).to_be_visible()
-    learner.send(Watch(plane=(7, 9)))  # a stranger's joints
+    learner.send(InsideRequest(plane=(7, 9)))  # a stranger's joints
     assert eventually(page, lambda: learner.failure is None and learner.status is not None)
