@@ -4,7 +4,7 @@ A dragged target on its way down:
 1. The browser tells where the gizmo is. `server/guard` counts the bytes, `page/inlet` refuses what is no
    place, and viser calls back on its loop: `view/target`, then `view/drag`.
 2. `view/reachability`, on a thread of its own, finds what can be reached; `view/drag` posts a `MoveTarget`.
-3. `client/learner` puts it into `link/outbox`, which never waits; its thread writes to `link/wire`.
+3. `client/simulation_client` puts it into `link/outbox`, which never waits; its thread writes to `link/wire`.
 4. `worker/main` reads it and hands it to `worker/simulation`, which puts it into the session's mailbox.
 5. The session (`lessons/session/session.py`) empties its mailbox when the next tick begins.
 

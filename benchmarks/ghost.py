@@ -19,8 +19,8 @@ import time
 import numpy as np
 import psutil
 
-from app.client.learner import Learner
 from app.client.simulation import Simulation
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
@@ -76,7 +76,7 @@ def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[st
         client.wait()
 
 
-def measured(learner: Learner, lines: list[str], seconds: float) -> dict[str, float]:
+def measured(learner: SimulationClient, lines: list[str], seconds: float) -> dict[str, float]:
     """lines: what the client prints, one per second."""
     busy = {name: psutil.Process(pid) for name, pid in pids(learner).items()}
     for process in busy.values():
@@ -110,13 +110,13 @@ def simulated(learner: Simulation) -> float:
     return 0.0 if found is None else found
 
 
-def follows(learner: Learner) -> bool:
+def follows(learner: SimulationClient) -> bool:
     """Whether the ghost has come along for a while."""
     ghost = learner.ghost
     return ghost is not None and simulated(ghost) > 1.0
 
 
-def pids(learner: Learner) -> dict[str, int]:
+def pids(learner: SimulationClient) -> dict[str, int]:
     """The processes at work."""
     found = {"page": psutil.Process().pid, "robot": learner.pid}
     if learner.ghost is not None:

@@ -21,7 +21,7 @@ from typing import Any
 
 import psutil
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.server import PageServer
@@ -118,7 +118,7 @@ def measured(server: PageServer, clients: int, tab: str, seconds: float) -> dict
     }
 
 
-def found(learner: Learner, before: tuple[float, int, int], seconds: float) -> dict[str, float]:
+def found(learner: SimulationClient, before: tuple[float, int, int], seconds: float) -> dict[str, float]:
     """A simulation's speed and memory. uss: bytes no other process shares."""
     ticks, over = (now - then for now, then in zip(counts(learner), before[1:], strict=True))
     own = psutil.Process(learner.pid).memory_full_info().uss
@@ -140,13 +140,13 @@ def of_client(said: list[dict[str, Any]], client: int) -> dict[str, float]:
     }
 
 
-def simulated(learner: Learner) -> float:
+def simulated(learner: SimulationClient) -> float:
     """s, as the memory shared with the simulation says now."""
     found = learner.read(lambda block, _: block.moment()[0])
     return 0.0 if found is None else found
 
 
-def counts(learner: Learner) -> tuple[int, int]:
+def counts(learner: SimulationClient) -> tuple[int, int]:
     """(control ticks, those over budget) as last reported."""
     status = learner.status
     return (0, 0) if status is None else (status.ticks, status.over_budget)

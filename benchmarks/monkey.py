@@ -23,13 +23,13 @@ import numpy as np
 from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
 from app.client.decimated import History
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
 from benchmarks.findings import Findings, StandardError
 from benchmarks.hostile import roam
-from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
+from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 
@@ -65,7 +65,7 @@ class Monkey:
         page.on("dialog", lambda dialog: dialog.dismiss())
 
     @property
-    def learner(self) -> Learner:
+    def learner(self) -> SimulationClient:
         return self.server.sessions.learners[0]
 
     def act(self) -> None:
@@ -216,7 +216,7 @@ class Monkey:
         ready, settings = self.learner.ready, self.learner.settings
         return f"{ready.choice.run.scene if ready else '?'} with {settings.controller if settings else '?'}"
 
-    def _is_alive(self, learner: Learner) -> None:
+    def _is_alive(self, learner: SimulationClient) -> None:
         status, now = learner.status, time.monotonic()
         ticks = -1 if status is None else status.ticks
         resting = status is not None and not status.running

@@ -30,7 +30,7 @@ import psutil
 from viser import _messages
 from websockets.exceptions import ConnectionClosed
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually, let_in
@@ -117,30 +117,32 @@ def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, objec
     }
 
 
-def _learner(server: PageServer, place: int) -> Learner:
+def _learner(server: PageServer, place: int) -> SimulationClient:
     assert eventually(lambda: len(server.sessions.learners) > place, LONG)
     return server.sessions.learners[place]
 
 
-def _runs(learner: Learner) -> bool:
+def _runs(learner: SimulationClient) -> bool:
     status = learner.status
     return learner.trouble() is None and status is not None and status.ticks > 5
 
 
-def _hurt(learner: Learner, number: signal.Signals) -> None:
+def _hurt(learner: SimulationClient, number: signal.Signals) -> None:
     pid = learner.pid
     assert pid is not None
     with contextlib.suppress(ProcessLookupError):
         os.kill(pid, number)
 
 
-def _hang(learner: Learner) -> None:
+def _hang(learner: SimulationClient) -> None:
     """A scene is asked for that will never be there: its process stops while it loads."""
     _hurt(learner, signal.SIGSTOP)
     learner.load(SceneChoice(RunSpec("panda-hold")))
 
 
-def _recovers(learner: Learner, page: Wire, harm: Callable[[Learner], None], by_reset: bool) -> bool:
+def _recovers(
+    learner: SimulationClient, page: Wire, harm: Callable[[SimulationClient], None], by_reset: bool
+) -> bool:
     """Whether the page says what is the matter, and its button brings a running robot back."""
 
     def says() -> bool:

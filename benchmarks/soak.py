@@ -31,8 +31,8 @@ from statistics import median
 
 import psutil
 
-from app.client.learner import Learner
 from app.client.rows import MOST, RATE
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Speed
 from app.link.process import wait_until
@@ -94,7 +94,7 @@ def main() -> int:
     return 1 if faults else 0
 
 
-def go(learners: Sequence[Learner], speed: float) -> None:
+def go(learners: Sequence[SimulationClient], speed: float) -> None:
     """Simulated seconds per second of all robots."""
     for learner in learners:
         learner.send(Speed(speed))

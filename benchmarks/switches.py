@@ -28,8 +28,8 @@ from statistics import median
 
 import psutil
 
-from app.client.learner import Learner
 from app.client.simulation import Simulation
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load, Speed
 from app.link.process import wait_until
@@ -100,7 +100,7 @@ def main() -> int:
     return 1 if faults else 0
 
 
-def switched(learners: tuple[Learner, ...], options: argparse.Namespace) -> list[Period]:
+def switched(learners: tuple[SimulationClient, ...], options: argparse.Namespace) -> list[Period]:
     """Everybody does something every so many seconds, one after the other."""
     chance, length = random.Random(options.seed), min(PERIOD, options.minutes / 6)
     periods = [Period(0.0)]
@@ -118,7 +118,7 @@ def switched(learners: tuple[Learner, ...], options: argparse.Namespace) -> list
     return [period for period in periods if period.megabytes]
 
 
-def change(learner: Learner, chance: random.Random, speed: float) -> None:
+def change(learner: SimulationClient, chance: random.Random, speed: float) -> None:
     """One thing a learner does."""
     match chance.choices(("scene", "ghost", "alone"), (5, 3, 2))[0]:
         case "scene":
@@ -130,7 +130,7 @@ def change(learner: Learner, chance: random.Random, speed: float) -> None:
     learner.send(Speed(speed))
 
 
-def everybody(learners: tuple[Learner, ...], scene: str, speed: float) -> None:
+def everybody(learners: tuple[SimulationClient, ...], scene: str, speed: float) -> None:
     """All learners go to a scene, alone."""
     for learner in learners:
         learner.stop_ghost()
@@ -139,7 +139,7 @@ def everybody(learners: tuple[Learner, ...], scene: str, speed: float) -> None:
     assert wait_until(lambda: all(shows(each, scene) for each in learners), LONG), f"not all show {scene}"
 
 
-def shows(learner: Learner, scene: str) -> bool:
+def shows(learner: SimulationClient, scene: str) -> bool:
     """Whether a scene runs."""
     return learner.choice.run.scene == scene and runs(learner)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from playwright.sync_api import Locator, Page, expect
 
 from app.link.exercise import parts_of
-from browsing.hands import BETWEEN, key, press, row
+from browsing.browser_actions import BETWEEN, key, press, row
 from lessons.course import COURSE
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson, Step

@@ -12,14 +12,14 @@ from PIL import Image
 from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from app.server.server import PageServer
-from browsing.hands import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
+from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
 from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step
 
 OUT = Path(__file__).parents[1] / "docs" / "page.webp"
-EXERCISE = Exercise("a-redundant-arm", 2)
+EXERCISE = LessonPlace("a-redundant-arm", 2)
 SIZE = (1080, 675)
 EVERY, LAST = 100, 1500
 """ms that a picture stands; the last one longer, to be read."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
-from lessons.settings.listing import Line, reference
+from lessons.settings.listing import SettingLine, reference
 
 FILE = Path(__file__).with_name("settings.md")
 
@@ -42,7 +42,7 @@ def _table(title: str, scenes: list[str]) -> list[str]:
     return head + [_row(line) for line in found]
 
 
-def _row(line: Line) -> str:
+def _row(line: SettingLine) -> str:
     return f"| `{line.path}` | {line.allowed} | {line.unit} | {line.help.replace('|', '∣')} |"
 
 

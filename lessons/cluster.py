@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from lessons.parallel import Failed, Spread, guarded, sentence
+from lessons.parallel import FailedJob, Spread, guarded, sentence
 from robots import InputError
 
 T = TypeVar("T")
@@ -71,7 +71,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
 
     def spread(
         function: Callable[[T], U], items: Sequence[T]
-    ) -> Generator[tuple[int, U | Failed], None, None]:
+    ) -> Generator[tuple[int, U | FailedJob], None, None]:
         # pure=False: two equal items are two pieces of work. A lost worker is no failure: the scheduler gives
         # its work to another one, up to its `allowed-failures` (3) times.
         orphans: list[int] = []
@@ -83,14 +83,14 @@ def on_cluster(address: str) -> Iterator[Spread]:
                 if isinstance(error, KilledWorker):
                     orphans.append(places[future.key])
                 else:
-                    yield places[future.key], future.result() if error is None else Failed(sentence(error))
+                    yield places[future.key], future.result() if error is None else FailedJob(sentence(error))
             # A dying worker takes along what waited there: one at a time, the culprit shows.
             for place in sorted(orphans):
                 alone = client.submit(guarded, function, items[place], pure=False)
                 futures.append(alone)
                 for future in ended([alone]):
                     error = future.exception()
-                    yield place, future.result() if error is None else Failed(sentence(error))
+                    yield place, future.result() if error is None else FailedJob(sentence(error))
         except (OSError, CancelledError):
             raise InputError(
                 f"--scheduler {address}: the scheduler is gone. Give the same command again once it answers"

@@ -29,7 +29,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
-class Failed:
+class FailedJob:
     """Why a piece of work has no result, in one sentence."""
 
     reason: str
@@ -41,7 +41,7 @@ class Spread(Protocol):
 
     def __call__(
         self, function: Callable[[T], U], items: Sequence[T]
-    ) -> Generator[tuple[int, U | Failed], None, None]: ...
+    ) -> Generator[tuple[int, U | FailedJob], None, None]: ...
 
 
 def cores() -> int:
@@ -50,7 +50,9 @@ def cores() -> int:
     return max(1, len(affinity(0)) if affinity else os.cpu_count() or 1)
 
 
-def on_cores(function: Callable[[T], U], items: Sequence[T]) -> Generator[tuple[int, U | Failed], None, None]:
+def on_cores(
+    function: Callable[[T], U], items: Sequence[T]
+) -> Generator[tuple[int, U | FailedJob], None, None]:
     """Spreads work over spawned processes, one per core, each with one thread of linear algebra.
 
     Args:
@@ -58,7 +60,7 @@ def on_cores(function: Callable[[T], U], items: Sequence[T]) -> Generator[tuple[
         items: its arguments.
 
     Yields:
-        (place of the item, what the function returned, or `Failed` if it raised or its process died twice).
+        (place of the item, what the function returned, or `FailedJob` if it raised or its process died twice).
     """
     waiting = deque(range(len(items)))
     while waiting:
@@ -70,10 +72,10 @@ def on_cores(function: Callable[[T], U], items: Sequence[T]) -> Generator[tuple[
 
 def _until_one_dies(
     function: Callable[[T], U], items: Sequence[T], waiting: deque[int]
-) -> Generator[tuple[int, U | Failed], None, list[int]]:
+) -> Generator[tuple[int, U | FailedJob], None, list[int]]:
     """Works off `waiting`, places of items, until nothing is left or a process dies; returns the places whose
     work it took along."""
-    under_way: dict[Future[U | Failed], int] = {}
+    under_way: dict[Future[U | FailedJob], int] = {}
     orphans: list[int] = []
     workers = min(cores(), len(waiting))
     with _pool(workers) as pool, suppress(BrokenProcessPool):
@@ -94,18 +96,18 @@ def _until_one_dies(
 
 def one_by_one(
     function: Callable[[T], U], items: Sequence[T]
-) -> Generator[tuple[int, U | Failed], None, None]:
+) -> Generator[tuple[int, U | FailedJob], None, None]:
     """The same in this process, in order: for measuring times, and for tests."""
     for place, item in enumerate(items):
         yield place, guarded(function, item)
 
 
-def guarded(function: Callable[[T], U], item: T) -> U | Failed:
+def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
     """What the function returns, or why it raised."""
     try:
         return function(item)
     except Exception as error:
-        return Failed(sentence(error))
+        return FailedJob(sentence(error))
 
 
 def sentence(error: BaseException) -> str:
@@ -114,14 +116,14 @@ def sentence(error: BaseException) -> str:
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
 
 
-def _alone(function: Callable[[T], U], item: T) -> U | Failed:
+def _alone(function: Callable[[T], U], item: T) -> U | FailedJob:
     with _pool(1) as pool:
         with _born_deaf():
             future = pool.submit(guarded, function, item)
         try:
             return future.result()
         except BrokenProcessPool:
-            return Failed("its process died (out of memory, or a crash in a compiled library)")
+            return FailedJob("its process died (out of memory, or a crash in a compiled library)")
 
 
 @contextmanager

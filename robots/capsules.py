@@ -21,7 +21,7 @@ _SLENDER = 0.05  # radius over the length of the whole chain
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class MeshPart:
     """Triangles in the frame of a Pinocchio joint (0 = world); vertices in m."""
 
     joint: int
@@ -31,7 +31,7 @@ class Piece:
     name: str
 
 
-def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[Piece]:
+def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[MeshPart]:
     """Pieces for every body of the model that is not in `drawn`. tip: frame index of the end-effector."""
     thickness = _SLENDER * max(_chain_length(model, tip), 0.05)
     for joint in range(model.njoints):
@@ -61,7 +61,7 @@ def _farthest(model: pin.Model, joint: int) -> np.ndarray:
     return max(own, key=lambda at: float(np.linalg.norm(at)))
 
 
-def _limb(joint: int, end: np.ndarray, radius: float, colour: Colour, k: int) -> Iterator[Piece]:
+def _limb(joint: int, end: np.ndarray, radius: float, colour: Colour, k: int) -> Iterator[MeshPart]:
     length = float(np.linalg.norm(end))
     if length < _SHORTEST:
         return
@@ -72,30 +72,32 @@ def _limb(joint: int, end: np.ndarray, radius: float, colour: Colour, k: int) ->
         vertices - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)) + np.array([0.0, 0.0, 0.5 * length])
     )
     if colour == _TIP:
-        yield Piece(joint, _along(vertices, end), np.asarray(solid.faces), _BODY, f"body{joint}/limb{k}")
+        yield MeshPart(joint, _along(vertices, end), np.asarray(solid.faces), _BODY, f"body{joint}/limb{k}")
         ball = trimesh.creation.icosphere(subdivisions=3, radius=1.08 * radius)
-        yield Piece(joint, np.asarray(ball.vertices) + end, np.asarray(ball.faces), _TIP, f"body{joint}/tip")
+        yield MeshPart(
+            joint, np.asarray(ball.vertices) + end, np.asarray(ball.faces), _TIP, f"body{joint}/tip"
+        )
     else:
-        yield Piece(joint, _along(vertices, end), np.asarray(solid.faces), colour, f"body{joint}/limb{k}")
+        yield MeshPart(joint, _along(vertices, end), np.asarray(solid.faces), colour, f"body{joint}/limb{k}")
 
 
-def _pedestal(top: np.ndarray, radius: float) -> Iterator[Piece]:
+def _pedestal(top: np.ndarray, radius: float) -> Iterator[MeshPart]:
     """A column from the floor to the first joint, or a flat foot when that joint is on the floor."""
     height = max(float(np.linalg.norm(top)), 0.5 * radius)
     end = top if float(np.linalg.norm(top)) > 0.5 * radius else np.array([0.0, 0.0, -height])
     solid = trimesh.creation.cylinder(radius, height, sections=40)
     vertices, faces = _hard_edged(solid)
     shifted = vertices + np.array([0.0, 0.0, 0.5 * height])
-    yield Piece(0, _along(shifted, end), faces, _DRUM, "base/pedestal")
+    yield MeshPart(0, _along(shifted, end), faces, _DRUM, "base/pedestal")
 
 
-def _drum(model: pin.Model, joint: int, radius: float) -> Piece:
+def _drum(model: pin.Model, joint: int, radius: float) -> MeshPart:
     prismatic, axis = joint_axis(model, joint)
     if prismatic:
         vertices, faces = _hard_edged(trimesh.creation.box([1.6 * radius, 1.6 * radius, 2.4 * radius]))
     else:
         vertices, faces = _hard_edged(trimesh.creation.cylinder(radius, 2.2 * radius, sections=40))
-    return Piece(joint, _along(vertices, axis), faces, _DRUM, f"body{joint}/drum")
+    return MeshPart(joint, _along(vertices, axis), faces, _DRUM, f"body{joint}/drum")
 
 
 def _along(vertices: np.ndarray, direction: np.ndarray) -> np.ndarray:

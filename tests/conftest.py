@@ -130,7 +130,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> OneWorkerFor
 def browser() -> Iterator[Browser]:
     from playwright.sync_api import expect, sync_playwright
 
-    from browsing.hands import CHROMIUM_ARGS, find_chromium
+    from browsing.browser_actions import CHROMIUM_ARGS, find_chromium
 
     path = find_chromium()
     if path is None:

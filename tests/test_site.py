@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from app.__main__ import main
-from browsing.hands import SLOW
+from browsing.browser_actions import SLOW
 from docs.build import build
 from docs.further import further
 from docs.pages.lessons import MEASURED, measured

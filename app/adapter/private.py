@@ -21,10 +21,10 @@ import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
-from app.adapter.late import call
-from app.adapter.plain import plain
+from app.adapter.fast_messages import fast_message
 from app.adapter.probe import answer, reaches, refuse, require
-from app.adapter.wake import WakeUp
+from app.adapter.removed_handle_errors import call
+from app.adapter.thread_safe_event import ThreadSafeEvent
 from robots import InputError
 
 try:
@@ -142,11 +142,11 @@ def _keep_awake(server: viser.ViserServer) -> None:
     """Before a sender first sleeps; viser makes one for all clients and one for each, which then waits for
     nothing after what woke it: a picture comes in one piece."""
     websockets, loop = server._websock_server, server.get_event_loop()
-    websockets._broadcast_buffer.message_event = WakeUp(loop)
+    websockets._broadcast_buffer.message_event = ThreadSafeEvent(loop)
 
     async def keep(connection: infra.WebsockClientConnection) -> None:
         buffer = connection.get_message_buffer()
-        buffer.message_event, buffer.window_duration_sec = WakeUp(loop), 0.0
+        buffer.message_event, buffer.window_duration_sec = ThreadSafeEvent(loop), 0.0
 
     websockets.on_client_connect(keep)
 
@@ -291,10 +291,14 @@ def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> No
 def shift(node: viser.SceneNodeHandle, at: np.ndarray) -> None:
     """Moves a node, (3,) m; assigning compares at length with what was."""
     node._impl.position[:] = at
-    node._impl.api._queue_scene_message(plain(_messages.SetPositionMessage)(node.name, tuple(at.tolist())))
+    node._impl.api._queue_scene_message(
+        fast_message(_messages.SetPositionMessage)(node.name, tuple(at.tolist()))
+    )
 
 
 def turn(node: viser.FrameHandle, to: np.ndarray) -> None:
     """Turns a node, wxyz."""
     node._impl.wxyz[:] = to
-    node._impl.api._queue_scene_message(plain(_messages.SetOrientationMessage)(node.name, tuple(to.tolist())))
+    node._impl.api._queue_scene_message(
+        fast_message(_messages.SetOrientationMessage)(node.name, tuple(to.tolist()))
+    )

@@ -48,7 +48,7 @@ class History:
         self._t = layout.fields["t"].start
         self._before = self._count = 0
         self._numbers = np.full(_SLOTS, -1)
-        # Not filled, see `Record`: a slot counts only under its number.
+        # Not filled, see `RowHistory`: a slot counts only under its number.
         self._pairs = np.empty((_SLOTS, 2, layout.size))
         self._lasts = np.empty((_SLOTS, layout.size))
         self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
@@ -133,7 +133,7 @@ class History:
         self.bucket = bucket
         return slot
 
-    def window(self, until: float | None = None) -> Window:
+    def window(self, until: float | None = None) -> PlotWindow:
         """What the plots show when the clock reads `until` (s); None: now."""
         end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
         wanted = np.arange(end - BUCKETS + 1, end + 1)
@@ -141,7 +141,7 @@ class History:
         slots = wanted % _SLOTS
         known = self._numbers[slots] == wanted
         known &= wanted >= 0
-        return Window(self.layout, 2 * (end - BUCKETS + 1), known, slots, self._pairs, self._bits)
+        return PlotWindow(self.layout, 2 * (end - BUCKETS + 1), known, slots, self._pairs, self._bits)
 
     def at(self, t: float) -> np.ndarray:
         """The row that was the newest one when the clock read t (s), as near as is known."""
@@ -156,7 +156,7 @@ class History:
         self.bound_ticks[:] = 0
 
 
-class Window:
+class PlotWindow:
     """What the plots show at one moment: BUCKETS pairs, oldest first."""
 
     def __init__(

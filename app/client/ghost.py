@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import final
 
 from app.client.simulation import Simulation
-from app.link.messages import Failed, Follow, Reached, Refused, Report, Script
+from app.link.messages import FollowLeader, LoadRefused, Reached, Report, Script, SimulationFailed
 from app.link.process import Process
 from app.link.spares import Spares
 
@@ -17,7 +17,7 @@ and the page says so: one that lagged behind would look like one that follows it
 
 
 @final
-class Ghost(Simulation):
+class GhostClient(Simulation):
     """A process that follows. It begins where the first script says, and what it tells of the time it has
     come to tells its leader how far it may go."""
 
@@ -29,7 +29,7 @@ class Ghost(Simulation):
         own: tuple[str, ...],
         spares: Spares,
         reached: Callable[[float], None],
-        lost: Callable[[Ghost, str], None],
+        lost: Callable[[GhostClient, str], None],
     ) -> None:
         """words: what it is, for the legend; own: assignments "PATH=VALUE" on top of the leader's settings;
         reached: told the time it has come to, s; lost: told why there is no ghost (any more). Both are called
@@ -43,7 +43,7 @@ class Ghost(Simulation):
         """Passes on what the leader told."""
         if self._told_at is None:
             self._told_at = time.monotonic()
-        self.send(Follow(script, self.own))
+        self.send(FollowLeader(script, self.own))
 
     @property
     def quiet(self) -> float:
@@ -54,7 +54,7 @@ class Ghost(Simulation):
         match report:
             case Reached(t):
                 self._reached(t + LEAD)
-            case Refused(sentence) | Failed(sentence):
+            case LoadRefused(sentence) | SimulationFailed(sentence):
                 self._lost(self, sentence)
             case _:
                 pass

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.client.decimated import Window
-from app.client.ghost import Ghost
-from app.client.learner import Learner
+from app.client.decimated import PlotWindow
+from app.client.ghost import GhostClient
 from app.client.simulation import Simulation
+from app.client.simulation_client import SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
@@ -21,7 +21,7 @@ class GhostState:
     """The ghost at that instant; see `Moment`."""
 
     poses: np.ndarray
-    window: Window
+    window: PlotWindow
     way: np.ndarray
 
 
@@ -45,12 +45,12 @@ class Moment:
     poses: np.ndarray
     status: Status
     latest: np.ndarray
-    window: Window
+    window: PlotWindow
     way: np.ndarray
     ghost: GhostState | None
 
 
-def moment_of(learner: Learner, past: float | None, curves: bool = True) -> Moment | None:
+def moment_of(learner: SimulationClient, past: float | None, curves: bool = True) -> Moment | None:
     """The instant to show, after taking over what is new; None while nothing was reported yet.
 
     Args:
@@ -98,7 +98,7 @@ def moment_of(learner: Learner, past: float | None, curves: bool = True) -> Mome
     )
 
 
-def _ghost_state(ghost: Ghost, t: float, ways: bool) -> GhostState | None:
+def _ghost_state(ghost: GhostClient, t: float, ways: bool) -> GhostState | None:
     found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t, ways)))
     return None if found is None or found[0] is None else GhostState(found[0].poses, found[1], found[2])
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from lessons.replay.progress import HandedIn, Progress, kept, written
+from lessons.replay.progress import HandedIn, LearnerProgress, kept, written
 
 
 class Notebook:
     """The progress of the learner at this page, written down whenever it grows."""
 
-    def __init__(self, progress: Progress, save: Callable[[str], None], key: bytes | None = None) -> None:
+    def __init__(
+        self, progress: LearnerProgress, save: Callable[[str], None], key: bytes | None = None
+    ) -> None:
         """key: of the lab, which signs what it writes."""
         self.progress = progress
         self._save, self._key = save, key
@@ -20,7 +22,7 @@ class Notebook:
     def signs(self) -> bool:
         return self._key is not None
 
-    def note(self, progress: Progress) -> None:
+    def note(self, progress: LearnerProgress) -> None:
         if progress != self.progress:
             self.progress = progress
             self._save(kept(progress, self._key))

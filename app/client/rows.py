@@ -17,7 +17,7 @@ MOST = 12_000
 """Rows kept of a whole run. One that is longer keeps every second, fourth, … of them."""
 
 
-class Record:
+class RowHistory:
     """The rows since the last reset: the last minute at RATE, and the whole run as densely as MOST allows."""
 
     def __init__(self, layout: Layout) -> None:
@@ -37,11 +37,11 @@ class Record:
         self._mark = -1
         self._last = -np.inf
 
-    def under(self, layout: Layout) -> Record:
+    def under(self, layout: Layout) -> RowHistory:
         """The same rows as another layout has them: the run goes on under another stack."""
         from himpc.telemetry import relaid
 
-        new = Record(layout)
+        new = RowHistory(layout)
         for rows, before, count in (
             (new._recent, self._recent, min(self._kept, len(self._recent))),
             (new._whole, self._whole, self._thinned),

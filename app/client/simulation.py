@@ -10,11 +10,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
 from app.client.decimated import History
-from app.client.poses import Frame, Tape
-from app.client.rows import Record
-from app.client.score import Score
+from app.client.pose_history import Frame, PoseHistory
+from app.client.rows import RowHistory
+from app.client.run_statistics import RunStatistics
 from app.client.trouble import Trouble, trouble_of
-from app.link.messages import Command, Failed, Loading, Ready, Refused, Report, Status
+from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
 from app.link.process import Process
 from app.link.ring import Block
 from app.link.spares import Spares
@@ -39,9 +39,9 @@ class Simulation(ABC):
         self.settings: Settings | None = None
         self.failure: str | None = None
         self.changed = 0
-        self.tape = Tape()
-        self.score: Score | None = None
-        self.record: Record | None = None
+        self.tape = PoseHistory()
+        self.score: RunStatistics | None = None
+        self.record: RowHistory | None = None
         self._refusals: list[str] = []
         self._notices: list[str] = []
         self._spares = spares
@@ -104,9 +104,9 @@ class Simulation(ABC):
                     self.status = report
                     self.settings = report.settings or self.settings
                     self._notices += report.notices
-                case Refused(sentence):
+                case LoadRefused(sentence):
                     self._refusals.append(sentence)
-                case Failed(sentence):
+                case SimulationFailed(sentence):
                     self.failure = sentence
                 case _:
                     pass
@@ -123,13 +123,13 @@ class Simulation(ABC):
         if not ready.again:
             self.status = None
             self.tape.clear()
-        self.score = Score(ready.layout)
+        self.score = RunStatistics(ready.layout)
         if ready.again and record is not None and history is not None:
             self.record = record.under(ready.layout)
-            self._history = history.under(self._block, ready.layout, self.score.take, self.record.take)
+            self._history = history.under(self._block, ready.layout, self.score.append_rows, self.record.take)
         else:
-            self.record = Record(ready.layout)
-            self._history = History(self._block, ready.layout, self.score.take, self.record.take)
+            self.record = RowHistory(ready.layout)
+            self._history = History(self._block, ready.layout, self.score.append_rows, self.record.take)
         self.changed += 1
 
     def _free(self) -> None:

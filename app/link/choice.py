@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from lessons.course import COURSE
 from lessons.own.files import is_file, read
 from lessons.scenes.names import ALL_SCENES
@@ -37,7 +37,7 @@ class SceneChoice:
 
     run: RunSpec
     urdf_text: str | None = None
-    exercise: Exercise | None = None
+    exercise: LessonPlace | None = None
     mine: tuple[str, ...] = ()
     scenes: tuple[str, ...] = ()
     within: Path | None = None
@@ -63,10 +63,10 @@ class SceneChoice:
         lesson."""
         if lesson not in COURSE and not is_file(lesson):
             raise unknown_name("lesson", lesson, COURSE)
-        return cls(RunSpec(""), exercise=Exercise(lesson))
+        return cls(RunSpec(""), exercise=LessonPlace(lesson))
 
     @classmethod
-    def of_lesson(cls, exercise: Exercise) -> SceneChoice:
+    def of_lesson(cls, exercise: LessonPlace) -> SceneChoice:
         """A step of a lesson. Raises InputError if there is no such lesson."""
         return cls(exercise.run, exercise=exercise)
 
@@ -87,7 +87,7 @@ class SceneChoice:
         run = state.run
         if state.lesson is None:
             return cls.of_run(run)
-        lesson = cls.of_lesson(Exercise.at(state.lesson, state.step or 1))
+        lesson = cls.of_lesson(LessonPlace.at(state.lesson, state.step or 1))
         own = replace(lesson.run, seed=run.seed, files=run.files, tasks=run.tasks)
         if (own.scene, own.urdf, own.tip) != (run.scene, run.urdf, run.tip):
             raise InputError(
@@ -99,7 +99,7 @@ class SceneChoice:
         mine = differences(own.prepared().settings, run.prepared().settings)
         return replace(lesson, run=own, mine=mine)
 
-    def at(self, exercise: Exercise) -> SceneChoice:
+    def at(self, exercise: LessonPlace) -> SceneChoice:
         """Another step of the lesson, with the same seed."""
         step = SceneChoice.of_lesson(exercise)
         return replace(step, run=replace(step.run, seed=self.run.seed)).admitting(self)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lessons.teaching.challenge import Challenge, Result
     from lessons.teaching.lesson import Lesson, Step
     from lessons.teaching.measure import Signal
-    from lessons.teaching.prediction import Grade
+    from lessons.teaching.prediction import PredictionResult
 
 Answer = int | float | tuple[tuple[float, float], ...]
 """A prediction: place of an option, a value, or the points (t in s, value) of a sketch."""
@@ -27,7 +27,7 @@ free."""
 
 
 @dataclass(frozen=True)
-class Exercise:
+class LessonPlace:
     """A step of a lesson, or, at the place after the last step, its challenge.
 
     Attributes:
@@ -39,7 +39,7 @@ class Exercise:
     place: int = 0
 
     @classmethod
-    def at(cls, lesson: str, step: int) -> Exercise:
+    def at(cls, lesson: str, step: int) -> LessonPlace:
         """The step (1 being the first) of a lesson. Raises InputError if there is no such lesson or step."""
         count = len(parts_of(_lesson(lesson)))
         if not 1 <= step <= count:
@@ -103,7 +103,7 @@ def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class SignalCurve:
     """A signal over the run so far: t (k,) s, values (k,) in its unit, thinned so that no spike is lost."""
 
     t: np.ndarray
@@ -131,7 +131,7 @@ class Lecture:
         lost_at: s, when the robot went out of control, which ends the run.
     """
 
-    exercise: Exercise
+    exercise: LessonPlace
     phase: Phase
     attempt: int
     t: float
@@ -141,10 +141,10 @@ class Lecture:
     values: tuple[float, ...] = ()
     holds: tuple[bool | None, ...] = ()
     truth: float = float("nan")
-    grade: Grade | None = None
-    curves: tuple[Curve, ...] = ()
-    ghosts: tuple[Curve, ...] = ()
-    sketched: Curve | None = None
+    grade: PredictionResult | None = None
+    curves: tuple[SignalCurve, ...] = ()
+    ghosts: tuple[SignalCurve, ...] = ()
+    sketched: SignalCurve | None = None
     result: Result | None = None
     points_for: float = float("nan")
     lost_at: float | None = None

@@ -51,7 +51,7 @@ class Preparing:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class ForkReady:
     """It can fork."""
 
 
@@ -115,7 +115,7 @@ class ForkServer:
                 match word:
                     case Preparing(sentence):
                         self.doing = sentence
-                    case Prepared():
+                    case ForkReady():
                         self.ready, self.doing = True, ""
         self._ended = True
         self._process.wait()
@@ -183,7 +183,7 @@ def serve(control: int, life: int, worker: str) -> NoReturn:
     gc.collect()
     gc.freeze()
     gc.disable()
-    wire.send(Prepared())
+    wire.send(ForkReady())
     _Nest(wire, module.main).run()
 
 

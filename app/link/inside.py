@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Watch:
+class InsideRequest:
     """What of the inside of a tick the page shows; the answers come with every `Status`.
 
     plane: the two joints whose plane is cut, None: no plane; through: name of the level whose solution the
@@ -30,7 +30,7 @@ class Watch:
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """The inside of the last tick, as far as it was asked for; see `Watch`.
+    """The inside of the last tick, as far as it was asked for; see `InsideRequest`.
 
     why_not: a sentence, where there is no tick to show; spectrum: (n,).
     """

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
-from app.link.inside import Inside, Watch
+from app.link.inside import Inside, InsideRequest
 from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
 from app.link.wire import Handle
@@ -38,7 +38,7 @@ class Play:
 
 
 @dataclass(frozen=True)
-class Step:
+class StepTicks:
     """Pause, then run so many ticks."""
 
     ticks: int = 1
@@ -87,7 +87,7 @@ class Begin:
 
 
 @dataclass(frozen=True, eq=False)
-class Follow:
+class FollowLeader:
     """What a ghost hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
     they count where the script begins anew."""
 
@@ -108,17 +108,17 @@ class Quit:
 Command = (
     Post
     | Play
-    | Step
+    | StepTicks
     | Speed
     | ResetAll
     | Load
     | Lead
     | WaitAt
-    | Follow
+    | FollowLeader
     | Tell
     | Predict
     | RunStep
-    | Watch
+    | InsideRequest
     | Quit
 )
 
@@ -221,14 +221,14 @@ class Loading:
 
 
 @dataclass(frozen=True)
-class Refused:
+class LoadRefused:
     """A scene or robot could not be loaded; the one before goes on."""
 
     sentence: str
 
 
 @dataclass(frozen=True)
-class Failed:
+class SimulationFailed:
     """The simulation stopped with an exception; `died`: its process ended without a word of its own."""
 
     sentence: str
@@ -269,4 +269,4 @@ class Told:
     t: float
 
 
-Report = Ready | Loading | Status | Refused | Failed | Script | Reached | Told
+Report = Ready | Loading | Status | LoadRefused | SimulationFailed | Script | Reached | Told

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 
 from app.link.children import Child
-from app.link.messages import Command, Failed, Quit, Report
+from app.link.messages import Command, Quit, Report, SimulationFailed
 from app.link.outbox import Outbox
 from app.link.wire import Wire
 
@@ -54,7 +54,7 @@ class Process:
         return not self._closed and not self._ended.is_set()
 
     def listen(self, listener: Callable[[Report], None]) -> None:
-        """Calls `listener` with every report, and with a last `Failed` if the child dies unasked."""
+        """Calls `listener` with every report, and with a last `SimulationFailed` if the child dies unasked."""
         with self._lock:
             unheard, self._unheard = self._unheard, []
             for report in unheard:
@@ -89,7 +89,7 @@ class Process:
         self._ended.set()
         self._outbox.close()
         if not self._closed and not failed:
-            self._pass_on(Failed(_obituary(self._child.exitcode), died=True))
+            self._pass_on(SimulationFailed(_obituary(self._child.exitcode), died=True))
         self._wire.hang_up()
         self._outbox.join()
         self._wire.close()
@@ -107,7 +107,7 @@ class Process:
                 except (EOFError, OSError):
                     over = time.monotonic() + _END  # its exit code is on the way
                 else:
-                    failed = isinstance(report, Failed)
+                    failed = isinstance(report, SimulationFailed)
                     self._pass_on(report)
                 continue
             if news:

@@ -10,7 +10,7 @@ from typing import Any
 import viser
 
 from app.adapter import private
-from app.adapter.late import too_late
+from app.adapter.removed_handle_errors import is_removed_handle_error
 from app.page.values import NotAllowed, allowed
 from app.panels.widgets.in_view import tells_what_is_seen
 
@@ -37,7 +37,7 @@ class Inlet:
                 case _:
                     await go_on(message)
         except Exception as error:
-            if too_late(error):
+            if is_removed_handle_error(error):
                 self.say("Not taken", _GONE)
                 return
             traceback.print_exc()

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.client.ghost import Ghost
-from app.client.learner import Learner
+from app.client.ghost import GhostClient
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
 from app.html.palette import level_colours, recoloured
 from app.html.text import PHONE
@@ -35,7 +35,7 @@ from app.panels.run.timeline import TimeLine
 from app.panels.widgets.command import add_command
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
@@ -52,7 +52,7 @@ class Stage:
     def __init__(
         self,
         client: viser.ClientHandle,
-        learner: Learner,
+        learner: SimulationClient,
         ready: Ready,
         scenes: Mapping[str, str],
         dark: bool,
@@ -84,7 +84,7 @@ class Stage:
         )
         self._resets: int | None = None
         self._ghost: GhostView | None = None
-        self._shown_ghost: Ghost | None = None
+        self._shown_ghost: GhostClient | None = None
         self._build_panels(client.gui, scenes, choose, own_files, loop, notebook, phone)
         self._build_scene(client.scene, dark)
 
@@ -231,7 +231,9 @@ class Stage:
         found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
         if found is None or learner.status is None:
             return
-        shown = Snapshot(self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s)
+        shown = SessionSnapshot(
+            self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s
+        )
         now = replace(shown, status=learner.status)
         with self._client.atomic():
             self._playback.update(now)

@@ -15,8 +15,8 @@ import numpy as np
 import viser
 
 from app.adapter import private
-from app.client.learner import Learner
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
@@ -46,7 +46,7 @@ class Page:
     def __init__(
         self,
         client: viser.ClientHandle,
-        learner: Learner,
+        learner: SimulationClient,
         dark: bool,
         own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,

@@ -10,13 +10,13 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import viser
 
-from app.client.learner import Learner
 from app.client.moment import Moment
+from app.client.simulation_client import SimulationClient
 from app.html.palette import RGB
 from app.link.messages import Post, Ready, Status
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.robot import RobotView
 from lessons.events import Event
 
@@ -28,7 +28,7 @@ class Context:
 
     client: viser.ClientHandle
     in_view: InView
-    learner: Learner
+    learner: SimulationClient
     ready: Ready
     colours: dict[str, RGB]
     bindings: Bindings[Any]
@@ -100,7 +100,7 @@ class Face(Protocol):
         """Curves and plots, about ten times a second."""
         ...
 
-    def write(self, now: Snapshot[Any]) -> None:
+    def write(self, now: SessionSnapshot[Any]) -> None:
         """Texts, a few times a second."""
         ...
 

@@ -19,14 +19,14 @@ from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import draggable
 from app.view.drag import Hand
 from app.view.ellipsoids import EllipsoidView
 from app.view.link_picker import LinkPicker
 from app.view.pull import Pull
 from app.view.robot import RobotView, gizmo_size
-from app.view.target import Frames
+from app.view.target import TargetFrames
 from app.view.targets import Targets
 from app.view.trails import Trails
 from lessons.events import Set
@@ -116,7 +116,7 @@ class TorqueFace:
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         context, ready = self._context, self._context.ready
         tip = self._tip()
-        self._frames = Frames(scene)
+        self._frames = TargetFrames(scene)
         self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until there is a tick to tell
         self._add_targets(scene)
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
@@ -201,7 +201,7 @@ class TorqueFace:
         q = moment.latest[context.ready.layout.fields["q"]]
         self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
 
-    def write(self, now: Snapshot[TorqueSettings]) -> None:
+    def write(self, now: SessionSnapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:
             fields = now.ready.layout.fields
             # The snapshot's row is its own copy.

@@ -19,14 +19,14 @@ from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import full
 from app.view.follow import FollowBase
 from app.view.goals import Goals
 from app.view.obstacles import Obstacles
 from app.view.robot import RobotView, gizmo_size, look_at
 from app.view.surroundings import Carried, People, ReachCircle
-from app.view.target import Frames
+from app.view.target import TargetFrames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Appear, Set
@@ -99,7 +99,7 @@ class VelocityFace:
         del robot  # velocity servos do not feel a pull
         context, ready = self._context, self._context.ready
         size = gizmo_size(ready.robot)
-        self._frames = Frames(scene)
+        self._frames = TargetFrames(scene)
         self._obstacles = Obstacles(scene, self._put)
         self._people = People(scene)
         self._carried = Carried(scene)
@@ -219,7 +219,7 @@ class VelocityFace:
             wanted = None if turned is None else latest[fields[f"x_d/{turned.name}"]]
             self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), wanted)
 
-    def write(self, now: Snapshot[VelocitySettings]) -> None:
+    def write(self, now: SessionSnapshot[VelocitySettings]) -> None:
         self._begin.update(now)
         self._mission.update(now)
         self._roles.update(now)

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from app.client.decimated import History
-from app.client.ghost import Ghost
-from app.client.learner import Learner
-from app.client.poses import Tape
-from app.client.rows import Record
-from app.client.score import Score
+from app.client.ghost import GhostClient
+from app.client.pose_history import PoseHistory
+from app.client.rows import RowHistory
+from app.client.run_statistics import RunStatistics
+from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture
@@ -30,12 +30,12 @@ T = TypeVar("T")
 
 class Watcher:
     """A learner as a page sees it that only watches: everything can be looked at, nothing changes it. It has
-    all that pages use of a `Learner`, and nothing of it can be set."""
+    all that pages use of a `SimulationClient`, and nothing of it can be set."""
 
     token = ""
     attached = True
 
-    def __init__(self, shown: Learner, refuse: Refuse) -> None:
+    def __init__(self, shown: SimulationClient, refuse: Refuse) -> None:
         """refuse: says on the page why nothing happens."""
         self._shown = shown
         self._refuse = refuse
@@ -61,15 +61,15 @@ class Watcher:
         return self._shown.changed
 
     @property
-    def tape(self) -> Tape:
+    def tape(self) -> PoseHistory:
         return self._shown.tape
 
     @property
-    def score(self) -> Score | None:
+    def score(self) -> RunStatistics | None:
         return self._shown.score
 
     @property
-    def record(self) -> Record | None:
+    def record(self) -> RowHistory | None:
         return self._shown.record
 
     @property
@@ -81,7 +81,7 @@ class Watcher:
         return self._shown.lecture
 
     @property
-    def ghost(self) -> Ghost | None:
+    def ghost(self) -> GhostClient | None:
         return self._shown.ghost
 
     @property
@@ -143,23 +143,23 @@ class Classroom:
         self.token = secrets.token_urlsafe(16)
         self.max_sessions = 1
         self._spares = Spares(WORKER)
-        self._learner = Learner(self.token, choice, self._spares)
+        self._learner = SimulationClient(self.token, choice, self._spares)
 
     @property
-    def learners(self) -> tuple[Learner, ...]:
+    def learners(self) -> tuple[SimulationClient, ...]:
         return (self._learner,)
 
     def is_right(self, token: str) -> bool:
         """Whether this is the instructor's; takes as long for every wrong one."""
         return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())
 
-    def enter(self, tokens: Sequence[str], refuse: Refuse) -> Learner:
+    def enter(self, tokens: Sequence[str], refuse: Refuse) -> SimulationClient:
         """The session itself for who has the token, else a view of it."""
         if any(map(self.is_right, tokens)):
             return self._learner
-        return cast(Learner, Watcher(self._learner, refuse))
+        return cast(SimulationClient, Watcher(self._learner, refuse))
 
-    def leave(self, learner: Learner) -> None:
+    def leave(self, learner: SimulationClient) -> None:
         """A page was closed: nothing changes."""
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ from websockets.http11 import Request, Response
 
 from app.server import budget
 from app.server.budget import Budget
-from app.server.crowd import Crowd
+from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade, secured
 from app.server.peers import ends_of
 from app.server.uploads import TRANSFER, Uploads
@@ -36,11 +36,11 @@ _PAGE = (
 )
 
 
-class Guard:
+class ConnectionGuard:
     """Given to `open_server`. Refuses everybody until it is opened."""
 
     def __init__(self, door: Door) -> None:
-        self.crowd = Crowd()
+        self.crowd = ConnectionLimits()
         self.refused = 0
         self.taken = 0
         """Messages that reached viser."""
@@ -114,7 +114,7 @@ class GuardedConnection(ServerConnection):
     serves, `refuse` tells its user what was not taken, `is_owners` says whether who started the server
     opened it."""
 
-    def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
+    def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
         super().__init__(*of, **more)
         self.uploads: Uploads | None = None
         self.refuse: Callable[[str], object] = _nothing_said

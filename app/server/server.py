@@ -17,11 +17,11 @@ import viser
 
 from app.adapter import private
 from app.link.choice import SceneChoice
-from app.server.arenas import few_arenas, large_arrays_apart
 from app.server.classroom import Classroom
 from app.server.door import Door, as_origin, names_of_this_machine
 from app.server.greeting import greeting
-from app.server.guard import Guard
+from app.server.guard import ConnectionGuard
+from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.opening import opened_in_a_browser
 from app.server.passes import Passes, new_token
 from app.server.sessions import GRACE, Sessions
@@ -129,7 +129,7 @@ class PageServer:
         local = host in _LOOPBACK
         self.public = not local or bool(trusted)
         """Whether others than this machine's users can come to the page."""
-        self.guard = Guard(Door())
+        self.guard = ConnectionGuard(Door())
         self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
         self._own_files, self._key = own_files, key
         self._visits: dict[int, Visit] = {}

@@ -8,10 +8,10 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.spares import Spares
-from app.server.arenas import give_back
+from app.server.malloc_tuning import give_back
 
 WORKER = "app.worker.entry"
 """What a simulation's process runs; by name, because the server never loads it."""
@@ -33,18 +33,18 @@ class Sessions:
         self._grace = grace
         self._spares = Spares(WORKER)
         self._lock = threading.Lock()
-        self._learners: dict[str, Learner] = {}
+        self._learners: dict[str, SimulationClient] = {}
         self._closed = threading.Event()
         self._spares.refill()
         self._keeper = threading.Thread(target=self._keep, daemon=True)
         self._keeper.start()
 
     @property
-    def learners(self) -> tuple[Learner, ...]:
+    def learners(self) -> tuple[SimulationClient, ...]:
         with self._lock:
             return tuple(self._learners.values())
 
-    def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> Learner | None:
+    def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> SimulationClient | None:
         """The learner this browser left behind (its tokens, latest last) or a new one; None if all places
         are taken. A place is kept for who left it a moment ago: only its token gets it."""
         with self._lock:
@@ -57,12 +57,12 @@ class Sessions:
                     return known
             if len(self._learners) >= self.max_sessions:
                 return None
-            learner = Learner(secrets.token_urlsafe(16), self._choice, self._spares)
+            learner = SimulationClient(secrets.token_urlsafe(16), self._choice, self._spares)
             learner.attached = True
             self._learners[learner.token] = learner
         return learner
 
-    def leave(self, learner: Learner) -> None:
+    def leave(self, learner: SimulationClient) -> None:
         """The tab was closed or reloaded."""
         learner.left_at = time.monotonic()
         learner.attached = False

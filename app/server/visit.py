@@ -11,7 +11,7 @@ from functools import partial
 import viser
 
 from app.adapter import private
-from app.adapter.late import told
+from app.adapter.removed_handle_errors import print_exception
 from app.client.progress import Notebook
 from app.html.text import block
 from app.page.inlet import Inlet
@@ -24,7 +24,7 @@ from app.server.sessions import Sessions
 from app.server.uploads import Uploads
 from app.server.workers import Workers
 from lessons.own.folder import Folder
-from lessons.replay.progress import Progress
+from lessons.replay.progress import LearnerProgress
 from lessons.replay.progress import found as found_progress
 
 STORAGE = 5.0
@@ -56,7 +56,7 @@ class Visit:
         self._left = False
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
-        self._notebook = Notebook(Progress(), lambda _: None)
+        self._notebook = Notebook(LearnerProgress(), lambda _: None)
         self._workers = Workers()
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)
@@ -94,7 +94,7 @@ class Visit:
             self._left = True
             if self._asking is not None:
                 self._server.get_event_loop().call_soon_threadsafe(self._asking.cancel)
-            self._steps.submit(self._end).add_done_callback(told)
+            self._steps.submit(self._end).add_done_callback(print_exception)
             self._steps.shutdown(wait=False)
 
     def close(self) -> None:
@@ -107,7 +107,7 @@ class Visit:
     def _then(self, tokens: Sequence[str]) -> None:
         """Another attempt to come in."""
         if not self._left:
-            self._steps.submit(self._admit, tokens).add_done_callback(told)
+            self._steps.submit(self._admit, tokens).add_done_callback(print_exception)
 
     def _admit(self, tokens: Sequence[str]) -> None:
         if self._left:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-from app.adapter.late import in_time
+from app.adapter.removed_handle_errors import unless_removed
 
 THREADS = 4
 WAITING = 64
@@ -26,7 +26,7 @@ class Workers(ThreadPoolExecutor):
         if not self._room.acquire(blocking=False):
             return _dropped()
         try:
-            future = super().submit(in_time, fn, *args, **kwargs)
+            future = super().submit(unless_removed, fn, *args, **kwargs)
         except RuntimeError:  # shut down: its page has been closed
             self._room.release()
             return _dropped()

@@ -12,12 +12,12 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import RGB
 from app.link.messages import Ready
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
-from app.view.reachability import Judge, Question, Verdict
-from app.view.target import Frames, TargetGizmo
+from app.view.reachability import Question, Reachability, ReachabilityWorker
+from app.view.target import TargetFrames, TargetGizmo
 from lessons.events import MoveTarget
 from lessons.settings.torque import TorqueSettings
 
@@ -55,14 +55,14 @@ class Hand:
         """targets: raw targets by task, where the session has them; tip (7,): pose of the hand, position
         (m) and quaternion wxyz; size: of the gizmo, m; clamp: whether the controller gets only what can be
         reached; dragged: called at every move; later: of viser's loop, on which the hand moves."""
-        self.verdict: Verdict | None = None
+        self.verdict: Reachability | None = None
         self._post, self._clamp, self._dragged = post, clamp, dragged
         self._targets = targets
         self._moved_at = -math.inf
         self._later = later
         self._go_on = _LESSON_PAUSED if ready.choice.exercise is not None else _PAUSED
         self._gizmo: TargetGizmo | None = None
-        self._judge: Judge | None = None
+        self._judge: ReachabilityWorker | None = None
         self._lock = threading.Lock()  # the hand moves on viser's loop, the judge answers on its own thread
         self._moves = self._given = self._turned = self._forgotten = 0
         position, orientation = draggable(ready.tasks)
@@ -83,7 +83,7 @@ class Hand:
             size,
             self._moved,
         )
-        self._judge = Judge(ready.robot, self._placed, self._judged)
+        self._judge = ReachabilityWorker(ready.robot, self._placed, self._judged)
 
     def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         gizmo, judge = self._gizmo, self._judge
@@ -126,7 +126,7 @@ class Hand:
             if gizmo is not None and question.number > self._given:
                 self._give(gizmo, question, accepted)
 
-    def _judged(self, verdict: Verdict) -> None:
+    def _judged(self, verdict: Reachability) -> None:
         if self._gizmo is not None and verdict.question.number > self._forgotten:
             self.verdict = verdict
 
@@ -160,7 +160,7 @@ class Hand:
 
     def show(
         self,
-        frames: Frames,
+        frames: TargetFrames,
         settings: TorqueSettings,
         latest: np.ndarray,
         fields: dict[str, slice],

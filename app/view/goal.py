@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.client.wish import HOLD
+from app.client.pending_edit import HOLD
 from app.html.palette import RGB
 
 _BALL = 0.07  # m

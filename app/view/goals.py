@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import viser
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import RGB
 from app.html.text import free_name, quantity
 from app.link.messages import Ready, Status, TaskView

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.wish import HOLD
+from app.client.pending_edit import HOLD
 from app.html.palette import RGB
 from robots.collision import Ball, Box, Floor, Obstacle
 

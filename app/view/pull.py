@@ -9,7 +9,7 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import BAD
 from app.view.robot import RobotView
 from lessons.events import Push

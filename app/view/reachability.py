@@ -25,7 +25,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Reachability:
     """accepted: the position itself, or the nearest one found within reach; missing: m between them;
     turned_away: rad the orientation falls short at the accepted position (0 if none was asked for)."""
 
@@ -39,14 +39,14 @@ class Verdict:
         return self.missing == 0.0
 
 
-class Judge:
+class ReachabilityWorker:
     """A thread with placo on it."""
 
     def __init__(
         self,
         robot: Robot,
         place: Callable[[Question, np.ndarray], None],
-        answer: Callable[[Verdict], None],
+        answer: Callable[[Reachability], None],
     ) -> None:
         """place: hears the accepted position, (3,) m, as soon as it is known; answer: then all of the
         verdict. Both are called on the judge's thread."""
@@ -95,4 +95,4 @@ class Judge:
                     turned = max(pose.rotation_error, np.radians(1.0))
                 elif missing == 0.0:
                     q = pose.q
-            self._answer(Verdict(question, accepted, missing, turned))
+            self._answer(Reachability(question, accepted, missing, turned))

@@ -157,7 +157,7 @@ class TargetGizmo:
             self._then.position = then
 
 
-class Frames:
+class TargetFrames:
     """The filtered target (what the controller follows now) beside the actual frame."""
 
     def __init__(self, scene: viser.SceneApi) -> None:

@@ -9,7 +9,7 @@ import pinocchio as pin
 import viser
 import viser.transforms as vtf
 
-from app.client.wish import HOLD, Send
+from app.client.pending_edit import HOLD, Send
 from app.html.palette import BOUND, RGB
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, xyzw

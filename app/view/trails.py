@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.adapter import private
-from app.client.corners import corners
+from app.client.decimate import decimate
 from app.html.palette import RGB
 
 EXAGGERATION = 100
@@ -20,7 +20,7 @@ def segments(points: np.ndarray) -> np.ndarray:
 
 def trace(tips: np.ndarray) -> np.ndarray:
     """The way (k, 3) a hand went, m, as segments, without the points that lie on straight stretches."""
-    return segments(tips[corners(tips.T, _FINE)]) if len(tips) > 1 else NOTHING
+    return segments(tips[decimate(tips.T, _FINE)]) if len(tips) > 1 else NOTHING
 
 
 NOTHING = np.zeros((1, 2, 3), np.float32)

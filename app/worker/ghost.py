@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import final
 
-from app.link.messages import Begin, Command, Follow, Loading, Quit, Reached, Refused
+from app.link.messages import Begin, Command, FollowLeader, Loading, LoadRefused, Quit, Reached
 from app.link.wire import Wire
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.session.ghost import GhostDriver, ghost_scene
 from robots import InputError
 
@@ -25,7 +25,7 @@ class GhostBody:
         """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
         scene = ghost_scene(begin.choice.scene(), begin.settings, own)
         # A lesson judges the robot, not its ghost.
-        self.body = Body(begin.choice, scene, judged=False)
+        self.body = SimulationRunner(begin.choice, scene, judged=False)
         self.driver = GhostDriver(self.body.session, begin.settings, own)
 
     def catch_up(self, until: float) -> bool:
@@ -38,7 +38,7 @@ class GhostBody:
         return ran
 
 
-def follow(wire: Wire, first: Follow) -> None:
+def follow(wire: Wire, first: FollowLeader) -> None:
     """Follows until the page says Quit; `first` is what a process that waited for work was told."""
     ghost = _hear(wire, None, first)
     next_pose = next_reached = next_status = 0.0
@@ -49,7 +49,7 @@ def follow(wire: Wire, first: Follow) -> None:
                 command: Command = wire.recv()
                 if isinstance(command, Quit):
                     return
-                if isinstance(command, Follow):
+                if isinstance(command, FollowLeader):
                     ghost = _hear(wire, ghost, command)
                     if command.script.begin is not None:
                         reached = -1.0  # the leader waits to hear that its ghost is there
@@ -77,7 +77,7 @@ def follow(wire: Wire, first: Follow) -> None:
             ghost.body.block.close()
 
 
-def _hear(wire: Wire, ghost: GhostBody | None, command: Follow) -> GhostBody | None:
+def _hear(wire: Wire, ghost: GhostBody | None, command: FollowLeader) -> GhostBody | None:
     script = command.script
     if script.begin is not None:
         wire.send(Loading())
@@ -86,7 +86,7 @@ def _hear(wire: Wire, ghost: GhostBody | None, command: Follow) -> GhostBody | N
         try:
             ghost = GhostBody(script.begin, command.own)
         except InputError as error:
-            wire.send(Refused(str(error)))
+            wire.send(LoadRefused(str(error)))
             return None
         wire.send(ghost.body.ready())
     if ghost is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.worker.lesson.lecturer import Lecturer
-from app.worker.reports.start import Run, start
+from app.worker.reports.start import SessionReport, start
 from lessons.events import Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
@@ -21,7 +21,7 @@ class Loaded:
 
     choice: SceneChoice
     scene: Scene
-    run: Run
+    run: SessionReport
     lecturer: Lecturer | None
     mine: tuple[Post, ...]
     left_out: tuple[str, ...] = ()

@@ -10,11 +10,11 @@ import traceback
 from contextlib import suppress
 
 from app.link.choice import SceneChoice
-from app.link.messages import Command, Failed, Follow, Load, Loading, Quit, Refused
+from app.link.messages import Command, FollowLeader, Load, Loading, LoadRefused, Quit, SimulationFailed
 from app.link.wire import Wire, packed
 from app.worker.ghost import follow
 from app.worker.pacing import Pacer
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -34,7 +34,7 @@ _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
 def rehearse() -> None:
     """Both kinds of controllers run for a moment: what is loaded on first use is there afterwards."""
     for scene in _USUAL:
-        body = Body(SceneChoice(RunSpec(scene)))
+        body = SimulationRunner(SceneChoice(RunSpec(scene)))
         body.tick(3)
         packed(body.ready())
         packed(body.status())
@@ -53,7 +53,7 @@ def main(wire: Wire) -> None:
         return  # the page is gone
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        wire.send(Failed(_sentence(error)))
+        wire.send(SimulationFailed(_sentence(error)))
 
 
 def _let_ticks_end() -> None:
@@ -66,7 +66,7 @@ def _let_ticks_end() -> None:
 
 def _serve(wire: Wire) -> None:
     body = _first(wire)
-    if isinstance(body, Follow):
+    if isinstance(body, FollowLeader):
         follow(wire, body)
         return
     if body is None:
@@ -77,12 +77,12 @@ def _serve(wire: Wire) -> None:
         body.block.close()
 
 
-def _first(wire: Wire) -> Body | Follow | None:
+def _first(wire: Wire) -> SimulationRunner | FollowLeader | None:
     while True:
         command: Command = wire.recv()
         if isinstance(command, Quit):
             return None
-        if isinstance(command, Follow):
+        if isinstance(command, FollowLeader):
             return command
         if isinstance(command, Load):
             body = _try(wire, command.choice)
@@ -90,18 +90,18 @@ def _first(wire: Wire) -> Body | Follow | None:
                 return body
 
 
-def _try(wire: Wire, choice: SceneChoice) -> Body | None:
+def _try(wire: Wire, choice: SceneChoice) -> SimulationRunner | None:
     wire.send(Loading())
     try:
-        body = Body(choice)
+        body = SimulationRunner(choice)
     except InputError as error:
-        wire.send(Refused(str(error)))
+        wire.send(LoadRefused(str(error)))
         return None
     wire.send(body.ready())
     return body
 
 
-def _simulate(wire: Wire, body: Body) -> None:
+def _simulate(wire: Wire, body: SimulationRunner) -> None:
     pacer = Pacer(time.perf_counter())
     next_pose = next_status = next_script = 0.0
     while True:
@@ -146,7 +146,7 @@ def _simulate(wire: Wire, body: Body) -> None:
             wire.poll(_BEAT if body.busy else _IDLE)
 
 
-def _run(body: Body, pacer: Pacer, due: int, until: float) -> int:
+def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:
     """Runs up to so many steps, and returns how many it were."""
     for ran in range(due):
         step_s = body.session.step_s

@@ -9,22 +9,22 @@ from typing import Any, final
 import numpy as np
 
 from app.link.choice import SceneChoice
-from app.link.inside import Watch
+from app.link.inside import InsideRequest
 from app.link.messages import (
     Command,
     Lead,
     Load,
+    LoadRefused,
     Play,
     Post,
     Predict,
     Ready,
-    Refused,
     Report,
     ResetAll,
     RunStep,
     Speed,
     Status,
-    Step,
+    StepTicks,
     Tell,
     Told,
     WaitAt,
@@ -42,7 +42,7 @@ from robots import InputError
 
 
 @final
-class Body:
+class SimulationRunner:
     """A session, whether it plays and how fast, and the memory its telemetry goes to."""
 
     def __init__(self, choice: SceneChoice, scene: Scene | None = None, judged: bool = True) -> None:
@@ -102,7 +102,7 @@ class Body:
     def handle(self, command: Command) -> Report | None:
         """Obeys a command; the answer, if it has one, goes to the page."""
         lecturer = self.lecturer
-        if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, Step, RunStep)):
+        if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, StepTicks, RunStep)):
             self.session.notices.append("First say what you expect: this step asks for a prediction.")
             return None
         match command:
@@ -131,7 +131,7 @@ class Body:
             case Play(running):
                 self.running, self._steps = running, 0
                 self._finish_period()
-            case Step(ticks):
+            case StepTicks(ticks):
                 self.running = False
                 self._finish_period()
                 self._steps += ticks
@@ -142,7 +142,7 @@ class Body:
                 self._begin_anew(replace(again, left_out=self.left_out))
             case Load(choice):
                 return self._load(choice)
-            case Watch() as watch:
+            case InsideRequest() as watch:
                 self.run.watch = watch
             case Tell():
                 return Told(self.choice, self.session.settings_now, tuple(self.session.log), self.session.t)
@@ -185,7 +185,7 @@ class Body:
                 return None
             self._enter(loaded)
         except InputError as error:
-            return Refused(str(error))
+            return LoadRefused(str(error))
         before.close()
         return self.ready()
 

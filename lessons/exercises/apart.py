@@ -21,7 +21,7 @@ from himpc.controllers.view import View
 from lessons.exercises.inside import wire
 from lessons.exercises.inside.now import numbers_of, shape_of
 from lessons.exercises.inside.serve import ROOT
-from lessons.exercises.watch import LOOK, Watch
+from lessons.exercises.watch import LOOK, ProcessDeadline
 from lessons.own.files import Source
 from lessons.session.controllers import LONGEST_TICK
 from robots import InputError
@@ -168,7 +168,7 @@ class Apart:
         if marks != self._marks:
             message, self._marks = wire.packed(wire.SHAPE, wire.of_json(shape_of(now))), marks
         message += wire.packed(wire.TICK, b"".join([each.tobytes() for each in arrays]))
-        watch = Watch(self._child.pid, LONGEST_TICK, "one call")
+        watch = ProcessDeadline(self._child.pid, LONGEST_TICK, "one call")
         if watch.began - self._looked > LOOK:
             self._looked = watch.began
             self._account()
@@ -205,9 +205,9 @@ class Apart:
     def _exchanged(self, kind: bytes, data: bytes, seconds: float, what: str) -> tuple[bytes, bytes]:
         child = self._child
         assert child is not None
-        return self._answered(wire.packed(kind, data), Watch(child.pid, seconds, what))
+        return self._answered(wire.packed(kind, data), ProcessDeadline(child.pid, seconds, what))
 
-    def _answered(self, message: bytes, watch: Watch) -> tuple[bytes, bytes]:
+    def _answered(self, message: bytes, watch: ProcessDeadline) -> tuple[bytes, bytes]:
         """Sends and hears one message. Raises OwnFault, and ends the process, if that takes too long."""
         left = memoryview(message)
         while left:
@@ -236,7 +236,7 @@ class Apart:
                     continue
             self._look(watch)
 
-    def _look(self, watch: Watch) -> None:
+    def _look(self, watch: ProcessDeadline) -> None:
         """Raises OwnFault, and ends the process, if an answer takes too long by its own doing, or too much
         memory."""
         slept = watch.slept

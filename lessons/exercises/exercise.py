@@ -19,7 +19,7 @@ TORQUE_UNIT = "N·m"
 
 
 @dataclass(frozen=True)
-class Check:
+class GradeCheck:
     """One measured sentence about a submission.
 
     Attributes:
@@ -77,7 +77,7 @@ class Exercise:
     plain: str
     hints: tuple[str, ...]
     lesson: str
-    checks: Callable[[int], tuple[Check, ...]]
+    checks: Callable[[int], tuple[GradeCheck, ...]]
     mistakes: tuple[Mistake, ...] = ()
 
     @property

@@ -11,7 +11,7 @@ from pathlib import Path
 from lessons.exercises import load_exercise
 from lessons.exercises.grade import WITHIN, Grade, Submission, grade_apart
 from lessons.own.files import SUFFIX, Source, read
-from lessons.parallel import Failed, Spread
+from lessons.parallel import FailedJob, Spread
 from robots import InputError
 from robots.processes.isolation import Allowance
 
@@ -67,7 +67,7 @@ def grade_folder(
     with closing(work) as outcomes:
         for place, outcome in outcomes:
             source = left[place]
-            if isinstance(outcome, Failed):
+            if isinstance(outcome, FailedJob):
                 outcome = Grade(source.path, source.digest, exercise or "", error=outcome.reason)
             done[Path(source.path)] = row_of(outcome, seed, exercise)
             _write(out, [done[each] for each in files if each in done])

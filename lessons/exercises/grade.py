@@ -15,7 +15,7 @@ from himpc.controllers.view import View
 from himpc.references import Preview
 from lessons.exercises import EXERCISES, load_exercise
 from lessons.exercises.apart import Apart, Exhausted
-from lessons.exercises.exercise import Check, Exercise
+from lessons.exercises.exercise import Exercise, GradeCheck
 from lessons.exercises.mistakes import Diagnosis
 from lessons.own.files import Source, read
 from lessons.recording.recording import Recording
@@ -33,7 +33,7 @@ WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program 
 
 
 @dataclass(frozen=True)
-class Line:
+class CheckResult:
     """One check with what was measured.
 
     Attributes:
@@ -70,7 +70,7 @@ class Grade:
     file: str
     digest: str
     exercise: str
-    lines: tuple[Line, ...] = ()
+    lines: tuple[CheckResult, ...] = ()
     error: str = ""
     protection: tuple[str, ...] = ()
 
@@ -166,11 +166,11 @@ def graded(submission: Submission) -> Grade:
         return Grade(source.path, source.digest, name, lines, protection=apart.protection)
 
 
-def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[Line, ...]:
+def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult, ...]:
     """Every check of an exercise; a run that fails costs its own checks only."""
     recordings: dict[RunSpec, Recording | str] = {}
     diagnosis = Diagnosis(exercise.mistakes)
-    lines: list[Line] = []
+    lines: list[CheckResult] = []
     general: list[tuple[int, str]] = []  # which lines say what it may be, and how they begin
     for check in exercise.checks(seed):
         begins = ""
@@ -182,7 +182,7 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[Line, ...]:
             value, fault = math.nan, str(error)
         held = check.holds(value)
         lines.append(
-            Line(
+            CheckResult(
                 check.text,
                 value,
                 check.unit,
@@ -205,7 +205,7 @@ class _Lost(Exception):
 
 
 def _measured(
-    check: Check, shown: Shown, diagnosis: Diagnosis, recordings: dict[RunSpec, Recording | str]
+    check: GradeCheck, shown: Shown, diagnosis: Diagnosis, recordings: dict[RunSpec, Recording | str]
 ) -> float:
     if check.measure is None:
         return beside(_scene(check.run, check.beside), shown, diagnosis, check.run.duration or 1.0)

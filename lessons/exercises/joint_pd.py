@@ -14,7 +14,7 @@ from typing import Any
 
 from himpc.controllers.view import View
 from lessons.events import MoveTarget
-from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed
 from lessons.exercises.laws import held, wanted
 from lessons.exercises.mistakes import Law, Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -29,12 +29,12 @@ STIFF = ("levels.posture.K_p=1000", "levels.posture.K_v=180")
 PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
 
 
-def checks(seed: int) -> tuple[Check, ...]:
+def checks(seed: int) -> tuple[GradeCheck, ...]:
     # Where gravity pulls otherwise than at the start.
     moved = tuple(radians(each) for each in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
     sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (
-        Check(
+        GradeCheck(
             "The iiwa stays where it is.",
             "gravity, the spring or M̄ is not what the equation says",
             IIWA,
@@ -42,7 +42,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(ERROR),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "The planar arm comes back after a push.",
             "the spring K_p does not pull it back",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
@@ -50,7 +50,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(ERROR, "last"),
             points=3,
         ),
-        Check(
+        GradeCheck(
             "It is calm afterwards.",
             "the damper K_v does not brake it",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
@@ -58,7 +58,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(Signal("v", "deg/s"), "last"),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "A new posture is reached, where gravity pulls otherwise.",
             "the error is not taken towards the target q_d, or gravity is not that of where the arm is",
             sent,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed
 from lessons.exercises.laws import osf
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -37,9 +37,9 @@ HOLD = RunSpec(
 ROUGH = replace(HOLD, set=HOLD.set[:1], duration=0.5)
 
 
-def checks(seed: int) -> tuple[Check, ...]:
+def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
-        Check(
+        GradeCheck(
             "The hand follows its circle, though the second task is to stay: the first one comes first.",
             "the first level does not close (4), or does not come first",
             HOLD,
@@ -47,7 +47,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(Signal("error/position", "mm"), "rms", after=0.6),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "Joint 1 swings as asked: the second level gets the freedom there is.",
             "the second level does not close (4) with what it gets",
             CIRCLE,
@@ -55,7 +55,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(Signal("error/q1", "deg"), "rms", after=0.6),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "Nothing of the second level reaches the hand, in the arm's own terms.",
             "the projector is not the dynamically consistent one; return a row of torques per level",
             CIRCLE,
@@ -63,7 +63,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(Signal("dynamic_leak", "m/s²")),
             points=3,
         ),
-        Check(
+        GradeCheck(
             "The torque is OSF's, with a model that is a little wrong and a push.",
             "one of the terms is another one: J̇q̇, Λ, N, or what the levels above already do to this one",
             pushed(ROUGH, seed, "link_3", 3.0, plane=True),

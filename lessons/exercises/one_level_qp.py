@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed
 from lessons.exercises.laws import held, hierarchy
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -28,9 +28,9 @@ HEAVY = RunSpec(
 )
 
 
-def checks(seed: int) -> tuple[Check, ...]:
+def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
-        Check(
+        GradeCheck(
             "With room to spare the torque is the optimum.",
             "G, e⁰, H or f is another one: the residual (28) is taken at the next knot",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
@@ -38,7 +38,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             beside="hiqp",
             points=3,
         ),
-        Check(
+        GradeCheck(
             "The torque stays within its bound.",
             "the torque bound (32f) is not kept: it is on τ₀ + Δτ",
             WEAK,
@@ -46,7 +46,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(Signal("torque share", "%")),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "At the torque bound it is the optimum, not a cut-off one.",
             "it is not the optimum: the bounds must stand in the QP",
             WEAK,
@@ -54,7 +54,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             beside="hiqp",
             points=2,
         ),
-        Check(
+        GradeCheck(
             "At the velocity bound it is the optimum.",
             "the velocity bound (32e) on q̇ + T_s (q̈₀ + M̄⁻¹Δτ), approached at most as fast as `approach` says",
             SLOW,
@@ -62,7 +62,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             beside="hiqp",
             points=2,
         ),
-        Check(
+        GradeCheck(
             "The weights count.",
             "Q weighs the residual, R the increments: both stand in H, Q in f",
             HEAVY,

@@ -12,7 +12,7 @@ from typing import Any
 
 from himpc.controllers.view import View
 from lessons.events import Set
-from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed
 from lessons.exercises.joint_pd import ALONE, ERROR
 from lessons.exercises.laws import held, wanted
 from lessons.exercises.mistakes import Mistake, wrong
@@ -29,9 +29,9 @@ FRICTION = RunSpec("planar3-hold", set=(*ALONE, "plant.damping=1"), duration=1.0
 STILL = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), duration=0.2)
 
 
-def checks(seed: int) -> tuple[Check, ...]:
+def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
-        Check(
+        GradeCheck(
             "A load of 3 kg that is hung on, and that nobody told of, does not sag.",
             "Ĥ = τ₀ − M̄ q̈₀ is not what it should be",
             LOADED,
@@ -39,7 +39,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(ERROR, "last"),
             points=3,
         ),
-        Check(
+        GradeCheck(
             "It does not matter what the model says.",
             "Ĥ is not the estimate, or reads the nominal model: now.M, now.bias or now.gravity",
             MISLED,
@@ -47,7 +47,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(ERROR, "last"),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "With friction and a push the arm comes back.",
             "K_p, K_v or τ₀ is not what the equation says",
             pushed(FRICTION, seed, "link_3", 10.0, at=0.05, plane=True),
@@ -55,7 +55,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(ERROR, "last"),
             points=2,
         ),
-        Check(
+        GradeCheck(
             "The torque is that of the equation.",
             "one of its terms is another one: τ₀, M̄, q̈₀, K_p x̃ or K_v ẋ̃",
             pushed(STILL, seed + 1, "link_5", 20.0, at=0.02),

@@ -8,7 +8,7 @@ You need: exercise "one-level-qp"; lesson "inside-the-qp"
 
 from __future__ import annotations
 
-from lessons.exercises.exercise import Check, Exercise, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed
 from lessons.exercises.laws import held, hierarchy
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -22,9 +22,9 @@ WEAK = RunSpec("planar3-circle", set=(*SETTINGS, "limits.torque_scale=0.04"), du
 FIGHT = RunSpec("planar3-conflict", set=SETTINGS[:-1], duration=1.5)
 
 
-def checks(seed: int) -> tuple[Check, ...]:
+def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
-        Check(
+        GradeCheck(
             "With room to spare the torque is the optimum of both levels.",
             "a residual, a weight or a level is not what it should be",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
@@ -32,7 +32,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             beside="hiqp",
             points=2,
         ),
-        Check(
+        GradeCheck(
             "Nothing leaks from level 2 to level 1.",
             "the equality (33) is not kept: J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁. Return a row per level",
             WEAK,
@@ -40,7 +40,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             measure=Measure(Signal("priority_leak", "m/s²")),
             points=3,
         ),
-        Check(
+        GradeCheck(
             "Where torque is short, level 2 gives way.",
             "it is not the optimum: the bounds must stand in the QP of both levels",
             WEAK,
@@ -48,7 +48,7 @@ def checks(seed: int) -> tuple[Check, ...]:
             beside="hiqp",
             points=3,
         ),
-        Check(
+        GradeCheck(
             "Where the tasks fight, the hand stays on its circle.",
             "level 1 pays for level 2",
             FIGHT,

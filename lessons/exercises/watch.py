@@ -13,7 +13,7 @@ LOOK = 0.1
 
 
 @final
-class Watch:
+class ProcessDeadline:
     """One question to a process. What it waits for a core on a busy machine does not count, up to `PATIENCE`
     times as much in all.
 

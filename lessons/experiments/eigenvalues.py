@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lessons.events import MoveTarget, Set
-from lessons.experiments.jobs import Run, Work
+from lessons.experiments.jobs import JobResult, Work
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.session.torque import TorqueSession
 
@@ -34,7 +34,7 @@ class EigenvalueJob(Work):
 
     payload_later: float | None = None
 
-    def do(self) -> Run:
+    def do(self) -> JobResult:
         """The run; see `Work.do`."""
         scene = prepared(torque_scene(self.spec.scene), self.spec.controller, self.spec.set)
         later = self.payload_later
@@ -63,7 +63,7 @@ class EigenvalueJob(Work):
             "largest": max(largest),
             "beyond_2": longest(np.array(largest) > 2.0),
         }
-        return Run(self, told, {"t": t[:, None], "largest": np.array(largest)[:, None]})
+        return JobResult(self, told, {"t": t[:, None], "largest": np.array(largest)[:, None]})
 
 
 def longest(flags: NDArray[np.bool_]) -> int:

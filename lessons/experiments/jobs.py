@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.parallel import Failed, on_cores, one_by_one
+from lessons.parallel import FailedJob, on_cores, one_by_one
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.recording.summary import summary
@@ -46,7 +46,7 @@ class Work(ABC):
     timed: bool = False
 
     @abstractmethod
-    def do(self) -> Run:
+    def do(self) -> JobResult:
         """The run. Raises InputError for what cannot be."""
 
 
@@ -55,13 +55,13 @@ class Work(ABC):
 class Job(Work):
     """One run, as `himpc-lab run` does it."""
 
-    def do(self) -> Run:
+    def do(self) -> JobResult:
         recording = run(self.spec.prepared(), None, self.spec.seed)
-        return Run(self, summary(recording), _arrays(recording))
+        return JobResult(self, summary(recording), _arrays(recording))
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class JobResult:
     """What came out of a job: the summary of `himpc-lab run --json` and the rows that plots need.
 
     A run that failed has an `error`, an empty summary and no arrays; figures of it are NaN.
@@ -119,11 +119,11 @@ class Run:
         return self.figure("tasks", place, measure, coordinate) if place >= 0 else float("nan")
 
 
-Results = Mapping[Any, Run]
+Results = Mapping[Any, JobResult]
 """By the job."""
 
 
-def _do(job: Work) -> Run:
+def _do(job: Work) -> JobResult:
     return job.do()
 
 
@@ -148,13 +148,15 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
     shared = [job for job in unique if not job.timed]
     timed = [job for job in unique if job.timed]
     total = sum(map(_work, unique))
-    found: dict[Work, Run] = {}
+    found: dict[Work, JobResult] = {}
     done = 0.0
     for batch, spread in ((shared, on_cores), (timed, one_by_one)):
         with closing(spread(_do, batch)) as outcomes:
             for place, outcome in outcomes:
                 job = batch[place]
-                found[job] = Run(job, {}, {}, outcome.reason) if isinstance(outcome, Failed) else outcome
+                found[job] = (
+                    JobResult(job, {}, {}, outcome.reason) if isinstance(outcome, FailedJob) else outcome
+                )
                 done += _work(job)
                 if progress is not None:
                     progress(done / total)

@@ -18,7 +18,7 @@ MAX_STEPS = 60
 
 
 @dataclass(frozen=True)
-class Step:
+class Trial:
     """One trial.
 
     Attributes:
@@ -46,7 +46,7 @@ def tune(
     noise: float,
     seconds: float,
     seed: int = 0,
-) -> Iterator[Step]:
+) -> Iterator[Trial]:
     """Remark 4: begin with a sufficiently small M̄; increase it until tracking is satisfactory or the closed
     loop almost shows a noisy response.
 
@@ -82,7 +82,7 @@ def tune(
         else:
             verdict = "satisfactory" if error <= accuracy else "go on"
             kept_control = True
-        yield Step(
+        yield Trial(
             scale=scale,
             M_bar=tuple(float(f"{value * settings.M_bar_scale:.3g}") for value in settings.M_bar),
             error=error,
@@ -95,7 +95,7 @@ def tune(
         scale *= factor
 
 
-def chosen(steps: list[Step]) -> Step | None:
+def chosen(steps: list[Trial]) -> Trial | None:
     """The step with the least error among those that kept control without noise; None if none did."""
     good = [step for step in steps if step.verdict in ("go on", "satisfactory")]
     return min(good, key=lambda step: step.error, default=None)

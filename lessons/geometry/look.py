@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Tick:
+class TickProblems:
     """A tick taken apart: the strict hierarchy's problems and solutions, whatever controller ran.
 
     Attributes:
@@ -37,7 +37,7 @@ class Tick:
     strict: Sequence[LevelSolution]
 
 
-def tick_of(session: TorqueSession) -> Tick:
+def tick_of(session: TorqueSession) -> TickProblems:
     """The last tick.
 
     Raises:
@@ -58,7 +58,7 @@ def tick_of(session: TorqueSession) -> Tick:
     strict: Sequence[LevelSolution] = plan.levels
     if isinstance(controller, Weighted):
         strict = solve_problems(problems, plan.rows, {})
-    return Tick(plan, problems, strict)
+    return TickProblems(plan, problems, strict)
 
 
 def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shift: float = 0.0) -> Plane:
@@ -101,7 +101,7 @@ def matrix_of(session: TorqueSession, level: str) -> Matrix:
     return matrix(tick.problems[place], tick.plan.rows, tick.strict[place])
 
 
-def _weighted(session: TorqueSession, tick: Tick) -> Array | None:
+def _weighted(session: TorqueSession, tick: TickProblems) -> Array | None:
     """One cost of all tasks, under the same bounds, (N, n) N·m."""
     if isinstance(session.controller, Weighted):
         return tick.plan.levels[-1].U

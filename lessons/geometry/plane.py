@@ -27,7 +27,7 @@ _MET = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class TorqueBox:
     """lower ≤ w ≤ upper, (2,) N·m, ±inf where nothing bounds; kinds: of the limit at (lower, upper) of each
     joint, None where there is none."""
 
@@ -52,7 +52,7 @@ class Allowed:
     at: Array | None
     span: Array
 
-    def segment(self, box: Box) -> Array | None:
+    def segment(self, box: TorqueBox) -> Array | None:
         """The ends (2, 2) of a line's part in the box, ±inf where it has none; None if there is no part, or
         no line."""
         if self.at is None or self.span.shape[1] != 1:
@@ -117,7 +117,7 @@ class Plane:
     """
 
     joints: tuple[int, int]
-    box: Box
+    box: TorqueBox
     levels: tuple[LevelCut, ...]
     weighted: Array | None = None
     osf: Array | None = None
@@ -197,7 +197,7 @@ def _cost(problem: LevelProblem, pair: list[int], held: Array) -> tuple[Array, A
     return P, centre, problem.cost(moved)
 
 
-def _box(rows: Rows, pair: list[int], held: Array) -> Box:
+def _box(rows: Rows, pair: list[int], held: Array) -> TorqueBox:
     rest = held.copy()
     rest[0, pair] = 0.0
     touching = np.flatnonzero(rows.L[:, 0])
@@ -209,7 +209,7 @@ def _box(rows: Rows, pair: list[int], held: Array) -> Box:
         row = int(values[:, k].argmin() if up else values[:, k].argmax())
         return rows.kind(int(touching[row]), pair[k], up) if np.isfinite(values[row, k]) else None
 
-    return Box(
+    return TorqueBox(
         lower.max(axis=0),
         upper.min(axis=0),
         (
@@ -233,7 +233,7 @@ def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
     return Allowed(at if missed <= _MET else None, right[rank:].T)
 
 
-def best(P: Array, centre: Array, allowed: Allowed, box: Box) -> Array | None:
+def best(P: Array, centre: Array, allowed: Allowed, box: TorqueBox) -> Array | None:
     """The point of `allowed` in the box where (w − c)ᵀ P (w − c) is least; None if there is none."""
     at, span = allowed.at, allowed.span
     if at is None or (box.lower > box.upper + _MET).any():
@@ -255,7 +255,7 @@ def best(P: Array, centre: Array, allowed: Allowed, box: Box) -> Array | None:
     return min(found, key=lambda w: float((w - centre) @ P @ (w - centre)), default=None)
 
 
-def _best_on(P: Array, centre: Array, at: Array, along: Array, box: Box) -> Array | None:
+def _best_on(P: Array, centre: Array, at: Array, along: Array, box: TorqueBox) -> Array | None:
     """The best point of a line in the box."""
     low, high = _stretch(at, along, box)
     if low > high + _MET:
@@ -264,7 +264,7 @@ def _best_on(P: Array, centre: Array, at: Array, along: Array, box: Box) -> Arra
     return at + min(max(s, low), max(low, high)) * along
 
 
-def _stretch(at: Array, along: Array, box: Box) -> tuple[float, float]:
+def _stretch(at: Array, along: Array, box: TorqueBox) -> tuple[float, float]:
     """Between which s at + s·along is in the box; the first is greater than the second if nowhere."""
     low, high = -np.inf, np.inf
     for axis in (0, 1):

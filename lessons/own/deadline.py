@@ -22,11 +22,11 @@ class TooLong(BaseException):
 
 def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
     """function(…), ended by TooLong when it takes longer."""
-    return Watch(seconds).call(function, *args, **kwargs)
+    return CallDeadline(seconds).call(function, *args, **kwargs)
 
 
 @final
-class Watch:
+class CallDeadline:
     """Ends calls that take too long, in the main thread of a POSIX system.
 
     One that computed all the time does; one that did not may have slept or, on a busy machine, waited for a

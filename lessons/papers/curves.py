@@ -8,24 +8,24 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.experiments.jobs import Run
-from lessons.plots.panels import Curve, Panel
+from lessons.experiments.jobs import JobResult
+from lessons.plots.panels import Panel, PlotCurve
 from lessons.plots.style import name
 
 Array = NDArray[np.float64]
 
 
-def curve(run: Run, field: str, k: int = 0, scale: float = 1.0, **how: object) -> Curve:
+def curve(run: JobResult, field: str, k: int = 0, scale: float = 1.0, **how: object) -> PlotCurve:
     """A field of a run over time; nothing is drawn for a run that failed."""
-    return Curve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
+    return PlotCurve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
 
 
 _BROAD = (2.4, 1.0)
 
 
 def by_controller(
-    runs: Sequence[Run], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
-) -> tuple[Curve, ...]:
+    runs: Sequence[JobResult], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
+) -> tuple[PlotCurve, ...]:
     """A field of several controllers' runs, each in its colour. weights: widths of the first, if there are
     others, and of the others; the first is broad, so that those that coincide with it leave it visible."""
     shown = [run for run in runs if len(run.t)]
@@ -53,7 +53,7 @@ def banded(panel: Panel) -> Panel:
     return replace(panel, curves=tuple(_band(each) for each in panel.curves))
 
 
-def _band(curve: Curve) -> Curve:
+def _band(curve: PlotCurve) -> PlotCurve:
     if len(curve.x) < 2:
         return curve
     starts = np.unique(np.searchsorted(curve.x, np.arange(curve.x[0], curve.x[-1], BAND)))
@@ -70,7 +70,9 @@ def excerpt(panel: Panel, start: float, end: float) -> Panel:
     return replace(panel, curves=tuple(curves), y_label="")
 
 
-def error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, float]]) -> tuple[Panel, ...]:
+def error_panels(
+    runs: Sequence[JobResult], tasks: Sequence[tuple[str, int, str, float]]
+) -> tuple[Panel, ...]:
     """A panel per coordinate: (task, coordinate, label with unit, scale from m or rad)."""
     return tuple(
         Panel(label, by_controller(runs, f"error/{task}", k, scale)) for task, k, label, scale in tasks
@@ -81,7 +83,9 @@ FAINTEST = 1e-4
 """Of a coordinate's unit: where a logarithmic axis of errors ends."""
 
 
-def log_error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, float]]) -> tuple[Panel, ...]:
+def log_error_panels(
+    runs: Sequence[JobResult], tasks: Sequence[tuple[str, int, str, float]]
+) -> tuple[Panel, ...]:
     """The same as sizes on logarithmic axes, as the largest in windows of BAND: small errors are seen too.
     Of controllers that coincide the earlier is broad."""
     panels = []
@@ -95,7 +99,7 @@ def log_error_panels(runs: Sequence[Run], tasks: Sequence[tuple[str, int, str, f
     return tuple(panels)
 
 
-def _largest(curve: Curve) -> Curve:
+def _largest(curve: PlotCurve) -> PlotCurve:
     band = _band(replace(curve, y=np.abs(curve.y)))
     return band if band.y_to is None else replace(band, y=band.y_to, y_to=None, style="line")
 
@@ -118,7 +122,7 @@ PLANAR_ERRORS = (
 
 
 def joint_panels(
-    runs: Sequence[Run],
+    runs: Sequence[JobResult],
     field: str,
     symbol: str,
     unit: str,

@@ -109,7 +109,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Check:
+class PaperCheck:
     """A measurable sentence, the number it is about, and whether it holds.
 
     Attributes:
@@ -140,7 +140,7 @@ class Section:
     notes: tuple[str, ...] = ()
     rows: tuple[Row, ...] = ()
     tables: tuple[Table, ...] = ()
-    checks: tuple[Check, ...] = ()
+    checks: tuple[PaperCheck, ...] = ()
     pictures: tuple[Picture, ...] = ()
 
 
@@ -163,11 +163,11 @@ class Item:
     report: Callable[[Results, bool], Section]
 
 
-def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> Check:
+def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> PaperCheck:
     """The check that a value is at most a limit; NaN is not."""
-    return Check(f"{text} ≤ {limit:g}", value, bool(value <= limit), band)
+    return PaperCheck(f"{text} ≤ {limit:g}", value, bool(value <= limit), band)
 
 
-def between(text: str, value: float, low: float, high: float, band: float | None = CLOSE) -> Check:
+def between(text: str, value: float, low: float, high: float, band: float | None = CLOSE) -> PaperCheck:
     """The check that a value is within two limits; NaN is not."""
-    return Check(f"{text}, {low:g} to {high:g}", value, bool(low <= value <= high), band)
+    return PaperCheck(f"{text}, {low:g} to {high:g}", value, bool(low <= value <= high), band)

@@ -11,7 +11,7 @@ from typing import Any
 
 from lessons.experiments.jobs import Results, perform_all
 from lessons.papers.disagreements import page
-from lessons.papers.item import Check, Item, Row, Section, Table
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table
 from lessons.papers.stored import from_memory, judged, store, stored
 from lessons.papers.words import number, tally
 from lessons.plots.draw import draw
@@ -29,7 +29,7 @@ class Report:
     item: Item
     section: Section
     troubles: tuple[str, ...]
-    judged: tuple[Check, ...] = ()
+    judged: tuple[PaperCheck, ...] = ()
 
     @property
     def sound(self) -> bool:
@@ -37,7 +37,7 @@ class Report:
         return not self.faults
 
     @property
-    def faults(self) -> tuple[Check, ...]:
+    def faults(self) -> tuple[PaperCheck, ...]:
         """The checks that do not hold."""
         return tuple(check for check in (*self.section.checks, *self.judged) if not check.holds)
 
@@ -244,5 +244,5 @@ def _grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in cells]
 
 
-def _check_markdown(check: Check) -> str:
+def _check_markdown(check: PaperCheck) -> str:
     return f"- {'✓' if check.holds else '✗'} {check.text} (measured: {number(check.value)})"

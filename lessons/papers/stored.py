@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lessons.experiments.jobs import Run
-from lessons.papers.item import Check, Item, Row, Section
+from lessons.experiments.jobs import JobResult
+from lessons.papers.item import Item, PaperCheck, Row, Section
 from lessons.papers.topics import topics
 
 FILE = Path(__file__).with_name("stored.json")
@@ -22,7 +22,7 @@ _DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Memory:
+class StoredItem:
     """The stored numbers of one item.
 
     Attributes:
@@ -34,11 +34,11 @@ class Memory:
     checks: Mapping[str, tuple[float, bool]]
 
 
-def stored(quick: bool) -> dict[str, Memory]:
+def stored(quick: bool) -> dict[str, StoredItem]:
     """The stored numbers by item; items that were never stored are missing."""
     data = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     return {
-        item: Memory(
+        item: StoredItem(
             {quantity: (_number(ours), *rest) for quantity, (ours, *rest) in kept["rows"].items()},
             {text: (_number(value), held) for text, (value, held) in kept["checks"].items()},
         )
@@ -78,7 +78,7 @@ def _short(value: float | None) -> float | None:
 # -------------------------------------------------------------------------------- judging
 
 
-def judged(section: Section, memory: Memory | None) -> tuple[Check, ...]:
+def judged(section: Section, memory: StoredItem | None) -> tuple[PaperCheck, ...]:
     """A check for every row and every check of a section: is it, on both sides, what it was?
 
     A row must have the stored verdict and ratio (or, where the paper prints no number, value) within its
@@ -92,29 +92,34 @@ def judged(section: Section, memory: Memory | None) -> tuple[Check, ...]:
     found += [_check(check, memory) for check in section.checks if check.band is not None]
     names = {row.quantity for row in section.rows} | {check.text for check in section.checks}
     gone = [name for name in (*memory.rows, *memory.checks) if name not in names]
-    return (*found, *(Check(f"“{name}” was stored and is still measured", math.nan, False) for name in gone))
+    return (
+        *found,
+        *(PaperCheck(f"“{name}” was stored and is still measured", math.nan, False) for name in gone),
+    )
 
 
-def _explained(row: Row) -> Check:
-    return Check(f"{row.quantity}: {row.verdict}, and a topic explains it", row.ours, row.topic in topics())
+def _explained(row: Row) -> PaperCheck:
+    return PaperCheck(
+        f"{row.quantity}: {row.verdict}, and a topic explains it", row.ours, row.topic in topics()
+    )
 
 
-def _row(row: Row, memory: Memory) -> Check:
+def _row(row: Row, memory: StoredItem) -> PaperCheck:
     if row.quantity not in memory.rows:
-        return Check(f"“{row.quantity}” has a stored number", row.ours, False)
+        return PaperCheck(f"“{row.quantity}” has a stored number", row.ours, False)
     ours, ratio, verdict, says = memory.rows[row.quantity]
     before, now = (ours, row.ours) if ratio is None or row.ratio is None else (ratio, row.ratio)
     same = (row.verdict, row.says, row.ratio is None) == (verdict, says, ratio is None)
     text = f"{row.quantity}: {verdict or 'nothing printed'}, ours {ours:.4g} ± {row.band:.0%}"
-    return Check(text, row.ours, same and _near(now, before, row.band))
+    return PaperCheck(text, row.ours, same and _near(now, before, row.band))
 
 
-def _check(check: Check, memory: Memory) -> Check:
+def _check(check: PaperCheck, memory: StoredItem) -> PaperCheck:
     if check.text not in memory.checks:
-        return Check(f"“{check.text}” has a stored number", check.value, False)
+        return PaperCheck(f"“{check.text}” has a stored number", check.value, False)
     before, _ = memory.checks[check.text]
     text = f"{check.text}: {before:.4g} ± {check.band or 0:.0%}"
-    return Check(text, check.value, _near(check.value, before, check.band or 0))
+    return PaperCheck(text, check.value, _near(check.value, before, check.band or 0))
 
 
 def _near(now: float, before: float, band: float) -> bool:
@@ -127,9 +132,9 @@ def _near(now: float, before: float, band: float) -> bool:
 # -------------------------------------------------------------------------------- without running
 
 
-def from_memory(item: Item, memory: Memory, quick: bool = False) -> Section:
+def from_memory(item: Item, memory: StoredItem, quick: bool = False) -> Section:
     """An item's section as if its runs had given the stored numbers; without pictures and further tables."""
-    nothing = {job: Run(job, {}, {}, "not run") for job in item.jobs(quick)}
+    nothing = {job: JobResult(job, {}, {}, "not run") for job in item.jobs(quick)}
     section = item.report(nothing, quick)
     rows = tuple(
         replace(row, ours=memory.rows[row.quantity][0]) if row.quantity in memory.rows else row

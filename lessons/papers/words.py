@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lessons.experiments.jobs import Run
+from lessons.experiments.jobs import JobResult
 from lessons.papers.item import Row, Verdict
 from lessons.scenes.catalog import load_scene
 
@@ -28,7 +28,7 @@ def tally(rows: Sequence[Row]) -> str:
 _VERDICTS: dict[Verdict, str] = {"agrees": "agree", "differs": "differ", "opposite": "opposite"}
 
 
-def trouble(run: Run) -> str:
+def trouble(run: JobResult) -> str:
     """Why a run has no figures; "" if it has."""
     if run.error is not None:
         return f"could not be run: {run.error}"

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import BOUND, RC, REFERENCE, colour
 from lessons.plots.ticks import label_values
 
@@ -118,7 +118,7 @@ def _positive(values: Iterable[np.ndarray]) -> bool:
     return any(bool((each[np.isfinite(each)] > 0).any()) for each in values)
 
 
-def _draw_curve(axes: Axes, curve: Curve) -> None:
+def _draw_curve(axes: Axes, curve: PlotCurve) -> None:
     shade = colour(curve.colour)
     if curve.style == "dots":
         axes.plot(

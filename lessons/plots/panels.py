@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PlotCurve:
     """y over x.
 
     Attributes:
@@ -54,7 +54,7 @@ class Panel:
     """
 
     y_label: str
-    curves: tuple[Curve, ...]
+    curves: tuple[PlotCurve, ...]
     x_label: str = "time (s)"
     bounds: tuple[float, ...] = ()
     bound_label: str = ""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.telemetry import Layout
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) ->
         Panel(
             "control step (ms)",
             tuple(
-                Curve(each["t"][:, 0], 1e-3 * each["step_us"][:, 0], "control step", "7", style)
+                PlotCurve(each["t"][:, 0], 1e-3 * each["step_us"][:, 0], "control step", "7", style)
                 for each, style in both
             ),
             bounds=(1e3 * T_s,),
@@ -65,24 +65,24 @@ def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) ->
     return Picture(name, f"A run recorded on the page.{dashed}", tuple(panels))
 
 
-def _errors(run: Recorded, style: str) -> list[Curve]:
-    curves: list[Curve] = []
+def _errors(run: Recorded, style: str) -> list[PlotCurve]:
+    curves: list[PlotCurve] = []
     for place, task in enumerate(run.layout.tasks):
         unit, factor = ("mm", 1e3) if task.unit == "m" else ("°", 180 / np.pi)
         # Below that an error is nothing to look at, and would squeeze what is.
         size = np.maximum(factor * np.linalg.norm(run[f"error/{task.name}"], axis=1), _FLOOR)
         label = f"{task.name} ({unit})" + (", ghost" if style == "dashed" else "")
-        curves.append(Curve(run["t"][:, 0], size, label, str(place), style))
+        curves.append(PlotCurve(run["t"][:, 0], size, label, str(place), style))
     return curves
 
 
-def _shares(run: Recorded, style: str, field: str, lower: str, upper: str) -> list[Curve]:
+def _shares(run: Recorded, style: str, field: str, lower: str, upper: str) -> list[PlotCurve]:
     high = run[upper]
     low = run[lower] if lower else -high
     with np.errstate(all="ignore"):
         shares = 100 * (run[field] - 0.5 * (high + low)) / (0.5 * (high - low))
     return [
-        Curve(run["t"][:, 0], shares[:, joint], name if style == "line" else "", str(joint), style)
+        PlotCurve(run["t"][:, 0], shares[:, joint], name if style == "line" else "", str(joint), style)
         for joint, name in enumerate(run.layout.joints)
         if np.isfinite(shares[:, joint]).any()
     ]

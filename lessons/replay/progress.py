@@ -31,7 +31,7 @@ Proof = Literal["signed", "not signed", "signed with another key"]
 
 
 @dataclass(frozen=True)
-class Progress:
+class LearnerProgress:
     """Attributes:
     seen: per lesson the places of the steps whose run was seen.
     best: per lesson the best points (0 to 100) of its challenge.
@@ -40,11 +40,11 @@ class Progress:
     seen: Mapping[str, frozenset[int]] = field(default_factory=dict)
     best: Mapping[str, float] = field(default_factory=dict)
 
-    def with_step(self, lesson: str, place: int) -> Progress:
+    def with_step(self, lesson: str, place: int) -> LearnerProgress:
         """After a step's run."""
         return replace(self, seen={**self.seen, lesson: self.seen.get(lesson, frozenset()) | {place}})
 
-    def with_points(self, lesson: str, points: float) -> Progress:
+    def with_points(self, lesson: str, points: float) -> LearnerProgress:
         """After a challenge that was passed; only the best attempt counts."""
         return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
 
@@ -60,13 +60,13 @@ class Progress:
         )
 
 
-def kept(progress: Progress, key: bytes | None) -> str:
+def kept(progress: LearnerProgress, key: bytes | None) -> str:
     """As the browser keeps it."""
     text = progress.dumped()
     return text if key is None else _seal(text.encode(), key) + text
 
 
-def found(text: str | None, key: bytes | None) -> Progress:
+def found(text: str | None, key: bytes | None) -> LearnerProgress:
     """What a browser kept; with a key, nothing that was not written with it."""
     if key is None or not text:
         return progress_from(text)
@@ -76,15 +76,15 @@ def found(text: str | None, key: bytes | None) -> Progress:
     )
 
 
-def progress_from(text: str | None) -> Progress:
+def progress_from(text: str | None) -> LearnerProgress:
     """From the browser's storage, which anybody may have written: what makes no sense is left out."""
     try:
         found = json.loads(text or "{}")
     except (ValueError, RecursionError):
-        return Progress()
+        return LearnerProgress()
     if not isinstance(found, dict):
-        return Progress()
-    return Progress(
+        return LearnerProgress()
+    return LearnerProgress(
         {
             name: frozenset(place for place in places if type(place) is int and 0 <= place < 100)
             for name, places in _of_lessons(found.get("seen"))
@@ -118,7 +118,7 @@ class HandedIn:
 
     name: str
     at: str
-    progress: Progress
+    progress: LearnerProgress
     code: str = ""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from himpc.controllers import Controller, make_controller
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
-from lessons.own.deadline import TooLong, Watch
+from lessons.own.deadline import CallDeadline, TooLong
 from lessons.own.files import Source, is_file, read, sentence
 from lessons.own.judge import judged
 from lessons.own.kinds import law_of, line_of
@@ -34,12 +34,12 @@ def controller_of(settings: TorqueSettings, robot: Robot) -> Controller:
     judged(source)
     module = load(source)
     make = law_of(module)
-    watch = Watch(LONGEST_TICK)
+    watch = CallDeadline(LONGEST_TICK)
     careful, call = partial(_guarded, source, watch, make), partial(_guarded, source, watch)
     return OwnController(robot, wanted, careful, call, f"{source.path}, line {line_of(module)}")
 
 
-def _guarded(source: Source, watch: Watch, function: Callable[..., Any], *args: Any) -> Any:
+def _guarded(source: Source, watch: CallDeadline, function: Callable[..., Any], *args: Any) -> Any:
     """function(*args), at most LONGEST_TICK. Raises OwnFault, with the line, for whatever goes wrong."""
     try:
         with alone(source.path):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Outbox:
+class DelayedTorque:
     """Where a late torque waits for the next tick: a queue of one.
 
     A tick whose torque is in time applies it, and what waited is thrown away: nothing old ever acts after

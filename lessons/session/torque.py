@@ -20,7 +20,7 @@ from lessons.events import Event, MoveTarget, Push
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
 from lessons.session.controllers import controller_of
-from lessons.session.deadline import Outbox
+from lessons.session.deadline import DelayedTorque
 from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.places import Places
 from lessons.session.session import LOST_SPEED, Session
@@ -104,7 +104,7 @@ class TorqueSession(Session):
         self.given: Given | None = None
         self._push_until = math.inf
         self._ticks = 0
-        self._outbox = Outbox()
+        self._outbox = DelayedTorque()
         self._hands = self._first_hands()
         self._truth = (math.nan, math.nan, math.nan)
 

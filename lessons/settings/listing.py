@@ -13,7 +13,7 @@ _BY_PLACE = re.compile(r"levels\.\d+\.\w+")
 
 
 @dataclass(frozen=True)
-class Line:
+class SettingLine:
     """One setting, all of it text.
 
     Attributes:
@@ -31,7 +31,7 @@ class Line:
     help: str
 
 
-def lines(settings: Settings) -> list[Line]:
+def lines(settings: Settings) -> list[SettingLine]:
     """Every setting of a scene in the order of the page. Levels, which are also known by their place, come by
     their names."""
     paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
@@ -41,9 +41,9 @@ def lines(settings: Settings) -> list[Line]:
     return [_line(settings, path, path) for path in paths]
 
 
-def reference(scenes: Sequence[Settings]) -> list[Line]:
+def reference(scenes: Sequence[Settings]) -> list[SettingLine]:
     """Every setting that any of some scenes of a kind has, names written as "*"; `now` is the first one's."""
-    found: dict[str, Line] = {}
+    found: dict[str, SettingLine] = {}
     for settings in scenes:
         for path in settings.paths():
             pattern = _pattern(settings, path)
@@ -57,8 +57,8 @@ def _pattern(settings: Settings, path: str) -> str:
     return next((entry.path for entry in settings.entries if entry.at(path)), path)
 
 
-def _line(settings: Settings, path: str, shown: str) -> Line:
+def _line(settings: Settings, path: str, shown: str) -> SettingLine:
     entry, place = settings.entry(path), settings.place(path)
     now = assignment(path, place.read(settings)).partition("=")[2]
     words = entry.label if not entry.help else entry.help
-    return Line(shown, now, str(place.form), entry.unit, words)
+    return SettingLine(shown, now, str(place.form), entry.unit, words)

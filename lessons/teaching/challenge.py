@@ -7,7 +7,7 @@ from inspect import cleandoc
 
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control, Script
-from lessons.teaching.measure import Measure, Rows
+from lessons.teaching.measure import Measure, RunRows
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Challenge:
         """What a run must be measured for."""
         return (*(goal.measure for goal in self.goals), self.score.measure)
 
-    def grade(self, rows: Rows) -> Result:
+    def grade(self, rows: RunRows) -> Result:
         """Judges a finished run."""
         return self.result([measure.value(rows) for measure in self.measures])
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from lessons.parallel import Failed, Spread, on_cores
+from lessons.parallel import FailedJob, Spread, on_cores
 from lessons.recording.run import run
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import parse_assignment
@@ -92,7 +92,7 @@ def check(
     work = [(run, tuple(measures)) for run, measures in pieces]
     for place, outcome in spread(measured, work):
         run = work[place][0]
-        outcomes[run] = Outcome({}, 0, outcome.reason) if isinstance(outcome, Failed) else outcome
+        outcomes[run] = Outcome({}, 0, outcome.reason) if isinstance(outcome, FailedJob) else outcome
         if progress is not None:
             progress(len(outcomes) / len(work))
     return [verdict for lesson in lessons for verdict in judge(lesson, outcomes)]

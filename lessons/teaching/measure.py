@@ -44,7 +44,7 @@ _NAMES = {
 _PER_JOINT = ("q", "v", "tau")
 
 
-class Rows(Protocol):
+class RunRows(Protocol):
     """A run, finished or still going on: a field of telemetry over time by its name, (ticks, width)."""
 
     def __getitem__(self, field: str, /) -> Array: ...
@@ -79,7 +79,7 @@ class Signal:
         part = "of joint" if self.name in _PER_JOINT else "component"
         return f"{plain} {part} {self.column + 1}"
 
-    def over(self, rows: Rows) -> Array:
+    def over(self, rows: RunRows) -> Array:
         """The signal at every tick, (ticks,); NaN where it is not defined."""
         found = DERIVED[self.name](rows) if self.name in DERIVED else rows[self.name]
         one = np.linalg.norm(found, axis=1) if self.column is None else found[:, self.column]
@@ -124,7 +124,7 @@ class Measure:
         """The same without the ghost."""
         return replace(self, over_ghost=False)
 
-    def value(self, rows: Rows, ghost: Rows | None = None) -> float:
+    def value(self, rows: RunRows, ghost: RunRows | None = None) -> float:
         """The number so far; NaN as long as there is nothing to measure. `rows` may be a run half done."""
         own = self._of(rows)
         if not self.over_ghost:
@@ -132,7 +132,7 @@ class Measure:
         other = math.nan if ghost is None else self._of(ghost)
         return own / other if other else math.nan
 
-    def _of(self, rows: Rows) -> float:
+    def _of(self, rows: RunRows) -> float:
         t = rows["t"][:, 0]
         inside = (t >= self.after - 1e-9) & (t < self.until - 1e-9)
         values = self.signal.over(rows)[inside]
@@ -140,14 +140,14 @@ class Measure:
         return float(_STATISTICS[self.statistic](values)) if values.size else math.nan
 
 
-def _shares(rows: Rows, value: str, limit: str) -> Array:
+def _shares(rows: RunRows, value: str, limit: str) -> Array:
     """The largest |value| / limit over the joints that have a limit, (ticks, 1)."""
     with np.errstate(all="ignore"):
         share = np.abs(rows[value]) / rows[limit]
     return np.where(np.isfinite(share), share, 0.0).max(axis=1, keepdims=True)
 
 
-def _position_share(rows: Rows) -> Array:
+def _position_share(rows: RunRows) -> Array:
     """The largest distance from mid-range over half the range, (ticks, 1)."""
     lower, upper = rows["q_lower"], rows["q_upper"]
     with np.errstate(all="ignore"):
@@ -159,27 +159,27 @@ _CLOSE = math.radians(0.05)
 _NEAR = math.radians(5.0)
 
 
-def _ahead(rows: Rows) -> Array:
+def _ahead(rows: RunRows) -> Array:
     """Distance of each joint from the end of its range that it moves to, (ticks, n) rad; 0 beyond it."""
     forward = rows["v"] > 0.0
     return np.maximum(np.where(forward, rows["q_upper"] - rows["q"], rows["q"] - rows["q_lower"]), 0.0)
 
 
-def _deceleration_to_stop(rows: Rows) -> Array:
+def _deceleration_to_stop(rows: RunRows) -> Array:
     """The largest q̇²/2d with d the distance ahead, (ticks, 1) rad/s²; from 0.05° on it is not defined."""
     ahead = _ahead(rows)
     found = np.where(ahead > _CLOSE, rows["v"] ** 2 / (2.0 * np.maximum(ahead, _CLOSE)), math.nan)
     return np.fmax.reduce(found, axis=1, keepdims=True)
 
 
-def _speed_near_an_end(rows: Rows) -> Array:
+def _speed_near_an_end(rows: RunRows) -> Array:
     """The largest speed of joints less than 5° before an end of their range, (ticks, 1) rad/s; or NaN."""
     found = np.where(_ahead(rows) < _NEAR, np.abs(rows["v"]), math.nan)
     return np.fmax.reduce(found, axis=1, keepdims=True)
 
 
-def _at(bit: int) -> Callable[[Rows], Array]:
-    def found(rows: Rows) -> Array:
+def _at(bit: int) -> Callable[[RunRows], Array]:
+    def found(rows: RunRows) -> Array:
         bits = rows["at_bound"]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         return (bits & bit != 0).any(axis=1, keepdims=True).astype(float)
@@ -187,30 +187,30 @@ def _at(bit: int) -> Callable[[Rows], Array]:
     return found
 
 
-def _joints_moved(rows: Rows) -> Array:
+def _joints_moved(rows: RunRows) -> Array:
     """How many joints are more than 1° from where they started, (ticks, 1)."""
     q = rows["q"]
     return (np.abs(q - q[:1]) > math.radians(1.0)).sum(axis=1, keepdims=True).astype(float)
 
 
-def _tip_travel(rows: Rows) -> Array:
+def _tip_travel(rows: RunRows) -> Array:
     """How far the task `position` is from where it started, (ticks, 1) m."""
     x = rows["x/position"]
     return np.linalg.norm(x - x[:1], axis=1, keepdims=True)
 
 
-def _way_of_the_base(rows: Rows) -> Array:
+def _way_of_the_base(rows: RunRows) -> Array:
     """How far the base has driven since the first row, along its path, (ticks, 1) m."""
     steps = np.linalg.norm(np.diff(rows["x/base"], axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])[: len(rows["t"]), None]
 
 
-def _time_at_work(rows: Rows) -> Array:
+def _time_at_work(rows: RunRows) -> Array:
     """t as long as tasks of the mission are left, (ticks, 1) s; then not defined."""
     return np.where(rows["left"] > 0, rows["t"], math.nan)
 
 
-DERIVED: Mapping[str, Callable[[Rows], Array]] = {
+DERIVED: Mapping[str, Callable[[RunRows], Array]] = {
     "torque share": lambda rows: _shares(rows, "tau_demand", "tau_upper"),
     "speed share": lambda rows: _shares(rows, "v", "v_limit"),
     "position share": _position_share,

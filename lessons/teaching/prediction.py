@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lessons.teaching.measure import Measure, Rows, Signal
+from lessons.teaching.measure import Measure, RunRows, Signal
 
 
 @dataclass(frozen=True)
-class Grade:
+class PredictionResult:
     """How a prediction did.
 
     Attributes:
@@ -53,14 +53,18 @@ class Choice:
         """Place of the option that a measured number makes right; None if there is none."""
         return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
 
-    def grade(self, picked: int, rows: Rows, ghost: Rows | None = None) -> Grade:
+    def grade(self, picked: int, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:
         """Compares the option picked with the run."""
         value = self.measure.value(rows, ghost)
         right = self.right(value)
         if right is None:
-            return Grade(0.0, "The run gave nothing to measure.")
+            return PredictionResult(0.0, "The run gave nothing to measure.")
         answer = f"{self.options[right].text} ({_number(value, self.measure.unit)})."
-        return Grade(1.0, f"Right: {answer}") if picked == right else Grade(0.0, f"It was: {answer}")
+        return (
+            PredictionResult(1.0, f"Right: {answer}")
+            if picked == right
+            else PredictionResult(0.0, f"It was: {answer}")
+        )
 
 
 @dataclass(frozen=True)
@@ -80,15 +84,15 @@ class Value:
     high: float
     factor: float = 1.5
 
-    def grade(self, guess: float, rows: Rows, ghost: Rows | None = None) -> Grade:
+    def grade(self, guess: float, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:
         """Compares the guess with the run."""
         value = self.measure.value(rows, ghost)
         unit = self.measure.unit
         if not (math.isfinite(value) and value > 0 and guess > 0):
-            return Grade(0.0, "The run gave nothing to measure.")
+            return PredictionResult(0.0, "The run gave nothing to measure.")
         off = abs(math.log(guess / value)) / math.log(self.factor)
         score = min(1.0, max(0.0, 2.0 - off))
-        return Grade(score, f"You said {_number(guess, unit)}, it was {_number(value, unit)}.")
+        return PredictionResult(score, f"You said {_number(guess, unit)}, it was {_number(value, unit)}.")
 
 
 @dataclass(frozen=True)
@@ -115,16 +119,16 @@ class Sketch:
         """The largest size of what is drawn: it must have room in the drawing."""
         return Measure(self.signal, until=self.until)
 
-    def grade(self, points: Sequence[tuple[float, float]], rows: Rows) -> Grade:
+    def grade(self, points: Sequence[tuple[float, float]], rows: RunRows) -> PredictionResult:
         """Compares the drawn points (t in s, value), joined by straight lines, with the run so far."""
         t, truth = rows["t"][:, 0], self.signal.over(rows)
         seen = np.isfinite(truth) & (t <= self.until)
         if not points or not seen.any():
-            return Grade(0.0, "There is nothing to compare yet.")
+            return PredictionResult(0.0, "There is nothing to compare yet.")
         times, values = np.array(sorted(points), float).T
         off = np.abs(np.interp(t[seen], times, values) - truth[seen])
         score = float((off <= self.band * (self.high - self.low)).mean())
-        return Grade(score, f"Your curve is close to the run for {score:.0%} of the time.")
+        return PredictionResult(score, f"Your curve is close to the run for {score:.0%} of the time.")
 
 
 Prediction = Choice | Value | Sketch

@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 import psutil
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.process import wait_until
 
 LONG = 60.0  # s
-Start = Callable[..., Learner]
+Start = Callable[..., SimulationClient]
 
 
-def running(learner: Learner) -> bool:
+def running(learner: SimulationClient) -> bool:
     status = learner.status
     return learner.trouble() is None and status is not None and status.ticks > 20
 
@@ -25,7 +25,7 @@ def gone(pid: int) -> bool:
         return True
 
 
-def born(learner: Learner) -> int:
+def born(learner: SimulationClient) -> int:
     assert wait_until(lambda: learner.pid is not None, LONG)
     assert learner.pid is not None
     return learner.pid

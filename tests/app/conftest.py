@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 from children import Start
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.spares import Spares
@@ -48,12 +48,12 @@ def lent(fork_server: ForkServer | None) -> dict[str, ForkServer | None]:
 def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
     """Learners of one worker, and what it holds."""
     made: list[Spares] = []
-    started: list[Learner] = []
+    started: list[SimulationClient] = []
 
-    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> Learner:
+    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> SimulationClient:
         if not made:
             made.append(Spares(worker, None if own_server else lent.get(worker)))
-        learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
+        learner = SimulationClient(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
         started.append(learner)
         return learner
 

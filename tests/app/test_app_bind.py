@@ -15,11 +15,11 @@ import pytest
 import viser
 from viser import _messages
 
-from app.client.wish import Wish
+from app.client.pending_edit import PendingEdit
 from app.panels.torque.controller import ControllerPanel
 from app.panels.widgets import mirror as bind
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.window import Window
+from app.panels.widgets.window import PopupWindow
 from lessons.events import Event, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.settings.torque import TorqueSettings
@@ -117,7 +117,7 @@ def test_controls_are_reminded_of_what_the_session_has(
 
 def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two quick presses of a toggle end where they began."""
-    wish: Wish[bool] = Wish()
+    wish: PendingEdit[bool] = PendingEdit()
     assert wish.now(True) is True
     assert wish.ask(not wish.now(True)) is False
     assert wish.ask(not wish.now(True)) is True
@@ -137,7 +137,7 @@ def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
 
     gui: Any = MagicMock()
     gui.add_modal.return_value.__exit__.return_value = False
-    window = Window(gui, "All lessons", "L", fill)
+    window = PopupWindow(gui, "All lessons", "L", fill)
     window.open()
     window.open()
     assert len(filled) == gui.add_modal.call_count == 2

@@ -10,10 +10,10 @@ import pytest
 
 from app.client.decimated import BUCKETS, History
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
-from app.link.messages import Load, Play, Post, Ready, Refused, ResetAll, Speed, Step
+from app.link.exercise import LessonPlace
+from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTicks
 from app.worker.pacing import BACKLOG, Pacer
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TRUTH_TICKS
@@ -22,13 +22,13 @@ from robots import InputError
 
 
 @pytest.fixture
-def body() -> Iterator[Body]:
-    made = Body(SceneChoice(RunSpec("iiwa14-hold")))
+def body() -> Iterator[SimulationRunner]:
+    made = SimulationRunner(SceneChoice(RunSpec("iiwa14-hold")))
     yield made
     made.close()
 
 
-def test_ticks_reach_the_block_in_order(body: Body) -> None:
+def test_ticks_reach_the_block_in_order(body: SimulationRunner) -> None:
     body.tick(50)
     first, rows = body.block.since(0)
     t = rows[:, body.session.layout.fields["t"]][:, 0]
@@ -36,7 +36,7 @@ def test_ticks_reach_the_block_in_order(body: Body) -> None:
     assert np.allclose(np.diff(t), 1e-3)
 
 
-def test_reports_survive_the_pipe(body: Body) -> None:
+def test_reports_survive_the_pipe(body: SimulationRunner) -> None:
     ready = pickle.loads(pickle.dumps(body.ready()))
     assert ready.robot.joint_names == body.session.robot.joint_names
     assert [task.kind for task in ready.tasks] == ["position", "orientation", "posture"]
@@ -46,7 +46,7 @@ def test_reports_survive_the_pipe(body: Body) -> None:
     assert body.status().settings is None  # sent once, then only after a change
 
 
-def test_settings_and_wrong_settings(body: Body) -> None:
+def test_settings_and_wrong_settings(body: SimulationRunner) -> None:
     body.handle(Post(Set("horizon", 10)))
     body.handle(Post(Set("M_bar_scale", -1.0)))
     body.handle(Post(Set("horzion", 3)))
@@ -57,23 +57,23 @@ def test_settings_and_wrong_settings(body: Body) -> None:
     assert body.status().notices == ()
 
 
-def test_pause_step_speed(body: Body) -> None:
+def test_pause_step_speed(body: SimulationRunner) -> None:
     body.handle(Play(False))
     assert not body.running
     body.handle(Play(True))
-    body.handle(Step())
+    body.handle(StepTicks())
     assert not body.running and body.take_steps() == 1 and body.take_steps() == 0
     body.handle(Post(Reset()))
     assert body.take_steps() == 1  # a reset shows while paused
     body.handle(Play(True))
     body.handle(Post(Reset()))
-    body.handle(Step())
+    body.handle(StepTicks())
     assert body.take_steps() == 1  # one press, one tick
     body.handle(Speed(0.5))
     assert body.status().speed == 0.5
 
 
-def test_paused_edits_take_effect_though_no_time_passes(body: Body) -> None:
+def test_paused_edits_take_effect_though_no_time_passes(body: SimulationRunner) -> None:
     """Settings, order, gauge and refusals are those of after the edits; the clock and the robot stand."""
     body.tick(3)
     assert body.status().gauge is None  # the rows tell it
@@ -94,7 +94,7 @@ def test_paused_edits_take_effect_though_no_time_passes(body: Body) -> None:
     assert row[body.session.layout.fields["gauge_radius"]][0] == pytest.approx(after.gauge[1], rel=1e-6)
 
 
-def test_reset_keeps_settings_and_reset_all_does_not(body: Body) -> None:
+def test_reset_keeps_settings_and_reset_all_does_not(body: SimulationRunner) -> None:
     start = body.block.poses()[-1].copy()
     target = tuple(start[:3] + np.array([0.0, 0.15, 0.0]))
     body.handle(Post(MoveTarget("position", target)))
@@ -112,7 +112,7 @@ def test_reset_keeps_settings_and_reset_all_does_not(body: Body) -> None:
     assert body.session.settings.horizon == 5
 
 
-def test_another_scene_or_a_sentence(body: Body) -> None:
+def test_another_scene_or_a_sentence(body: SimulationRunner) -> None:
     kept = body.session
     for choice in (
         SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")),
@@ -121,7 +121,7 @@ def test_another_scene_or_a_sentence(body: Body) -> None:
         SceneChoice(RunSpec("no-such-scene")),
     ):
         answer = body.handle(Load(choice))
-        assert isinstance(answer, Refused) and answer.sentence and "Traceback" not in answer.sentence
+        assert isinstance(answer, LoadRefused) and answer.sentence and "Traceback" not in answer.sentence
         assert body.session is kept
     old = body.block
     answer = body.handle(Load(SceneChoice(RunSpec("planar3-hold"))))
@@ -131,10 +131,10 @@ def test_another_scene_or_a_sentence(body: Body) -> None:
 
 def test_a_scene_that_cannot_be_loaded_at_all() -> None:
     with pytest.raises(InputError):
-        Body(SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")))
+        SimulationRunner(SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")))
 
 
-def test_history_keeps_spikes_and_counts_bounds(body: Body) -> None:
+def test_history_keeps_spikes_and_counts_bounds(body: SimulationRunner) -> None:
     layout = body.session.layout
     history = History(body.block, layout)
     row = np.zeros(layout.size)
@@ -160,7 +160,7 @@ def test_history_keeps_spikes_and_counts_bounds(body: Body) -> None:
     assert np.isnan(history.window().columns(layout.fields["t"])).all()
 
 
-def test_the_ring_wraps(body: Body) -> None:
+def test_the_ring_wraps(body: SimulationRunner) -> None:
     width = body.session.layout.size
     rows = body.block.rows
     for k in range(rows + 100):
@@ -187,7 +187,7 @@ def test_pacer_owes_simulated_time_but_never_piles_it_up() -> None:
 
 def test_a_choice_may_bring_settings_and_a_seed() -> None:
     """What a state code says is the scene as it was first loaded: "Reset all" goes back to it."""
-    made = Body(
+    made = SimulationRunner(
         SceneChoice(RunSpec("planar3-hold", set=("order=posture,position,orientation", "horizon=3"), seed=4))
     )
     made.handle(Post(Set("horizon", 9)))
@@ -198,12 +198,12 @@ def test_a_choice_may_bring_settings_and_a_seed() -> None:
     assert made.session.settings.levels[0].name == "posture"
     assert made.session.seed == 4
     refused = made.handle(Load(SceneChoice(RunSpec("planar3-hold", set=("horizn=3",)))))
-    assert isinstance(refused, Refused) and "horizon" in refused.sentence
+    assert isinstance(refused, LoadRefused) and "horizon" in refused.sentence
     made.close()
 
 
 def test_late_torques_are_counted() -> None:
-    made = Body(SceneChoice(RunSpec("planar3-hold", set=("deadline_ms=0.5", "horizon=5"))))
+    made = SimulationRunner(SceneChoice(RunSpec("planar3-hold", set=("deadline_ms=0.5", "horizon=5"))))
     made.tick(3)
     made.handle(Post(Set("horizon", 6)))
     made.tick(4)
@@ -211,7 +211,7 @@ def test_late_torques_are_counted() -> None:
     made.close()
 
 
-def test_another_stack_has_memory_of_its_own(body: Body) -> None:
+def test_another_stack_has_memory_of_its_own(body: SimulationRunner) -> None:
     """While it runs and while it is paused: rows of the new width go where the page hears of, once."""
     body.tick(5)
     assert body.news() is None
@@ -238,7 +238,7 @@ def test_another_stack_has_memory_of_its_own(body: Body) -> None:
 
 
 def test_in_a_lesson_the_stack_stays() -> None:
-    lesson = Body(SceneChoice.of_lesson(Exercise("a-redundant-arm")))
+    lesson = SimulationRunner(SceneChoice.of_lesson(LessonPlace("a-redundant-arm")))
     before = lesson.session.settings.levels
     lesson.handle(Post(Set("stack.remove", "posture")))
     lesson.settle()

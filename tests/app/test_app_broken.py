@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from app.client.learner import Learner
 from app.client.moment import Moment
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from app.link.messages import Load
 from app.page.layout import Stage
 from app.page.page import Page
@@ -23,7 +23,7 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
-NEXT = Exercise("deadlines")
+NEXT = LessonPlace("deadlines")
 
 
 def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -34,7 +34,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
 
     def slow(stage: Stage, moment: Moment) -> None:
         learner = stage._learner
-        late = leaving.is_set() and stage._ready.choice.exercise == Exercise("one-task")
+        late = leaving.is_set() and stage._ready.choice.exercise == LessonPlace("one-task")
         if late:
             writing.set()
             eventually(lambda: learner.lecture is not None and learner.lecture.exercise == NEXT)
@@ -43,7 +43,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
             eventually(lambda: any(answers(page) for page in pages), 3.0)  # the browser has it already
 
     monkeypatch.setattr(Stage, "_write", slow)
-    server = PageServer(SceneChoice.of_lesson(Exercise("one-task")), port=0, max_sessions=1)
+    server = PageServer(SceneChoice.of_lesson(LessonPlace("one-task")), port=0, max_sessions=1)
     try:
         with Wire(server.link) as page:
             pages.append(page)
@@ -110,7 +110,7 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
             page.write(again, value=True)
             assert eventually(lambda: page.shows("RUNNING"))
             learner = server.sessions.learners[0]
-            assert isinstance(learner, Learner) and learner.failure is None
+            assert isinstance(learner, SimulationClient) and learner.failure is None
     finally:
         server.close()
     assert "no <place> for it" in capfd.readouterr().err  # whoever started it can see where

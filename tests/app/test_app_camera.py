@@ -12,7 +12,7 @@ import pytest
 from app.link.choice import SceneChoice
 from app.view.camera import fit
 from app.view.robot import aim
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.scenes.run_spec import RunSpec
 from robots import load_robot
 
@@ -50,7 +50,7 @@ def test_on_a_phone_it_is_above_the_sheet() -> None:
 
 @pytest.mark.parametrize("phone", [False, True])
 def test_what_the_hand_will_follow_is_in_the_picture(phone: bool) -> None:
-    body = Body(SceneChoice(RunSpec("iiwa14-circle")))
+    body = SimulationRunner(SceneChoice(RunSpec("iiwa14-circle")))
     (way,) = [task.path for task in body.ready().tasks if task.kind == "position"]
     body.close()
     assert way is not None

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Play
 from app.panels.run.classroom import Guesses
@@ -32,7 +32,7 @@ def test_watchers_change_nothing() -> None:
             sent.append(command)
 
     refused: list[str] = []
-    watcher = Watcher(cast(Learner, Shown()), refused.append)
+    watcher = Watcher(cast(SimulationClient, Shown()), refused.append)
     watcher.send(Play(False))
     watcher.reset_all()
     watcher.restart(cast(SceneChoice, "another scene"))
@@ -62,7 +62,7 @@ def test_watchers_have_what_pages_use() -> None:
     assert own
     for name, found in own.items():
         ours, theirs = (
-            inspect.signature(each).parameters.values() for each in (found, getattr(Learner, name))
+            inspect.signature(each).parameters.values() for each in (found, getattr(SimulationClient, name))
         )
         assert [(each.name, each.default) for each in ours] == [(each.name, each.default) for each in theirs]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.process import wait_until
@@ -33,12 +33,12 @@ def server() -> Iterator[PageServer]:
     running.close()
 
 
-def settings(learner: Learner) -> TorqueSettings:
+def settings(learner: SimulationClient) -> TorqueSettings:
     assert isinstance(learner.settings, TorqueSettings)
     return learner.settings
 
 
-def levels(learner: Learner) -> list[str]:
+def levels(learner: SimulationClient) -> list[str]:
     return [level.name for level in settings(learner).levels]
 
 
@@ -186,7 +186,7 @@ def test_a_control_may_be_written_after_its_panel_was_rebuilt(
     assert "removed" not in said.err + said.out
 
 
-def axes(learner: Learner, name: str) -> str:
+def axes(learner: SimulationClient, name: str) -> str:
     tasks = (task for level in settings(learner).levels for task in level.tasks if task.name == name)
     found = next(tasks)
     assert isinstance(found, OnAxes)

@@ -10,7 +10,7 @@ import pytest
 from websockets.sync.connection import Connection
 
 from app.adapter import private
-from app.client.corners import corners
+from app.client.decimate import decimate
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.panels.widgets.chart import _TOP, _axis
@@ -98,11 +98,11 @@ def test_corners_show_the_curves() -> None:
     curves = np.array([np.sin(x / 40), 0.02 * rng.standard_normal(320), np.zeros(320)])
     curves[2, 170] = 1.0  # a spike
     for phase in (0, 7, -123):
-        kept = corners(curves, 0.05, phase)
+        kept = decimate(curves, 0.05, phase)
         drawn = np.array([np.interp(x, kept, curve[kept]) for curve in curves])
         assert np.abs(drawn - curves).max() <= 0.1 and drawn[2, 170] == 1.0
         assert kept[0] == 0 and kept[-1] == 319 and len(kept) < 200
-    assert corners(np.ones((2, 320)), 1e-9).tolist() == [0, 319]
+    assert decimate(np.ones((2, 320)), 1e-9).tolist() == [0, 319]
 
 
 def test_curves_that_slide_past_keep_their_corners() -> None:
@@ -110,7 +110,7 @@ def test_curves_that_slide_past_keep_their_corners() -> None:
     x = np.arange(400)
     curve = np.sin(x / 25)[None]
     now, then = (
-        set((start + corners(curve[:, start : start + 320], 0.01, start)).tolist()) for start in (20, 26)
+        set((start + decimate(curve[:, start : start + 320], 0.01, start)).tolist()) for start in (20, 26)
     )
     inside = set(range(64, 300))
     assert now & inside == then & inside

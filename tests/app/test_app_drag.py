@@ -13,8 +13,8 @@ from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.view import drag
 from app.view.drag import Hand
-from app.view.reachability import Question, Verdict
-from app.worker.simulation import Body
+from app.view.reachability import Question, Reachability
+from app.worker.simulation import SimulationRunner
 from lessons.events import Event, MoveTarget
 from lessons.scenes.run_spec import RunSpec
 
@@ -48,16 +48,16 @@ class Scene:
         return back
 
 
-class Judge:
+class Worker:
     """Answers when it is told to."""
 
-    made: list[Judge]
+    made: list[Worker]
 
     def __init__(
         self,
         _: object,
         place: Callable[[Question, np.ndarray], None],
-        answer: Callable[[Verdict], None] | None = None,
+        answer: Callable[[Reachability], None] | None = None,
     ) -> None:
         self.asked: list[Question] = []
         self.place, self.close = place, lambda: None
@@ -89,7 +89,7 @@ class Held:
             lambda: None,
             lambda seconds, then: self.waiting.append((seconds, then)),
         )
-        (self.judge,) = Judge.made
+        (self.judge,) = Worker.made
 
     def drag(self, place: np.ndarray) -> None:
         self.scene.nodes["/target"].position = place
@@ -106,15 +106,15 @@ class Held:
 
 @pytest.fixture(scope="module")
 def ready() -> Iterator[Ready]:
-    body = Body(SceneChoice(RunSpec("iiwa14-hold")))
+    body = SimulationRunner(SceneChoice(RunSpec("iiwa14-hold")))
     yield body.ready()
     body.close()
 
 
 @pytest.fixture
 def held(ready: Ready, monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], Held]:
-    Judge.made = []
-    monkeypatch.setattr(drag, "Judge", Judge)
+    Worker.made = []
+    monkeypatch.setattr(drag, "ReachabilityWorker", Worker)
     return lambda clamp: Held(ready, clamp)
 
 

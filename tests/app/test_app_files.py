@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
@@ -38,7 +38,7 @@ def server(tmp_path: Path) -> Iterator[PageServer]:
     running.close()
 
 
-def settings(learner: Learner) -> TorqueSettings:
+def settings(learner: SimulationClient) -> TorqueSettings:
     assert isinstance(learner.settings, TorqueSettings)
     return learner.settings
 

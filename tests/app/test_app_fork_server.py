@@ -9,13 +9,13 @@ import psutil
 import pytest
 from children import LONG, Start, born, gone, running
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link import forkserver
 from app.link.forkserver import ForkServer
 from app.link.process import wait_until
 
 
-def server_of(learner: Learner) -> ForkServer:
+def server_of(learner: SimulationClient) -> ForkServer:
     server = learner._spares.server
     assert server is not None
     return server

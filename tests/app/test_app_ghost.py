@@ -11,7 +11,7 @@ import numpy as np
 import psutil
 import pytest
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
@@ -20,7 +20,7 @@ from app.link.spares import Spares
 from app.link.wire import Wire
 from app.server.sessions import WORKER
 from app.worker.ghost import GhostBody
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.events import Push, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
@@ -34,19 +34,19 @@ def rings() -> int:
 
 
 @pytest.fixture
-def body() -> Iterator[Body]:
-    made = Body(SceneChoice(RunSpec("planar3-hold")))
+def body() -> Iterator[SimulationRunner]:
+    made = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     yield made
     made.close()
 
 
-def script_of(body: Body) -> Script:
+def script_of(body: SimulationRunner) -> Script:
     found = body.leader.script(body.session)
     assert found is not None
     return found
 
 
-def untimed(body: Body) -> np.ndarray:
+def untimed(body: SimulationRunner) -> np.ndarray:
     """All rows but what a clock measured."""
     layout = body.session.layout
     _, rows = body.block.since(0)
@@ -56,7 +56,7 @@ def untimed(body: Body) -> np.ndarray:
     return rows
 
 
-def test_a_ghost_has_the_rows_of_its_leader(body: Body) -> None:
+def test_a_ghost_has_the_rows_of_its_leader(body: SimulationRunner) -> None:
     """From the moment of leading on, although much had been changed before."""
     body.tick(20)
     for event in (Set("horizon", 3), Set("controller", "hqp"), Set("controller", "himpc")):
@@ -83,7 +83,7 @@ def test_a_ghost_has_the_rows_of_its_leader(body: Body) -> None:
         ghost.body.close()
 
 
-def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
+def test_leading_begins_anew_with_every_fresh_start(body: SimulationRunner) -> None:
     body.handle(Lead(True))
     assert script_of(body).begin is not None
     assert body.leader.waits(0.001)
@@ -108,11 +108,11 @@ def test_leading_begins_anew_with_every_fresh_start(body: Body) -> None:
 
 
 @pytest.fixture
-def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], Learner]]:
-    spares, started = Spares(WORKER, fork_server), list[Learner]()
+def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], SimulationClient]]:
+    spares, started = Spares(WORKER, fork_server), list[SimulationClient]()
 
-    def run(scene: str) -> Learner:
-        learner = Learner("token", SceneChoice(RunSpec(scene)), spares)
+    def run(scene: str) -> SimulationClient:
+        learner = SimulationClient("token", SceneChoice(RunSpec(scene)), spares)
         started.append(learner)
         assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
         return learner
@@ -123,7 +123,7 @@ def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], Learner]]:
     spares.close()
 
 
-def together(learner: Learner) -> bool:
+def together(learner: SimulationClient) -> bool:
     """Both stand at the same time, which is not the start."""
     status, ghost = learner.status, learner.ghost
     if status is None or ghost is None or ghost.status is None or status.running:
@@ -132,7 +132,7 @@ def together(learner: Learner) -> bool:
     return t is not None and t > 0.1 and ghost.look() == t
 
 
-def test_a_ghost_begins_follows_and_ends(start: Callable[[str], Learner]) -> None:
+def test_a_ghost_begins_follows_and_ends(start: Callable[[str], SimulationClient]) -> None:
     learner = start("planar3-hold")
     learner.start_ghost(Ghost("no preview", ("horizon=1",)))
     ghost = learner.ghost
@@ -158,7 +158,9 @@ def test_a_ghost_begins_follows_and_ends(start: Callable[[str], Learner]) -> Non
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)  # nothing holds it back
 
 
-def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Callable[[str], Learner]) -> None:
+def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(
+    start: Callable[[str], SimulationClient],
+) -> None:
     learner = start("planar3-hold")
     learner.start_ghost(Ghost("nonsense", ("horizn=3",)))
     notices: list[str] = []
@@ -168,11 +170,11 @@ def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Callable
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
 
 
-def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Learner]) -> None:
+def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], SimulationClient]) -> None:
     """Ready is on its way while the learner leaves: nobody else would free the memory it brings."""
     learner = start("planar3-hold")
     learner.close()
-    late = Body(SceneChoice(RunSpec("planar3-hold")))
+    late = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     here, there = (Wire(end) for end in socket.socketpair())
     there.send(late.ready())
     ready = here.recv()
@@ -184,7 +186,7 @@ def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Lea
         each.close()
 
 
-def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], Learner]) -> None:
+def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], SimulationClient]) -> None:
     learner = start("planar3-hold")
     learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
     ghost = learner.ghost

@@ -27,9 +27,9 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server import budget
 from app.server.budget import Bucket, Budget
-from app.server.crowd import Crowd
+from app.server.connection_limits import ConnectionLimits
 from app.server.door import Door
-from app.server.guard import FIRST_WORD, Guard, GuardedConnection
+from app.server.guard import FIRST_WORD, ConnectionGuard, GuardedConnection
 from app.server.passes import QUERY
 from app.server.server import PageServer
 from browsing.wire import camera, let_in, pack
@@ -328,7 +328,7 @@ def test_files_that_are_complete_hold_nothing() -> None:
 
 
 def test_the_silent_make_room() -> None:
-    crowd, left = Crowd(total=4, per_address=2), []
+    crowd, left = ConnectionLimits(total=4, per_address=2), []
     for key in "ab":
         assert crowd.enter(key, "1", lambda key=key: left.append(key))
     crowd.spoke("b")
@@ -345,7 +345,7 @@ def test_the_silent_make_room() -> None:
 
 
 def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
-    private.self_test(Guard(Door()))
+    private.self_test(ConnectionGuard(Door()))
     changed = web.serve
 
     def without(*given: Any, process_request: object = None, **keywords: Any) -> Any:
@@ -354,19 +354,19 @@ def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: py
     with monkeypatch.context() as patch:
         patch.setattr(web, "serve", without)  # the answer is no longer asked of us
         with pytest.raises(InputError, match=r"viser .*how it serves"):
-            private.self_test(Guard(Door()))
+            private.self_test(ConnectionGuard(Door()))
     for gone in ("FileTransferPart", "GuiUpdateMessage"):
         with monkeypatch.context() as patch:
             patch.delattr(_messages, gone)
             with pytest.raises(InputError, match=gone):
-                private.open_server("127.0.0.1", 0, Guard(Door()))
+                private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
     opened: list[Any] = []
     with monkeypatch.context() as patch:
         stop = private.stop
         patch.setattr(private, "stop", lambda server: (opened.append(server.get_port()), stop(server)))
         patch.setattr(private, "_OF_A_SERVER", ("gui._thread_pool",))
         with pytest.raises(InputError, match="_thread_pool"):
-            private.open_server("127.0.0.1", 0, Guard(Door()))
+            private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(f"http://127.0.0.1:{opened[0]}", timeout=5)
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.wire import packed
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from lessons.scenes.run_spec import RunSpec
 
 TICKS = 1000
@@ -35,7 +35,7 @@ def allocated() -> int:
 @pytest.mark.parametrize("scene", ["iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag"])
 def test_ticks_keep_nothing(scene: str) -> None:
     """80 bytes a tick are 5 MB a minute."""
-    body = Body(SceneChoice(RunSpec(scene)))
+    body = SimulationRunner(SceneChoice(RunSpec(scene)))
 
     def run() -> None:
         for _ in range(TICKS // 20):

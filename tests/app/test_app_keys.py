@@ -9,7 +9,7 @@ import pytest
 import viser
 
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from app.panels.widgets.command import CAMERA_KEYS
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
@@ -30,7 +30,7 @@ def test_the_cameras_keys_are_those_of_viser() -> None:
     [
         SceneChoice(RunSpec("planar3-hold")),
         SceneChoice(RunSpec("ridgeback-ur10-drag")),
-        SceneChoice.of_lesson(Exercise("deadlines")),
+        SceneChoice.of_lesson(LessonPlace("deadlines")),
     ],
     ids=["torque", "velocity", "lesson"],
 )

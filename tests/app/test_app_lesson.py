@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.exercise import Curve, Exercise, Lecture
-from app.link.messages import Command, Load, Play, Post, Predict, Ready, Refused, ResetAll, RunStep
-from app.worker.lesson.rows import BUCKETS, Record, thinned
-from app.worker.simulation import Body
+from app.link.exercise import Lecture, LessonPlace, SignalCurve
+from app.link.messages import Command, Load, LoadRefused, Play, Post, Predict, Ready, ResetAll, RunStep
+from app.worker.lesson.rows import BUCKETS, LessonRows, thinned
+from app.worker.simulation import SimulationRunner
 from himpc.telemetry import Layout
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
@@ -31,8 +31,8 @@ from robots import InputError
 class Learner:
     """A body, driven by hand; `lecture` is the last that was reported."""
 
-    def __init__(self, exercise: Exercise) -> None:
-        self.body = Body(SceneChoice.of_lesson(exercise))
+    def __init__(self, exercise: LessonPlace) -> None:
+        self.body = SimulationRunner(SceneChoice.of_lesson(exercise))
         self.lecture = self.look()
 
     def look(self) -> Lecture:
@@ -59,7 +59,7 @@ def learn() -> Iterator[Callable[[str, int], Learner]]:
     made: list[Learner] = []
 
     def start(lesson: str, place: int = 0) -> Learner:
-        made.append(Learner(Exercise(lesson, place)))
+        made.append(Learner(LessonPlace(lesson, place)))
         return made[-1]
 
     yield start
@@ -150,13 +150,13 @@ def test_what_is_refused_leaves_everything_as_it_was(learn: Start, monkeypatch: 
     learner.does(Predict(2.0))
     before = (body.choice, body.scene, body.run, body.lecturer, body.block, body.running, body.speed)
     for name, place in (("deadlines", 2), ("one-task", 0)):
-        choice = SceneChoice.of_lesson(Exercise(name, place))
+        choice = SceneChoice.of_lesson(LessonPlace(name, place))
         with monkeypatch.context() as patch:
             patch.setattr("app.worker.loaded.Lecturer", refuse)
             answer = body.handle(Load(choice))
-        assert isinstance(answer, Refused) and answer.sentence == "no lecturer here"
+        assert isinstance(answer, LoadRefused) and answer.sentence == "no lecturer here"
         mine = body.handle(Load(replace(choice, mine=("horizon",))))
-        assert isinstance(mine, Refused) and "horizon" in mine.sentence
+        assert isinstance(mine, LoadRefused) and "horizon" in mine.sentence
         after = (body.choice, body.scene, body.run, body.lecturer, body.block, body.running, body.speed)
         assert all(a is b for a, b in zip(after, before, strict=True))
     assert learner.look().answer == 2.0
@@ -170,12 +170,12 @@ def refuse(*_: object) -> None:
 def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -> None:
     learner = learn("a-redundant-arm", 0)
     block = learner.body.block
-    assert learner.body.handle(Load(SceneChoice.of_lesson(Exercise("a-redundant-arm", 2)))) is None
+    assert learner.body.handle(Load(SceneChoice.of_lesson(LessonPlace("a-redundant-arm", 2)))) is None
     assert learner.body.block is block
     lecture = learner.look()
     assert lecture.exercise.place == 2 and lecture.phase == "waiting"
     assert not learner.body.session.settings.levels[1].enabled  # the step's own settings
-    other = learner.body.handle(Load(SceneChoice.of_lesson(Exercise("one-task"))))
+    other = learner.body.handle(Load(SceneChoice.of_lesson(LessonPlace("one-task"))))
     assert isinstance(other, Ready)
 
 
@@ -188,8 +188,8 @@ def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
     solved = prepared(load_scene(run.scene, run.urdf), None, (*run.set, *challenge.solutions[0]))
     code = encode(state_of(replace(run, seed=3), solved.settings, lesson="deadlines", step=last))
     choice = SceneChoice.of_state(decode(code))
-    assert choice.exercise == Exercise("deadlines", last - 1) and choice.run.seed == 3
-    body = Body(choice)
+    assert choice.exercise == LessonPlace("deadlines", last - 1) and choice.run.seed == 3
+    body = SimulationRunner(choice)
     assert body.session.settings == solved.settings and not body.running
     body.handle(RunStep(fast=True))
     while not body.running:
@@ -258,21 +258,21 @@ def test_what_a_script_changes_is_undone_before_the_next_run(learn: Start) -> No
 
 def test_an_unknown_lesson_is_one_sentence() -> None:
     with pytest.raises(InputError, match="deadlines"):
-        SceneChoice.of_lesson(Exercise("deadline"))
+        SceneChoice.of_lesson(LessonPlace("deadline"))
 
 
 def test_thinning_keeps_every_spike() -> None:
     t = np.linspace(0.0, 1.0, 5000)
     values = np.sin(9 * t)
     values[777], values[3210], values[:40] = 50.0, -50.0, np.nan
-    curve = Curve(*thinned(t, values))
+    curve = SignalCurve(*thinned(t, values))
     assert len(curve.t) <= 2 * BUCKETS + 2 and 50.0 in curve.values and -50.0 in curve.values
     assert (np.diff(curve.t) >= 0).all()
 
 
 def test_a_record_grows_and_can_be_cut() -> None:
     layout = Layout(2, {"t": slice(0, 1), "x": slice(1, 2)}, (), (), ())
-    record = Record(layout, 3)
+    record = LessonRows(layout, 3)
     for k in range(10):
         record.add(np.array([0.1 * k, k]))
     assert record["x"][:, 0].tolist() == list(range(10))

@@ -15,14 +15,14 @@ from app.client.progress import Notebook
 from app.html.glossary import explained, words
 from app.html.markdown import rendered, rendered_line
 from app.html.text import figure, readable
-from app.link.exercise import Curve, Exercise, Lecture
+from app.link.exercise import Lecture, LessonPlace, SignalCurve
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.logarithmic import STEPS, place_of, value_at
 from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
-from lessons.replay.progress import Progress, progress_from
-from lessons.teaching.prediction import Grade, Value
+from lessons.replay.progress import LearnerProgress, progress_from
+from lessons.teaching.prediction import PredictionResult, Value
 
 CALLED = {
     "com": "centre of mass",
@@ -42,20 +42,22 @@ def test_every_kind_of_task_is_a_word_with_its_unit(kind: str) -> None:
 
 
 def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
-    progress = Progress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("deadlines", 40.0)
+    progress = (
+        LearnerProgress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("deadlines", 40.0)
+    )
     progress = progress.with_points("deadlines", 30.0)
     assert progress.best["deadlines"] == 40.0 and progress.next_place("deadlines", 4) == 1
     assert progress.next_place("one-task", 4) == 0
     assert progress_from(progress.dumped()) == progress
     for text in (None, "", "{", "[]", "3", '{"seen": 3, "best": []}', "[" * 100_000):
-        assert progress_from(text) == Progress()
+        assert progress_from(text) == LearnerProgress()
     hostile = '{"seen": {"deadlines": [0, "1", -2, 1e9, true], "<b>": [1]}, "best": {"deadlines": 1e400}}'
-    assert progress_from(hostile) == Progress({"deadlines": frozenset({0})})
+    assert progress_from(hostile) == LearnerProgress({"deadlines": frozenset({0})})
 
 
 def test_a_notebook_saves_only_what_is_new() -> None:
     saved: list[str] = []
-    notebook = Notebook(Progress(), saved.append)
+    notebook = Notebook(LearnerProgress(), saved.append)
     for _ in range(3):
         notebook.note(notebook.progress.with_step("one-task", 1))
     assert len(saved) == 1 and progress_from(saved[0]) == notebook.progress
@@ -101,9 +103,9 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     drawn = scale(0.1, 100.0, 5.0, 16.0, 1.5, "mm")
     assert "your guess 5 mm" in drawn and "measured 16 mm" in drawn
     assert "measured" not in scale(0.1, 100.0, 5.0, math.nan, 1.5, "mm")
-    curve = Curve(np.array([0.0, 0.5, 1.0]), np.array([math.nan, math.inf, 3.0]))
+    curve = SignalCurve(np.array([0.0, 0.5, 1.0]), np.array([math.nan, math.inf, 3.0]))
     assert "nan" not in chart("error", "mm", curve, curve, [Bound(1.0, "<b>")], 1.0)
-    nothing = Curve(np.array([0.0]), np.array([math.nan]))
+    nothing = SignalCurve(np.array([0.0]), np.array([math.nan]))
     assert chart("error", "mm", nothing, None, [], 1.0) == ""
     assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")
 
@@ -127,14 +129,14 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
     graded = prediction.low * 2
     asking.show(
         Lecture(
-            exercise=Exercise("one-task"),
+            exercise=LessonPlace("one-task"),
             phase="done",
             attempt=1,
             t=1.0,
             duration=1.0,
             answer=graded,
             truth=graded,
-            grade=Grade(1.0, "Right."),
+            grade=PredictionResult(1.0, "Right."),
         )
     )
     guess = re.findall(r">your guess ([^<]*)", picture.content)

@@ -13,13 +13,13 @@ import pinocchio as pin
 import pytest
 
 from app.client.decimated import KEPT, WINDOW, History
-from app.client.poses import Frame, Tape
-from app.client.rows import MOST, Record
-from app.client.score import Score
+from app.client.pose_history import Frame, PoseHistory
+from app.client.rows import MOST, RowHistory
+from app.client.run_statistics import RunStatistics
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.view.pull import Grip, pulled, push_at
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from himpc.telemetry import Layout
 from lessons.events import Push
 from lessons.plots.draw import draw
@@ -33,14 +33,14 @@ from robots import Plant, PlantSettings, load_robot
 
 
 @pytest.fixture(scope="module")
-def body() -> Iterator[Body]:
-    made = Body(SceneChoice(RunSpec("planar3-circle")))
+def body() -> Iterator[SimulationRunner]:
+    made = SimulationRunner(SceneChoice(RunSpec("planar3-circle")))
     yield made
     made.close()
 
 
 @pytest.fixture
-def layout(body: Body) -> Layout:
+def layout(body: SimulationRunner) -> Layout:
     return body.session.layout
 
 
@@ -60,7 +60,7 @@ def frame(t: float, x: float = 0.0, turn: float = 0.0) -> Frame:
 
 
 def test_the_tape_shows_any_moment_of_the_last_minute() -> None:
-    tape = Tape()
+    tape = PoseHistory()
     assert tape.at(1.0) is None and tape.span == (0.0, 0.0)
     for k in range(30 * 90):
         tape.add(frame(k / 30, x=k / 30, turn=0.02 * k))
@@ -75,7 +75,7 @@ def test_the_tape_shows_any_moment_of_the_last_minute() -> None:
 
 
 def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
-    tape = Tape()
+    tape = PoseHistory()
     for k in range(3000):
         tape.add(frame(1e-3 * k))
     assert len(list(tape.between(-1.0, 10.0))) < 3.0 * 30 + 3
@@ -88,7 +88,7 @@ def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
 @pytest.mark.parametrize("rate", [30.0, 10.0])
 def test_the_tape_holds_no_more_than_a_minute(rate: float) -> None:
     """Also where a busy machine shows fewer frames than it would keep."""
-    tape = Tape()
+    tape = PoseHistory()
     lengths: list[int] = []
     for k in range(round(150 * rate)):
         tape.add(frame(k / rate))
@@ -156,7 +156,7 @@ def test_a_period_longer_than_a_bucket_leaves_no_gaps(layout: Layout) -> None:
 
 
 def test_the_score_counts_every_tick_of_the_run(layout: Layout) -> None:
-    score = Score(layout)
+    score = RunStatistics(layout)
     assert score.result() is None
     name = layout.tasks[0].name
     for start in (0, 100):
@@ -165,18 +165,18 @@ def test_the_score_counts_every_tick_of_the_run(layout: Layout) -> None:
         rows[:, layout.fields["tau_upper"]], rows[:, layout.fields["tau_lower"]] = 2.0, -4.0
         rows[:, layout.fields["tau_demand"].start] = -3.0
         rows[:, layout.fields["step_us"]] = 500.0
-        score.take(rows)
+        score.append_rows(rows)
     found = score.result()
     assert found is not None and found.rmse[name] == pytest.approx(np.sqrt(5.0))
     assert found.torque_share == 0.75 and found.unsolved == 200 and found.seconds == pytest.approx(0.199)
     assert found.step_ms == pytest.approx(0.5, rel=0.03) and found.slow_ms == pytest.approx(0.5, rel=0.03)
-    score.take(rows_at(layout, np.zeros(1), "unsolved", np.zeros(1)))
+    score.append_rows(rows_at(layout, np.zeros(1), "unsolved", np.zeros(1)))
     found = score.result()
     assert found is not None and found.unsolved == 0 and found.rmse[name] == 0.0
 
 
 def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
-    record = Record(layout)
+    record = RowHistory(layout)
     for minute in range(8):
         times = 60.0 * minute + 0.002 * np.arange(30_000)
         record.take(rows_at(layout, times, "step_us", times**2))
@@ -192,8 +192,8 @@ def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
 
 
 @pytest.fixture(scope="module")
-def run(body: Body) -> Recorded:
-    record = Record(body.session.layout)
+def run(body: SimulationRunner) -> Recorded:
+    record = RowHistory(body.session.layout)
     history = History(body.block, body.session.layout, record.take)
     for _ in range(6):
         body.tick(50)
@@ -201,7 +201,7 @@ def run(body: Body) -> Recorded:
     return Recorded(record.layout, record.whole())
 
 
-def test_files_hold_what_was_recorded(body: Body, run: Recorded) -> None:
+def test_files_hold_what_was_recorded(body: SimulationRunner, run: Recorded) -> None:
     robot, now = body.session.robot, body.session.settings
     data = np.load(io.BytesIO(as_npz(named(robot, now, run.layout, run.rows, {"scene": "x"}))))
     assert np.allclose(np.diff(data["t"]), 0.01) and len(data["t"]) == 30

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.messages import Lead, Load, Post, Ready, Refused
+from app.link.messages import Lead, Load, LoadRefused, Post, Ready
 from app.link.process import wait_until
 from app.server.server import PageServer
 from app.worker.ghost import GhostBody
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
 from lessons.events import Reset, Set
@@ -38,13 +38,13 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def body(file: Path) -> Iterator[Body]:
-    made = Body(SceneChoice.starting("planar3-hold", controller=str(file)))
+def body(file: Path) -> Iterator[SimulationRunner]:
+    made = SimulationRunner(SceneChoice.starting("planar3-hold", controller=str(file)))
     yield made
     made.close()
 
 
-def after(body: Body, condition: Callable[[], bool]) -> bool:
+def after(body: SimulationRunner, condition: Callable[[], bool]) -> bool:
     """Whether something comes true while the body runs and reports."""
 
     def looked() -> bool:
@@ -54,7 +54,7 @@ def after(body: Body, condition: Callable[[], bool]) -> bool:
     return wait_until(looked, LONG, period=0.05)
 
 
-def test_own_code_that_is_saved_runs(body: Body, file: Path) -> None:
+def test_own_code_that_is_saved_runs(body: SimulationRunner, file: Path) -> None:
     body.tick(20)
     own = body.status().own
     assert own is not None
@@ -67,7 +67,7 @@ def test_own_code_that_is_saved_runs(body: Body, file: Path) -> None:
     assert not body.session.failure
 
 
-def test_own_code_that_is_wrong_leaves_what_ran_before(body: Body, file: Path) -> None:
+def test_own_code_that_is_wrong_leaves_what_ran_before(body: SimulationRunner, file: Path) -> None:
     body.tick(20)
     body.status()
     file.write_text("def torque(now)\n    return 1\n")
@@ -83,7 +83,7 @@ def test_own_code_that_is_wrong_leaves_what_ran_before(body: Body, file: Path) -
     assert found.fault is None
 
 
-def test_own_code_that_fails_can_be_reset(body: Body, file: Path) -> None:
+def test_own_code_that_fails_can_be_reset(body: SimulationRunner, file: Path) -> None:
     body.tick(20)
     body.status()
     file.write_text("def torque(now):\n    return now.q[7]\n")
@@ -100,7 +100,7 @@ def test_own_code_that_fails_can_be_reset(body: Body, file: Path) -> None:
     assert found.fault is None
 
 
-def test_own_code_has_a_ghost_beside_it(body: Body, file: Path) -> None:
+def test_own_code_has_a_ghost_beside_it(body: SimulationRunner, file: Path) -> None:
     """The lab's controller as the ghost of one's own, and the other way round."""
     body.handle(Lead(True))
     begin = body.leader.script(body.session)
@@ -114,7 +114,9 @@ def test_own_code_has_a_ghost_beside_it(body: Body, file: Path) -> None:
         ghost.body.close()
 
 
-def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(body: Body, file: Path) -> None:
+def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(
+    body: SimulationRunner, file: Path
+) -> None:
     body.handle(Post(Set("controller", "himpc")))
     body.handle(Post(Set("controller", str(file))))
     body.tick(20)
@@ -125,12 +127,12 @@ def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(body:
     body.tick(1)
     assert "--controller FILE.py" in body.session.notices[0]
     with pytest.raises(InputError):
-        Body(SceneChoice(RunSpec("planar3-hold", set=(f"controller={file}",))))
+        SimulationRunner(SceneChoice(RunSpec("planar3-hold", set=(f"controller={file}",))))
     with pytest.raises(InputError, match="scene"):
-        Body(SceneChoice(RunSpec(str(file))))
+        SimulationRunner(SceneChoice(RunSpec(str(file))))
 
 
-def test_own_code_is_known_by_its_content(body: Body, file: Path) -> None:
+def test_own_code_is_known_by_its_content(body: SimulationRunner, file: Path) -> None:
     """A code names the file and what is in it; it opens for whoever started with the same one."""
     state = state_of(RunSpec("planar3-hold"), body.session.settings_now)
     code = encode(state)
@@ -181,9 +183,9 @@ def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
     scene.write_text(text_of("scene", None, "scene.py"))
     lesson.write_text(text_of("lesson", None, "lesson.py"))
     for choice in (SceneChoice.starting(str(scene)), SceneChoice.opening(str(lesson))):
-        body = Body(choice)
+        body = SimulationRunner(choice)
         body.tick(3)
-        assert not isinstance(body.ready(), Refused)
+        assert not isinstance(body.ready(), LoadRefused)
         body.close()
 
 
@@ -193,7 +195,7 @@ def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> No
     path = tmp_path / "reach.py"
     path.write_text(text_of("task", None, "reach.py").replace('name="reach"', 'name="reach", frame="link_4"'))
     choice = SceneChoice.starting("iiwa14-hold", tasks=(str(path),))
-    body = Body(choice)
+    body = SimulationRunner(choice)
     try:
         assert body.ready().left_out == ()
         elsewhere = replace(choice, run=replace(choice.run, scene="planar3-hold"))
@@ -205,7 +207,7 @@ def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> No
 
         stack = f'stack=[{{"task": "{path}"}}]'
         refused = body.handle(Load(replace(elsewhere, run=elsewhere.run.but(stack))))
-        assert isinstance(refused, Refused) and "link_4" in refused.sentence
+        assert isinstance(refused, LoadRefused) and "link_4" in refused.sentence
         again = body.handle(Load(choice))
         assert isinstance(again, Ready) and again.left_out == ()
         assert own_tasks(body) == [str(path)]
@@ -213,6 +215,6 @@ def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> No
         body.close()
 
 
-def own_tasks(body: Body) -> list[str]:
+def own_tasks(body: SimulationRunner) -> list[str]:
     assert isinstance(body.session.settings, TorqueSettings)
     return list(dict(body.session.settings.own_tasks))

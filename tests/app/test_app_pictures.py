@@ -12,7 +12,7 @@ from lxml import etree
 
 from app.client.watching import Watching
 from app.html.palette import LEVELS
-from app.link.inside import Inside, Watch
+from app.link.inside import Inside, InsideRequest
 from app.panels.inside import matrix as hessian
 from app.panels.inside import plane_svg, spectrum
 from lessons.events import MoveTarget
@@ -112,11 +112,11 @@ def test_eigenvalues_stand_on_the_real_axis() -> None:
 def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr("app.client.watching.time.monotonic", lambda: now[0])
-    sent: list[Watch] = []
+    sent: list[InsideRequest] = []
     watching = Watching(sent.append)
-    watching.ask(Watch(), None)
+    watching.ask(InsideRequest(), None)
     assert not sent  # nobody looks: nothing is asked
-    wish = Watch(plane=(0, 1))
+    wish = InsideRequest(plane=(0, 1))
     for _ in range(3):
         watching.ask(wish, None)
     assert sent == [wish]
@@ -125,5 +125,5 @@ def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytes
     assert sent == [wish]
     watching.ask(wish, None)  # the run began anew
     assert sent == [wish, wish]
-    watching.ask(Watch(), Inside())
-    assert sent[-1] == Watch()
+    watching.ask(InsideRequest(), Inside())
+    assert sent[-1] == InsideRequest()

@@ -11,11 +11,11 @@ import numpy as np
 import psutil
 import pytest
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from app.link.forkserver import ForkServer
-from app.link.messages import Load, Play, Post, Speed, Step
+from app.link.messages import Load, Play, Post, Speed, StepTicks
 from app.link.process import wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Sessions
@@ -33,11 +33,11 @@ def spares(fork_server: ForkServer | None) -> Iterator[Spares]:
 
 
 @pytest.fixture
-def start(spares: Spares) -> Iterator[Callable[[str], Learner]]:
-    started: list[Learner] = []
+def start(spares: Spares) -> Iterator[Callable[[str], SimulationClient]]:
+    started: list[SimulationClient] = []
 
-    def run(scene: str) -> Learner:
-        learner = Learner(f"token{len(started)}", SceneChoice(RunSpec(scene)), spares)
+    def run(scene: str) -> SimulationClient:
+        learner = SimulationClient(f"token{len(started)}", SceneChoice(RunSpec(scene)), spares)
         started.append(learner)
         assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
         return learner
@@ -47,23 +47,23 @@ def start(spares: Spares) -> Iterator[Callable[[str], Learner]]:
         learner.close()
 
 
-def ticks(learner: Learner) -> int:
+def ticks(learner: SimulationClient) -> int:
     return 0 if learner.status is None else learner.status.ticks
 
 
-def tip(learner: Learner) -> np.ndarray:
+def tip(learner: SimulationClient) -> np.ndarray:
     poses = learner.read(lambda block, _: block.poses())
     assert poses is not None
     return poses[-1, :3]
 
 
-def test_play_pause_step_speed_reset(start: Callable[[str], Learner]) -> None:
+def test_play_pause_step_speed_reset(start: Callable[[str], SimulationClient]) -> None:
     learner = start("planar3-hold")
     learner.send(Play(False))
     assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
     held = ticks(learner)
     assert not wait_until(lambda: ticks(learner) != held, 0.4)
-    learner.send(Step())
+    learner.send(StepTicks())
     assert wait_until(lambda: ticks(learner) == held + 1, LONG)
     learner.send(Speed(0.1))
     learner.send(Post(Set("horizon", 8)))
@@ -75,31 +75,33 @@ def test_play_pause_step_speed_reset(start: Callable[[str], Learner]) -> None:
     assert learner.status is not None and learner.status.t < 5.0
 
 
-def _factor(learner: Learner) -> float:
+def _factor(learner: SimulationClient) -> float:
     return 0.0 if learner.status is None else learner.status.real_time_factor
 
 
-def test_a_page_that_shows_the_scene_before_keeps_its_settings(start: Callable[[str], Learner]) -> None:
+def test_a_page_that_shows_the_scene_before_keeps_its_settings(
+    start: Callable[[str], SimulationClient],
+) -> None:
     """Until it has built the next scene, whose settings may be of another kind altogether."""
     learner = start("planar3-hold")
     learner.send(Post(Set("horizon", 8)))
     before = learner.ready
     assert before is not None
     assert wait_until(lambda: learner.settings_of(before).horizon == 8, LONG)  # pyright: ignore
-    learner.send(Load(SceneChoice.of_lesson(Exercise("first-hold-then-reach"))))
+    learner.send(Load(SceneChoice.of_lesson(LessonPlace("first-hold-then-reach"))))
     assert wait_until(lambda: learner.ready is not before, LONG)
     now = learner.ready
     assert now is not None
     assert learner.settings_of(before) is before.settings
     assert learner.settings_of(now) is learner.settings is not before.settings
     assert learner.choice_of(before).exercise is None
-    later = Exercise("first-hold-then-reach", 1)
+    later = LessonPlace("first-hold-then-reach", 1)
     learner.send(Load(SceneChoice.of_lesson(later)))
     assert wait_until(lambda: learner.choice_of(now).exercise == later, LONG)
     assert learner.ready is now
 
 
-def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], Learner]) -> None:
+def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], SimulationClient]) -> None:
     one, two = start("iiwa14-hold"), start("iiwa14-hold")
     assert one.pid != two.pid
     before = tip(two).copy()
@@ -114,14 +116,14 @@ def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], Learner])
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="Linux only")
-def test_a_simulation_lets_the_ticks_of_another_end(start: Callable[[str], Learner]) -> None:
+def test_a_simulation_lets_the_ticks_of_another_end(start: Callable[[str], SimulationClient]) -> None:
     pid = start("planar3-hold").pid
     assert pid is not None
     assert os.sched_getscheduler(pid) == os.SCHED_BATCH
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
-def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], Learner]) -> None:
+def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], SimulationClient]) -> None:
     learner = start("planar3-hold")
     pid = learner.pid
     assert pid is not None
@@ -135,7 +137,7 @@ def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], Learner
 
 
 def test_a_bad_scene_is_a_sentence_and_the_process_waits(spares: Spares) -> None:
-    learner = Learner("token", SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")), spares)
+    learner = SimulationClient("token", SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")), spares)
     refusals: list[str] = []
     try:
         assert wait_until(lambda: bool(refusals.extend(learner.take_messages()[0]) or refusals), LONG)
@@ -144,7 +146,7 @@ def test_a_bad_scene_is_a_sentence_and_the_process_waits(spares: Spares) -> None
         learner.close()
 
 
-def test_no_child_and_no_memory_is_left(start: Callable[[str], Learner]) -> None:
+def test_no_child_and_no_memory_is_left(start: Callable[[str], SimulationClient]) -> None:
     learner = start("planar3-hold")
     pid, before = learner.pid, rings()
     assert pid is not None and before > 0
@@ -158,7 +160,7 @@ def test_a_lent_fork_server_outlives_who_used_it(fork_server: ForkServer | None)
         pytest.skip("processes are not forked here")
     for _ in range(2):
         spares = Spares(WORKER, fork_server)
-        learner = Learner("token", SceneChoice(RunSpec("planar3-hold")), spares)
+        learner = SimulationClient("token", SceneChoice(RunSpec("planar3-hold")), spares)
         assert wait_until(lambda one=learner: ticks(one) > 20, LONG)
         pid = learner.pid
         assert pid is not None and psutil.Process(pid).ppid() == fork_server.pid

@@ -16,7 +16,7 @@ import pytest
 from children import LONG, Start, born, gone, running
 
 from app.client import trouble
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.messages import Load, Play, Post, Told
@@ -66,7 +66,7 @@ def test_nobody_waits_for_a_stopped_child(start: Start, monkeypatch: pytest.Monk
     assert wait_until(lambda: gone(pid), LONG)
 
 
-def flood(learner: Learner) -> None:
+def flood(learner: SimulationClient) -> None:
     for _ in range(20 * MOST):
         learner.send(Post(MoveTarget("position", (0.5, 0.1, 0.0))))
 
@@ -165,7 +165,7 @@ def test_a_question_to_who_dies_is_answered_at_once(start: Start) -> None:
 PAGE = """
 import sys, time, os, signal
 sys.path[:0] = {paths!r}
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
 from app.link.process import wait_until
@@ -174,7 +174,7 @@ spares = Spares("stubborn")
 if {spawn}:
     spares._forks = False
 names = ("asleep", "busy", "idle", "stopped")
-learners = [Learner(name, SceneChoice(RunSpec(name)), spares) for name in names]
+learners = [SimulationClient(name, SceneChoice(RunSpec(name)), spares) for name in names]
 assert wait_until(lambda: all(each.pid for each in learners), 60.0)
 print(*(each.pid for each in learners), *([] if {spawn} else [spares.server.pid]), flush=True)
 time.sleep(1e6)

@@ -12,7 +12,7 @@ import pytest
 from viser import _messages
 
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise
+from app.link.exercise import LessonPlace
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
@@ -34,7 +34,7 @@ NAMES = (
     [
         SceneChoice(RunSpec("planar3-hold")),
         SceneChoice(RunSpec("ridgeback-ur10-drag")),
-        SceneChoice.of_lesson(Exercise("deadlines")),
+        SceneChoice.of_lesson(LessonPlace("deadlines")),
     ],
     ids=["torque", "velocity", "lesson"],
 )

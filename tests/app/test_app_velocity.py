@@ -11,12 +11,12 @@ import pytest
 from app.client.decimated import History
 from app.html.text import free_name
 from app.link.choice import SceneChoice
-from app.link.messages import Play, Post, Ready, ResetAll, Status, Step
+from app.link.messages import Play, Post, Ready, ResetAll, Status, StepTicks
 from app.link.mission_view import MissionView
 from app.server.server import PageServer
 from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from himpc.rotation import exp3, from_quaternion, log3, quaternion
 from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
@@ -27,19 +27,19 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 RINGS = "/targets/orientation/control"
 
 
-def opened(scene: str) -> Iterator[Body]:
-    made = Body(SceneChoice(RunSpec(scene)))
+def opened(scene: str) -> Iterator[SimulationRunner]:
+    made = SimulationRunner(SceneChoice(RunSpec(scene)))
     yield made
     made.close()
 
 
 @pytest.fixture
-def body() -> Iterator[Body]:
+def body() -> Iterator[SimulationRunner]:
     yield from opened("ridgeback-ur10-drag")
 
 
 @pytest.fixture
-def handover() -> Iterator[Body]:
+def handover() -> Iterator[SimulationRunner]:
     yield from opened("ridgeback-ur10-handover")
 
 
@@ -48,12 +48,12 @@ def mission(status: Status) -> MissionView:
     return status.mission
 
 
-def error(body: Body, role: str) -> float:
+def error(body: SimulationRunner, role: str) -> float:
     row = body.block.since(0)[1][-1]
     return float(np.linalg.norm(row[body.session.layout.fields[f"error/{role}"]]))
 
 
-def test_reports_survive_the_pipe(body: Body) -> None:
+def test_reports_survive_the_pipe(body: SimulationRunner) -> None:
     ready: Ready = pickle.loads(pickle.dumps(body.ready()))
     assert [(task.name, task.kind, task.axes) for task in ready.tasks] == [
         ("ee", "position", "xyz"),
@@ -71,7 +71,7 @@ def test_reports_survive_the_pipe(body: Body) -> None:
     assert [row.state for row in mission(status).rows] == ["active", "active"]
 
 
-def test_the_robot_moves_between_two_control_steps(body: Body) -> None:
+def test_the_robot_moves_between_two_control_steps(body: SimulationRunner) -> None:
     """Ten small motions and then one row, not one jump of a tenth of a second."""
     body.handle(Post(MoveTarget("base", (0.5, 0.5))))
     body.tick(5)
@@ -87,7 +87,7 @@ def test_the_robot_moves_between_two_control_steps(body: Body) -> None:
     assert (steps > 0).all() and steps.max() < 0.015
 
 
-def test_a_pause_stands_between_two_control_steps(body: Body) -> None:
+def test_a_pause_stands_between_two_control_steps(body: SimulationRunner) -> None:
     """The step that was begun is carried out; then edits and a reset show though no time passes."""
     body.handle(Post(MoveTarget("base", (0.5, 0.5))))
     for _ in range(14):
@@ -107,7 +107,7 @@ def test_a_pause_stands_between_two_control_steps(body: Body) -> None:
     assert [row.name for row in mission(status).rows] == ["base", "ee"]
     assert np.allclose(status.targets["ee"], (1.0, 0.5, 0.8))
     assert len(status.notices) == 1 and "horizon" in status.notices[0]
-    body.handle(Step())
+    body.handle(StepTicks())
     assert body.take_steps() == 1
     body.tick()
     assert body.session.t == pytest.approx(0.3)
@@ -118,14 +118,14 @@ def test_a_pause_stands_between_two_control_steps(body: Body) -> None:
     assert body.running and body.session.settings.horizon == 10
 
 
-def test_a_step_while_running_pauses_first(body: Body) -> None:
+def test_a_step_while_running_pauses_first(body: SimulationRunner) -> None:
     for _ in range(3):
         body.advance()
-    body.handle(Step())
+    body.handle(StepTicks())
     assert not body.running and body.ticks == 1 and body.take_steps() == 1
 
 
-def test_the_base_stops_where_the_arm_is_stretched_until_it_comes_first(body: Body) -> None:
+def test_the_base_stops_where_the_arm_is_stretched_until_it_comes_first(body: SimulationRunner) -> None:
     body.handle(Post(MoveTarget("base", (-1.5, 0.0))))
     worst = 0.0
     for _ in range(60):
@@ -138,7 +138,7 @@ def test_the_base_stops_where_the_arm_is_stretched_until_it_comes_first(body: Bo
     assert body.status().notices == ()
 
 
-def test_the_list_follows_the_mission(handover: Body) -> None:
+def test_the_list_follows_the_mission(handover: SimulationRunner) -> None:
     """Events change it, people move with their tasks and keep what they were given."""
     before = mission(handover.status())
     assert [row.name for row in before.rows] == ["base 1", "ee 1", "base 2", "ee 2"]
@@ -159,7 +159,7 @@ def test_the_list_follows_the_mission(handover: Body) -> None:
     assert not after.done
 
 
-def test_a_role_without_an_open_task_has_no_target(handover: Body) -> None:
+def test_a_role_without_an_open_task_has_no_target(handover: SimulationRunner) -> None:
     for name in ("base 1", "base 2"):
         handover.handle(Post(RemoveTask(name)))
     handover.tick()
@@ -170,7 +170,7 @@ def test_a_role_without_an_open_task_has_no_target(handover: Body) -> None:
     assert first is not None and first.name == "ee 1"
 
 
-def test_what_a_kind_does_not_know_is_a_sentence(body: Body) -> None:
+def test_what_a_kind_does_not_know_is_a_sentence(body: SimulationRunner) -> None:
     """Pushes at velocity level, missions at torque level."""
     body.handle(Post(Push("base", (10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.1)))
     body.tick()
@@ -232,7 +232,7 @@ def test_a_fast_simulation_may_owe_as_much_real_time_as_a_slow_one() -> None:
     assert pacer.due(5.0, 0.01) == round(10.0 * BACKLOG / 0.01) and pacer.capped(5.0)
 
 
-def test_a_row_counts_until_the_next_one_comes(body: Body) -> None:
+def test_a_row_counts_until_the_next_one_comes(body: SimulationRunner) -> None:
     """At 10 Hz a bucket of the plots in two has no row: the curve has no holes, and looking back finds it."""
     body.tick(30)
     layout = body.session.layout
@@ -247,5 +247,5 @@ def test_a_row_counts_until_the_next_one_comes(body: Body) -> None:
     assert np.isnan(history.window(8.0).columns(t)[-1]).all()
 
 
-def history_times(body: Body) -> np.ndarray:
+def history_times(body: SimulationRunner) -> np.ndarray:
     return body.block.since(0)[1][:, body.session.layout.fields["t"]][:, 0]

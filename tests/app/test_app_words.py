@@ -23,7 +23,7 @@ from app.server import words
 from app.server.server import PageServer
 from app.view.camera import look, turn
 from app.view.robot import aim
-from app.worker.simulation import Body
+from app.worker.simulation import SimulationRunner
 from benchmarks.findings import StandardError
 from benchmarks.hostile import roam
 from browsing.wire import Wire, camera, eventually
@@ -212,9 +212,9 @@ def test_a_thing_that_goes_while_it_is_dragged_is_told_of(capfd: pytest.CaptureF
 
 
 def test_a_paused_lesson_says_how_to_go_on() -> None:
-    from app.link.exercise import Exercise
+    from app.link.exercise import LessonPlace
 
-    server = PageServer(SceneChoice.of_lesson(Exercise("one-task")), port=0, max_sessions=1)
+    server = PageServer(SceneChoice.of_lesson(LessonPlace("one-task")), port=0, max_sessions=1)
     try:
         with Wire(server.link) as page:
             assert eventually(lambda: page.find("Run this step") is not None)
@@ -330,7 +330,7 @@ def test_a_control_that_goes_before_it_is_written_is_no_news() -> None:
 
 def test_the_newest_row_does_not_keep_all_that_came_with_it() -> None:
     """Up to 12 MB of each robot, until the next look."""
-    body = Body(SceneChoice(RunSpec("planar3-hold")))
+    body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     history = History(body.block, body.session.layout)
     body.tick(50)
     history.pull()

@@ -69,9 +69,9 @@ def test_a_check_that_fails_is_exit_1(
 ) -> None:
     """Ran, but a claim does not hold: the command says which and by what."""
     from lessons import papers
-    from lessons.papers.item import Check, Item, Section
+    from lessons.papers.item import Item, PaperCheck, Section
 
-    section = Section(checks=(Check("the moon is of cheese", 0.0, False),))
+    section = Section(checks=(PaperCheck("the moon is of cheese", 0.0, False),))
     item = Item("moon", "", "", lambda quick: (), lambda results, quick: section)
     monkeypatch.setitem(papers.ITEMS, "moon", item)
     assert main(["reproduce", "moon", "--out", str(tmp_path)]) == 1

@@ -17,7 +17,7 @@ import pytest
 from submissions import SUBMISSIONS
 
 from lessons.cluster import on_cluster
-from lessons.parallel import Failed
+from lessons.parallel import FailedJob
 from robots import InputError
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
@@ -109,7 +109,7 @@ def test_a_worker_that_dies_costs_its_item_a_retry(cluster: Any, tmp_path: Path)
         assert dict(spread(_dies_once, items)) == {value: value for value in range(6)}
         outcomes = dict(spread(_dies_at_one, list(range(4))))
     assert [outcomes[value] for value in (0, 2, 3)] == [0, 2, 3]
-    assert isinstance(outcomes[1], Failed)
+    assert isinstance(outcomes[1], FailedJob)
 
 
 def _dies_once(item: tuple[Path, int]) -> int:

@@ -12,7 +12,7 @@ from lessons.events import MoveTarget, Reset, Set
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
-from lessons.session.deadline import Outbox
+from lessons.session.deadline import DelayedTorque
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 
@@ -41,7 +41,7 @@ def with_settings(scene: TorqueScene, *assignments: str) -> TorqueScene:
 )
 def test_a_queue_of_one(late: list[int], applied: list[int]) -> None:
     """Tick k finds the torque k + 1; before the first tick the torque 0 acts."""
-    outbox = Outbox()
+    outbox = DelayedTorque()
     found = [
         float(outbox.applied(np.array([k + 1.0]), bool(missed), np.zeros(1))[0])
         for k, missed in enumerate(late)

@@ -14,13 +14,13 @@ from himpc.qp import solve_qp
 from lessons.events import MoveLevel, MoveTarget, Set
 from lessons.geometry.ellipsoids import ellipsoids
 from lessons.geometry.look import plane_of, tick_of
-from lessons.geometry.plane import Allowed, Box, Plane, best, cut
+from lessons.geometry.plane import Allowed, Plane, TorqueBox, best, cut
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.session.torque import TorqueSession
 from robots import InputError
 
 JOINTS = (0, 1)
-WITHOUT = Box(np.full(2, -np.inf), np.full(2, np.inf), ((None, None), (None, None)))
+WITHOUT = TorqueBox(np.full(2, -np.inf), np.full(2, np.inf), ((None, None), (None, None)))
 
 
 def running(
@@ -181,7 +181,7 @@ def test_best_agrees_with_a_solver_on_random_problems() -> None:
         root = rng.normal(size=(2, 2))
         P, centre = root @ root.T + 0.05 * np.eye(2), rng.normal(size=2) * 2
         lower = -rng.uniform(0.1, 1.0, 2)
-        box = Box(lower, lower + rng.uniform(0.2, 2.0, 2), ((None, None), (None, None)))
+        box = TorqueBox(lower, lower + rng.uniform(0.2, 2.0, 2), ((None, None), (None, None)))
         d = int(rng.integers(0, 3))
         at = rng.uniform(box.lower, box.upper)
         span = np.linalg.qr(rng.normal(size=(2, 2)))[0][:, :d]
@@ -195,7 +195,7 @@ def test_best_agrees_with_a_solver_on_random_problems() -> None:
 
 
 def test_what_cannot_be_is_nothing() -> None:
-    box = Box(-np.ones(2), np.ones(2), ((None, None), (None, None)))
+    box = TorqueBox(-np.ones(2), np.ones(2), ((None, None), (None, None)))
     outside = Allowed(np.array([3.0, 0.0]), np.array([[0.0], [1.0]]))
     assert outside.segment(box) is None and best(np.eye(2), np.zeros(2), outside, box) is None
     assert best(np.eye(2), np.zeros(2), Allowed(None, np.eye(2)), box) is None

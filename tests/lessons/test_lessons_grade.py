@@ -18,7 +18,7 @@ from himpc.controllers.answers import OwnFault
 from himpc.controllers.view import View
 from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.exercises.folder import Row, grade_folder
-from lessons.exercises.grade import WITHIN, Grade, Line, Submission, grade, grade_apart, judged_by
+from lessons.exercises.grade import WITHIN, CheckResult, Grade, Submission, grade, grade_apart, judged_by
 from lessons.own.files import Source, execute, sentence
 from lessons.own.kinds import law_of
 from lessons.parallel import on_cores, one_by_one
@@ -94,7 +94,7 @@ class Near:
         return told
 
 
-def here(text: str, exercise: str, about: str = "") -> tuple[Line, ...]:
+def here(text: str, exercise: str, about: str = "") -> tuple[CheckResult, ...]:
     """The lines of the checks about something, without the process of its own."""
     whole = load_exercise(exercise)
     chosen = replace(whole, checks=lambda seed: tuple(c for c in whole.checks(seed) if about in c.text))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lessons.experiments.jobs import Job, Results, Run, Work, perform_all
+from lessons.experiments.jobs import Job, JobResult, Results, Work, perform_all
 from lessons.papers import ITEMS
 from lessons.papers.himpc_paper.accuracy import model_errors
 from lessons.papers.himpc_paper.effort import EffortJob
@@ -20,10 +20,10 @@ from lessons.papers.himpc_paper.planar import rt1, rt2, rt3
 from lessons.papers.himpc_paper.table_3 import CRITERIA, verdicts
 from lessons.papers.himpc_paper.table_8 import smoothness
 from lessons.papers.himpc_paper.value import decrease
-from lessons.papers.item import Check, Item, Row, Section, Table, at_most
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most
 from lessons.papers.printed import printed
 from lessons.papers.reproduce import Report, as_data, reproduce, write
-from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.scene import Scene
 from robots import InputError
@@ -33,11 +33,11 @@ QUICK = (False, True)
 
 def failed(jobs: Iterable[Work]) -> Results:
     """A run for every job, all failed."""
-    return {job: Run(job, {}, {}, "there was no time") for job in jobs}
+    return {job: JobResult(job, {}, {}, "there was no time") for job in jobs}
 
 
 @pytest.fixture(scope="module")
-def short() -> dict[str, Run]:
+def short() -> dict[str, JobResult]:
     """A second and a bit of RT1 for two controllers."""
     jobs = {name: Job(RunSpec("planar3-circle", controller=name, duration=1.2)) for name in ("himpc", "osf")}
     found = perform_all(jobs.values())
@@ -141,12 +141,12 @@ def test_printed_values_are_what_the_paper_prints() -> None:
 # -------------------------------------------------------------------------------- verdicts
 
 
-def fake(job: Job, error: float, torque: float, speed: float, lost: float | None = None) -> Run:
+def fake(job: Job, error: float, torque: float, speed: float, lost: float | None = None) -> JobResult:
     """A run with a level-1 error (m), and shares of the bounds."""
     task = {"name": "position", "rmse_after_1s": [error, error / 2], "rmse": [error, error / 2]}
     limits = {"torque": {"max_ratio": torque}, "velocity": {"max_ratio": speed}}
     data: dict[str, Any] = {"diverged": lost is not None, "diverged_at_s": lost, "tasks": [task]}
-    return Run(job, {**data, "limits": limits}, {"error/position": np.full((4, 2), error)})
+    return JobResult(job, {**data, "limits": limits}, {"error/position": np.full((4, 2), error)})
 
 
 def ticks(error: float, torque: float, speed: float, lost: float | None = None) -> dict[str, bool | None]:
@@ -191,7 +191,7 @@ def test_nothing_measured_is_no_check_passed() -> None:
 # -------------------------------------------------------------------------------- runs
 
 
-def test_jobs_run_anywhere_give_the_same_numbers(short: dict[str, Run]) -> None:
+def test_jobs_run_anywhere_give_the_same_numbers(short: dict[str, JobResult]) -> None:
     """A spawned process and this one agree to the bit, and the arrays are as long as the run."""
     run = short["himpc"]
     again = run.job.do()
@@ -209,7 +209,7 @@ def test_a_job_that_cannot_be_done_is_a_run_with_a_sentence() -> None:
     assert len(run.t) == 0
 
 
-def test_the_incremental_model_is_better_than_a_model_20_percent_off(short: dict[str, Run]) -> None:
+def test_the_incremental_model_is_better_than_a_model_20_percent_off(short: dict[str, JobResult]) -> None:
     """Section III-B on its own definitions: γ of (21) at least ten times δ of (25)."""
     errors = model_errors(short["himpc"])
     assert errors.gamma > 10 * errors.delta > 0
@@ -230,8 +230,8 @@ def test_an_exact_nominal_model_has_no_error() -> None:
 
 def test_smoothness_is_the_rms_distance() -> None:
     job = Job(RunSpec("planar3-circle", controller="himpc"))
-    one = Run(job, {}, {"t": np.zeros((4, 1)), "tau": np.zeros((4, 2))})
-    other = Run(job, {}, {"t": np.zeros((3, 1)), "tau": np.array([[3.0, 4.0]] * 3)})
+    one = JobResult(job, {}, {"t": np.zeros((4, 1)), "tau": np.zeros((4, 2))})
+    other = JobResult(job, {}, {"t": np.zeros((3, 1)), "tau": np.array([[3.0, 4.0]] * 3)})
     assert smoothness(other, one) == 5.0
 
 
@@ -263,9 +263,13 @@ def test_weighing_the_torque_costs_accuracy_where_gravity_pulls() -> None:
 def picture(name: str) -> Picture:
     x = np.linspace(0.0, 1.0, 50)
     panels = (
-        Panel("y (m)", (Curve(x, x, "a", "himpc"), Curve(x, -x, "b", "reference", "dots")), bounds=(-2, 2)),
-        Panel("y (m)", (Curve(x[:5] + 1, x[:5] + 1, colour="0"),), "x (m)", log_x=True, log_y=True),
-        Panel("y (m)", (Curve(x, x),), "x (m)", equal=True, y_range=(0.0, 0.5)),
+        Panel(
+            "y (m)",
+            (PlotCurve(x, x, "a", "himpc"), PlotCurve(x, -x, "b", "reference", "dots")),
+            bounds=(-2, 2),
+        ),
+        Panel("y (m)", (PlotCurve(x[:5] + 1, x[:5] + 1, colour="0"),), "x (m)", log_x=True, log_y=True),
+        Panel("y (m)", (PlotCurve(x, x),), "x (m)", equal=True, y_range=(0.0, 0.5)),
         Bars("c", ("one", "two"), (("HIMPC", "himpc", (1.0, 1e3)), ("HQP", "hqp", (math.nan, 2.0)))),
         Panel("nothing", ()),
     )
@@ -278,7 +282,7 @@ def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
         notes=("A note.",),
         rows=(Row("x", "m", 2.0, 4.0, "differs | because"), Row("y", "m", None, math.nan, "none")),
         tables=(Table("T", ("a", "b"), (("1", "2"),)),),
-        checks=(Check("holds", 1.0, True), Check("does not", math.nan, False)),
+        checks=(PaperCheck("holds", 1.0, True), PaperCheck("does not", math.nan, False)),
         pictures=(picture("seen"),),
     )
     item = Item("test-1", "A title", "a source", lambda quick: (), lambda results, quick: section)
@@ -307,10 +311,10 @@ def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
     assert (tmp_path / "seen.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_items_share_their_runs(short: dict[str, Run]) -> None:
+def test_items_share_their_runs(short: dict[str, JobResult]) -> None:
     """Two items that need the same job get the same run."""
     job = Job(replace(short["himpc"].job.spec, duration=0.01))
-    seen: list[Run] = []
+    seen: list[JobResult] = []
 
     def report(results: Results, quick: bool) -> Section:
         seen.append(results[job])

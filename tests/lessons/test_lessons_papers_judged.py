@@ -16,9 +16,9 @@ from lessons.papers import ITEMS
 from lessons.papers import printed as printed_values
 from lessons.papers.disagreements import page
 from lessons.papers.himpc_paper.iiwa import rt4
-from lessons.papers.item import Check, Item, Row, Section, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, between
 from lessons.papers.reproduce import recalled, write_page
-from lessons.papers.stored import Memory, from_memory, judged, stored
+from lessons.papers.stored import StoredItem, from_memory, judged, stored
 from lessons.papers.topics import Quoted, Topic, topics
 
 ROOT = Path(__file__).parents[2]
@@ -56,7 +56,7 @@ def test_a_number_is_held_against_the_stored_one_on_both_sides() -> None:
     row = Row("x", "m", 2.0, 4.0, topic="chatter")
     check = between("y", 1.0, 0.0, 10.0)
     section = Section(rows=(row,), checks=(check,))
-    memory = Memory({"x": (4.0, 2.0, "differs", None)}, {check.text: (1.0, True)})
+    memory = StoredItem({"x": (4.0, 2.0, "differs", None)}, {check.text: (1.0, True)})
     assert all(each.holds for each in judged(section, memory))
     for changed in (3.5, 4.5, 2.0, math.nan):
         assert not all(
@@ -70,7 +70,7 @@ def test_a_number_is_held_against_the_stored_one_on_both_sides() -> None:
         each.holds for each in judged(replace(section, rows=(row, replace(row, quantity="z"))), memory)
     )
     assert not all(each.holds for each in judged(Section(rows=(replace(row, topic=""),)), None))
-    free = Check(check.text, 5.0, holds=True, band=None)
+    free = PaperCheck(check.text, 5.0, holds=True, band=None)
     assert all(each.holds for each in judged(replace(section, checks=(free,)), memory))
 
 
@@ -113,7 +113,7 @@ def turned(name: str, path: tuple[Any, ...], value: Any) -> list[Any]:
     return [-value, value * much, value / much]
 
 
-def faults(quick: bool, items: dict[str, Item], memory: dict[str, Memory]) -> list[str]:
+def faults(quick: bool, items: dict[str, Item], memory: dict[str, StoredItem]) -> list[str]:
     return [
         check.text
         for name, kept in memory.items()
@@ -131,7 +131,7 @@ def test_what_is_stored_is_sound() -> None:
             assert not [text for text, (_, held) in memory.checks.items() if not held], name
     known = {**stored(True), **stored(False)}
     for name, item in ITEMS.items():
-        section = from_memory(item, Memory({}, {}), True)
+        section = from_memory(item, StoredItem({}, {}), True)
         assert name in known or not (section.rows or section.checks), name
 
 

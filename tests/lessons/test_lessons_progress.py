@@ -11,7 +11,7 @@ import pytest
 from app.commands.grade import grade
 from lessons.replay.progress import (
     HandedIn,
-    Progress,
+    LearnerProgress,
     found,
     kept,
     progress_from,
@@ -22,7 +22,7 @@ from lessons.replay.progress import (
 from robots import InputError
 
 KEY, OTHER = b"an instructor's key", b"somebody else's key"
-DONE = Progress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("one-task", 81.0)
+DONE = LearnerProgress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("one-task", 81.0)
 HANDED = HandedIn("Zoë Ångström", "2026-11-22T10:00:00+00:00", DONE, "hl1-abc")
 
 
@@ -74,8 +74,8 @@ def test_a_lab_with_a_key_believes_only_what_it_wrote_into_the_browser() -> None
     assert found(kept(DONE, None), None) == DONE
     forged = kept(DONE, KEY)[:64] + DONE.with_points("deadlines", 100.0).dumped()
     for text in (None, "", "{", DONE.dumped(), kept(DONE, OTHER), forged, "ü" * 200):
-        assert found(text, KEY) == Progress()
-    assert progress_from(kept(DONE, KEY)) == Progress()
+        assert found(text, KEY) == LearnerProgress()
+    assert progress_from(kept(DONE, KEY)) == LearnerProgress()
 
 
 def test_grade_reads_what_is_handed_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

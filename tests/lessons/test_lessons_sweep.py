@@ -24,7 +24,7 @@ from lessons.experiments.sweep import (
     make_sweep,
     metrics,
 )
-from lessons.parallel import Failed, cores, on_cores, one_by_one
+from lessons.parallel import FailedJob, cores, on_cores, one_by_one
 from lessons.plots.heat import draw_map
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
@@ -185,13 +185,13 @@ def test_a_sweep_notices_that_a_file_of_ones_own_was_changed(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("spread", [one_by_one, on_cores])
 def test_failed_work_is_an_outcome(spread: Callable[..., Generator[tuple[int, Any], None, None]]) -> None:
-    assert dict(spread(fails_at_two, [1, 2, 4])) == {0: 1, 1: Failed("two is too many"), 2: 16}
+    assert dict(spread(fails_at_two, [1, 2, 4])) == {0: 1, 1: FailedJob("two is too many"), 2: 16}
 
 
 def test_a_process_that_dies_costs_its_own_item_only() -> None:
     outcomes = dict(on_cores(dies_at_one, [0, 1, 2, 3]))
     assert [outcomes[place] for place in (0, 2, 3)] == [0, 4, 9]
-    assert isinstance(outcomes[1], Failed)
+    assert isinstance(outcomes[1], FailedJob)
     assert "died" in outcomes[1].reason
 
 
@@ -207,7 +207,7 @@ def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
 def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
     """Every item has its result, and only what was under way at that moment runs in a process of its own."""
     outcomes = dict(on_cores(dies_once, [(tmp_path / "died", value) for value in range(12)]))
-    done = {place: outcome for place, outcome in outcomes.items() if not isinstance(outcome, Failed)}
+    done = {place: outcome for place, outcome in outcomes.items() if not isinstance(outcome, FailedJob)}
     assert {place: value for place, (value, _) in done.items()} == {value: value for value in range(12)}
     assert len({pid for _, pid in done.values()}) <= 3 * cores()
 
@@ -220,7 +220,7 @@ def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
     def one_failing(
         function: Callable[[Any], Any], items: Sequence[Any]
     ) -> Generator[tuple[int, Any], None, None]:
-        yield 0, Failed("no reason")
+        yield 0, FailedJob("no reason")
         yield 1, function(items[1])
 
     cells = carry_on(sweep, tmp_path, one_failing)

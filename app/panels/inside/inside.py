@@ -8,11 +8,11 @@ from dataclasses import replace
 import viser
 
 from app.client.moment import Moment
+from app.client.pending_edit import Send
 from app.client.watching import Watching
-from app.client.wish import Send
 from app.html.palette import RGB
 from app.html.text import block
-from app.link.inside import Watch
+from app.link.inside import InsideRequest
 from app.link.messages import Command, Ready, Status
 from app.panels.inside.matrix import MatrixPanel
 from app.panels.inside.plane import PlanePanel
@@ -48,8 +48,8 @@ class InsidePanel:
 
     def draw(self, moment: Moment) -> None:
         """Paints the instant, and asks for what the next one shall show."""
-        plane = Watch() if self._plane is None else self._plane.wish
-        wish: Watch = replace(plane, matrix=self._matrix.wish, spectrum=self._spectrum.in_view)
+        plane = InsideRequest() if self._plane is None else self._plane.wish
+        wish: InsideRequest = replace(plane, matrix=self._matrix.wish, spectrum=self._spectrum.in_view)
         self._watching.ask(wish, moment.status.inside)
         if self._plane is not None:
             self._plane.draw(moment)

@@ -11,7 +11,7 @@ from app.html.palette import BAD, BOUND, LEVELS, css
 from app.html.text import block, esc, figure
 from app.link.inside import Inside
 from app.panels.widgets.in_view import InView
-from app.panels.widgets.picture import Picture
+from app.panels.widgets.picture import SvgPicture
 from robots import Robot
 
 if TYPE_CHECKING:
@@ -33,7 +33,9 @@ class MatrixPanel:
         """levels: names, highest priority first."""
         self._names = robot.joint_names
         self._level = client.gui.add_dropdown("Level", tuple(levels), initial_value=levels[0])
-        self._picture = Picture(client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see it.")
+        self._picture = SvgPicture(
+            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see it."
+        )
         self._words = client.gui.add_html("")
 
     @property

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.client.moment import Moment
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import block, esc, figure, swatch
-from app.link.inside import Inside, Watch
+from app.link.inside import Inside, InsideRequest
 from app.panels.inside.plane_svg import CONTOURED, SIZE, half_width, parts
 from app.panels.widgets.in_view import InView
-from app.panels.widgets.picture import Picture
+from app.panels.widgets.picture import SvgPicture
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -48,7 +48,7 @@ class PlanePanel:
             f"{robot.joint_names[a]}, {robot.joint_names[b]}": (a, b)
             for a, b in combinations(range(robot.n), 2)
         }
-        self._picture = Picture(client, in_view, TITLE, SIZE, _EMPTY)
+        self._picture = SvgPicture(client, in_view, TITLE, SIZE, _EMPTY)
         self._words = gui.add_html("")
         self._fewer = gui.add_button(
             "Look one knot ahead (N = 1)",
@@ -78,12 +78,12 @@ class PlanePanel:
             post(Set("horizon", 1))
 
     @property
-    def wish(self) -> Watch:
+    def wish(self) -> InsideRequest:
         """What to ask the simulation for."""
         if not self._picture.in_view:
-            return Watch()
+            return InsideRequest()
         through = str(self._through.value)
-        return Watch(
+        return InsideRequest(
             plane=self._pairs.get(str(self._pair.value)),
             through="" if through == _APPLIED else through,
             shift=min(max(float(self._shift.value), -_SHIFT), _SHIFT),

@@ -11,7 +11,7 @@ import viser
 from app.html.palette import BAD, BOUND, GOOD, css
 from app.link.inside import Inside
 from app.panels.widgets.in_view import InView
-from app.panels.widgets.picture import Picture
+from app.panels.widgets.picture import SvgPicture
 
 TITLE = "Eigenvalues of I − M⁻¹M̄"
 SIZE = (360, 208)
@@ -23,7 +23,7 @@ class SpectrumPicture:
     """Asks for the eigenvalues while the browser shows it."""
 
     def __init__(self, client: viser.ClientHandle, in_view: InView) -> None:
-        self._picture = Picture(
+        self._picture = SvgPicture(
             client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see them."
         )
 

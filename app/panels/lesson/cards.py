@@ -12,9 +12,9 @@ from app.client.progress import Notebook
 from app.html.palette import GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise, parts_of
+from app.link.exercise import LessonPlace, parts_of
 from lessons.course import COURSE, load_lesson
-from lessons.replay.progress import Progress
+from lessons.replay.progress import LearnerProgress
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Lesson
 
@@ -41,7 +41,7 @@ def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
         _button(
             gui,
             f"{word} {number} · {lesson.card.title}",
-            SceneChoice.of_lesson(Exercise(name, place)),
+            SceneChoice.of_lesson(LessonPlace(name, place)),
             choose,
         )
     gui.add_html(
@@ -61,7 +61,7 @@ def add_invitation(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> Non
     lesson, number = load_lesson(name), COURSE.index(name) + 1
     word, place = _offer(lesson, progress)
     label = f"{word} lesson {number}: {lesson.card.title}"
-    _button(gui, label, SceneChoice.of_lesson(Exercise(name, place)), choose, LEVELS[1])
+    _button(gui, label, SceneChoice.of_lesson(LessonPlace(name, place)), choose, LEVELS[1])
 
 
 def _button(
@@ -78,7 +78,7 @@ def _button(
         choose(choice)
 
 
-def _offer(lesson: Lesson, progress: Progress) -> tuple[str, int]:
+def _offer(lesson: Lesson, progress: LearnerProgress) -> tuple[str, int]:
     """("Start", "Continue" or "Again", at which place)."""
     seen = progress.seen.get(lesson.name, frozenset())
     parts = len(parts_of(lesson))
@@ -86,7 +86,7 @@ def _offer(lesson: Lesson, progress: Progress) -> tuple[str, int]:
     return ("Start" if not seen else "Continue" if place else "Again"), place
 
 
-def _card(number: int, lesson: Lesson, progress: Progress) -> str:
+def _card(number: int, lesson: Lesson, progress: LearnerProgress) -> str:
     card = lesson.card
     parts = parts_of(lesson)
     seen = progress.seen.get(lesson.name, frozenset())

@@ -8,7 +8,7 @@ from app.html.glossary import STYLE
 from app.html.markdown import rendered, rendered_line
 from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB, css
 from app.html.text import badge, bar, block, esc, figure
-from app.link.exercise import Curve, Exercise, Lecture, parts_of, signals_of
+from app.link.exercise import Lecture, LessonPlace, SignalCurve, parts_of, signals_of
 from app.panels.lesson.drawing import Bound, chart
 from lessons.course import COURSE
 from lessons.teaching.challenge import Challenge
@@ -19,7 +19,7 @@ from lessons.teaching.measure import Signal
 Part = Step | Challenge
 
 
-def heading(exercise: Exercise) -> str:
+def heading(exercise: LessonPlace) -> str:
     """Which lesson, which step of how many."""
     lesson = exercise.whole
     parts = parts_of(lesson)
@@ -169,7 +169,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
     )
 
 
-def _whole(curve: Curve | None) -> Curve | None:
+def _whole(curve: SignalCurve | None) -> SignalCurve | None:
     return curve if curve is not None and len(curve.t) else None
 
 

@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise, Lecture
+from app.link.exercise import Lecture, LessonPlace
 from app.panels.lesson.cards import add_cards, add_invitation
 from app.panels.lesson.exercise_cards import exercise_cards
 from app.panels.lesson.step import LessonPanel
-from app.panels.widgets.window import Window
+from app.panels.widgets.window import PopupWindow
 from lessons.settings.settings import Settings
 
 
@@ -24,8 +24,8 @@ class Course:
     def __init__(
         self,
         gui: viser.GuiApi,
-        learner: Learner,
-        exercise: Exercise | None,
+        learner: SimulationClient,
+        exercise: LessonPlace | None,
         notebook: Notebook,
         choose: Callable[[SceneChoice], None],
         settings: Callable[[], Settings],
@@ -35,7 +35,7 @@ class Course:
         self._gui, self._learner, self._notebook = gui, learner, notebook
         self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop
-        self._list = Window(gui, "All lessons", "L", self._fill)
+        self._list = PopupWindow(gui, "All lessons", "L", self._fill)
         self._panel: LessonPanel | None = None
         if exercise is None:
             add_invitation(gui, notebook, choose)

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.html.palette import BOUND, GOOD, LEVELS, css
 from app.html.text import esc, figure
-from app.link.exercise import Curve
+from app.link.exercise import SignalCurve
 
 _W = 360  # units of every picture's width; it scales with the panel
 GUESS, TRUTH = css(LEVELS[0]), css(LEVELS[1])
@@ -50,7 +50,12 @@ class Bound:
 
 
 def chart(
-    words: str, unit: str, curve: Curve, ghost: Curve | None, bounds: Sequence[Bound], until: float
+    words: str,
+    unit: str,
+    curve: SignalCurve,
+    ghost: SignalCurve | None,
+    bounds: Sequence[Bound],
+    until: float,
 ) -> str:
     """A signal over the run, with the ghost's (dashed) and what it is compared with (dotted)."""
     height, top, left = 92, 18, 54
@@ -61,7 +66,7 @@ def chart(
     marks = [bound.value for bound in bounds if math.isfinite(bound.value)]
     axis = _axis(values, marks)
 
-    def points(of: Curve) -> str:
+    def points(of: SignalCurve) -> str:
         return _polyline(
             of, lambda t: left + (_W - left - 6) * t / until, lambda v: _height(v, axis, top, height)
         )
@@ -91,20 +96,20 @@ def sketch(
     high: float,
     until: float,
     points: Sequence[tuple[float, float]],
-    truth: Curve | None,
+    truth: SignalCurve | None,
     unit: str,
 ) -> str:
     """What the learner draws, and the truth over it."""
     height, top, left = 130, 16, 40
     axis = (low, high, False)
 
-    def place(of: Curve) -> str:
+    def place(of: SignalCurve) -> str:
         return _polyline(
             of, lambda t: left + (_W - left - 8) * t / until, lambda v: _height(v, axis, top, height)
         )
 
     times, values = (np.array(column, float) for column in zip(*points, strict=True))
-    drawn = Curve(times, values)
+    drawn = SignalCurve(times, values)
     dots = "".join(
         f'<circle cx="{left + (_W - left - 8) * t / until:.1f}" cy="{_height(v, axis, top, height):.1f}" '
         f'r="3.5" fill="{GUESS}"/>'
@@ -120,7 +125,9 @@ def sketch(
     ]
     if truth is not None:
         inside = truth.t <= until
-        parts.append(f'<path d="{place(Curve(truth.t[inside], truth.values[inside]))}" {_line(TRUTH)}/>')
+        parts.append(
+            f'<path d="{place(SignalCurve(truth.t[inside], truth.values[inside]))}" {_line(TRUTH)}/>'
+        )
         parts.append(_text(left + 90, 11, "measured", TRUTH, bold=True))
     return _svg(height, parts, "your sketch over time")
 
@@ -158,7 +165,7 @@ def _end(axis: Axis, which: int) -> str:
     return figure(10.0 ** axis[which] if axis[2] else float(f"{axis[which]:.2g}"))
 
 
-def _polyline(curve: Curve, x: Scaling, y: Scaling) -> str:
+def _polyline(curve: SignalCurve, x: Scaling, y: Scaling) -> str:
     pieces, pen = [], "M"
     for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True):
         if not math.isfinite(value):

@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.html.palette import LEVELS
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise, Lecture, parts_of
+from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
 from app.panels.lesson.claims import after, heading, idea, pictures, state
 from app.panels.lesson.exercise_cards import belonging_to
@@ -37,8 +37,8 @@ class LessonPanel:
         gui: viser.GuiApi,
         tab: viser.GuiTabHandle,
         pictures: viser.GuiHtmlHandle,
-        exercise: Exercise,
-        learner: Learner,
+        exercise: LessonPlace,
+        learner: SimulationClient,
         choose: Callable[[SceneChoice], None],
         all_lessons: Callable[[], None],
         notebook: Notebook,
@@ -63,7 +63,7 @@ class LessonPanel:
 
     # ---------------------------------------------------------------- building
 
-    def _turn_to(self, exercise: Exercise) -> None:
+    def _turn_to(self, exercise: LessonPlace) -> None:
         self._exercise, self._part = exercise, exercise.part
         self._lecture: Lecture | None = None
         last = exercise.place + 1 >= len(parts_of(exercise.whole))
@@ -179,7 +179,7 @@ class LessonPanel:
             self._go(self._exercise.place - 1)
 
     def _go(self, place: int) -> None:
-        self._choose(self._learner.choice.at(Exercise(self._exercise.lesson, place)))
+        self._choose(self._learner.choice.at(LessonPlace(self._exercise.lesson, place)))
 
     # ---------------------------------------------------------------- showing
 

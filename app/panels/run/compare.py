@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
-from app.client.score import Result
+from app.client.run_statistics import RunFigures
+from app.client.simulation_client import SimulationClient
 from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.session.ghost import swapped
 from lessons.settings.presets import usual_settings
 from lessons.settings.settings import Settings
@@ -31,7 +31,7 @@ class ComparePanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        learner: Learner,
+        learner: SimulationClient,
         settings: Settings,
         colours: dict[str, RGB],
     ) -> None:
@@ -114,7 +114,7 @@ class ComparePanel:
             learner.send(Post(event))
         learner.start_ghost(Ghost(", ".join(own), own))
 
-    def update(self, now: Snapshot[Settings]) -> None:
+    def update(self, now: SessionSnapshot[Settings]) -> None:
         """Shows what is."""
         ghost = self._learner.ghost
         on = ghost is not None
@@ -130,7 +130,7 @@ class ComparePanel:
             return
         self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
 
-    def _results(self, now: Snapshot[Settings], mine: Result, its: Result) -> str:
+    def _results(self, now: SessionSnapshot[Settings], mine: RunFigures, its: RunFigures) -> str:
         places = {level.name: place for place, level in enumerate(now.settings.levels, start=1)}
         tasks = sorted(now.ready.layout.tasks, key=lambda task: places.get(task.level, 99))
         rows = [
@@ -162,7 +162,7 @@ class ComparePanel:
         )
 
 
-def _legend(words: str, now: Snapshot[Settings]) -> str:
+def _legend(words: str, now: SessionSnapshot[Settings]) -> str:
     slow = ""
     if now.status.capped:
         slow = (

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import viser
 
-from app.client.learner import Learner
 from app.client.rows import RATE
 from app.client.simulation import Simulation
+from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from lessons.plots.recorded import Recorded, run_picture
 from lessons.recording.arrays import named
@@ -24,7 +24,9 @@ _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 class ExportPanel:
     """Files are made on viser's threads, from what the learner has recorded; the simulation is not asked."""
 
-    def __init__(self, gui: viser.GuiApi, learner: Learner, settings: Callable[[], Settings]) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, learner: SimulationClient, settings: Callable[[], Settings]
+    ) -> None:
         self._learner, self._settings = learner, settings
         gui.add_html(_INTRO)
         self._span = gui.add_dropdown("Of", (_MINUTE, _WHOLE), initial_value=_MINUTE)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import viser
 
-from app.client.learner import Learner
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.panels.run.share import code_of
 from lessons.replay.progress import LONGEST_NAME
 from robots import InputError
 
 
-def add_hand_in(gui: viser.GuiApi, learner: Learner, notebook: Notebook) -> None:
+def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
     """A folder in the current container. The text is made when it is asked for, on viser's threads."""
     with gui.add_folder("Hand in what you did", expand_by_default=False):
         gui.add_html(block(_SIGNED if notebook.signs else _NOT_SIGNED))

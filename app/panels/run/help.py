@@ -6,7 +6,7 @@ import viser
 
 from app.html.glossary import words
 from app.html.text import block
-from app.panels.widgets.window import Window
+from app.panels.widgets.window import PopupWindow
 
 _KEYS = (
     ("Space", "run or pause"),
@@ -55,7 +55,7 @@ class HelpPanel:
     def __init__(self, gui: viser.GuiApi) -> None:
         self._gui = gui
         self._fill()
-        self._window = Window(gui, "Help", "?", self._fill, shift=True)
+        self._window = PopupWindow(gui, "Help", "?", self._fill, shift=True)
 
     def _fill(self) -> None:
         known = (*words().items(), *_MARKS)

@@ -10,10 +10,10 @@ from functools import partial
 import numpy as np
 import viser
 
-from app.client.decimated import Window
+from app.client.decimated import PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, joint_colour
 from app.html.text import block
-from app.panels.widgets.chart import Chart, Line, of_ghost
+from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 from robots import Robot
 from robots.truth import joint_axis
@@ -80,7 +80,7 @@ class JointPlots:
             index = options.index(str(choice.value)) - 1
             self._joint = None if index < 0 else index
 
-    def draw(self, window: Window, ghost: Window | None) -> None:
+    def draw(self, window: PlotWindow, ghost: PlotWindow | None) -> None:
         """ghost: the same stretch of time of the ghost, drawn dashed."""
         joint = self._joint
         if (joint, ghost is not None) != self._built:
@@ -109,7 +109,7 @@ class JointPlots:
             marked = at_bound[:, joint]
         return [*lines, np.where(marked, low + _RUG * (high - low), low), *dashed]
 
-    def _read(self, window: Window) -> Sequence[_Quantity]:
+    def _read(self, window: PlotWindow) -> Sequence[_Quantity]:
         columns, fields = window.columns, window.layout.fields
         v, driven = columns(fields["v_limit"]), self._input
         upper = columns(fields[driven.upper])
@@ -160,13 +160,13 @@ class JointPlots:
 
     def _all(self, title: str, names: tuple[str, ...], last: bool, ghost: bool) -> Chart:
         n = len(names)
-        lines = [Line(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
-        bounds = [Line("upper bound", BOUND, dashed=True), Line("lower bound", BOUND, dashed=True)]
+        lines = [ChartLine(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
+        bounds = [ChartLine("upper bound", BOUND, dashed=True), ChartLine("lower bound", BOUND, dashed=True)]
         return Chart(
             self._gui,
             self._in_view,
             f"{title}, % of bound",
-            [*lines, *bounds, Line("at bound", BAD, fill=0.5, width=0.5), *of_ghost(lines, ghost)],
+            [*lines, *bounds, ChartLine("at bound", BAD, fill=0.5, width=0.5), *of_ghost(lines, ghost)],
             (-_SHARE, _SHARE),
             height=170,
             bands=((n, n + 1, GOOD),),
@@ -175,16 +175,16 @@ class JointPlots:
         )
 
     def _one(self, title: str, kind: int, joint: int, ghost: bool) -> Chart:
-        line = Line(self._robot.joint_names[joint], joint_colour(joint), width=2.0)
+        line = ChartLine(self._robot.joint_names[joint], joint_colour(joint), width=2.0)
         return Chart(
             self._gui,
             self._in_view,
             f"{title}, {self._unit(kind, joint)[0]}",
             [
                 line,
-                Line("upper bound", BOUND, dashed=True),
-                Line("lower bound", BOUND, dashed=True),
-                Line("at bound", BAD, fill=0.5, width=0.5),
+                ChartLine("upper bound", BOUND, dashed=True),
+                ChartLine("lower bound", BOUND, dashed=True),
+                ChartLine("at bound", BAD, fill=0.5, width=0.5),
                 *of_ghost([line], ghost),
             ],
             self._span(kind, joint),

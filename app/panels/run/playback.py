@@ -9,16 +9,16 @@ from functools import partial
 
 import viser
 
-from app.adapter.late import in_time
-from app.client.learner import Learner
+from app.adapter.removed_handle_errors import unless_removed
+from app.client.pending_edit import HOLD, PendingEdit
+from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
-from app.client.wish import HOLD, Wish
 from app.html.palette import GOOD, LEVELS
 from app.html.text import badge, block, in_trouble
-from app.link.messages import Play, Post, Speed, Step
+from app.link.messages import Play, Post, Speed, StepTicks
 from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import on_scale
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Reset
 from lessons.settings.settings import Settings
 
@@ -29,11 +29,11 @@ class PlaybackPanel:
     """Buttons and a status line."""
 
     def __init__(
-        self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop, fastest: float
+        self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop, fastest: float
     ) -> None:
         """fastest: the highest speed that can be asked for, simulated seconds per second."""
         self._learner, self._loop = learner, loop
-        self._running: Wish[bool] = Wish()
+        self._running: PendingEdit[bool] = PendingEdit()
         self._closed = False
         self._trouble = gui.add_html("", visible=False)
         self._again = gui.add_button("Start again", visible=False)
@@ -82,7 +82,7 @@ class PlaybackPanel:
             learner.send(Play(self._running.ask(not running)))
         elif choice == _STEP:
             self._running.ask(False)
-            learner.send(Step())
+            learner.send(StepTicks())
         elif choice == _RESET and learner.trouble() is None:
             learner.send(Post(Reset()))
         else:
@@ -108,12 +108,12 @@ class PlaybackPanel:
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 
-    def update(self, now: Snapshot[Settings]) -> None:
+    def update(self, now: SessionSnapshot[Settings]) -> None:
         status = now.status
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
-        self._loop.call_soon_threadsafe(in_time, self._show_speed, status.speed)
+        self._loop.call_soon_threadsafe(unless_removed, self._show_speed, status.speed)
         state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
         if status.capped:
             why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."

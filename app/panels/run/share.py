@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import Told
@@ -18,7 +18,9 @@ from robots import InputError
 class SharePanel:
     """Texts are made when they are asked for, on viser's threads."""
 
-    def __init__(self, gui: viser.GuiApi, learner: Learner, choose: Callable[[SceneChoice], None]) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, learner: SimulationClient, choose: Callable[[SceneChoice], None]
+    ) -> None:
         self._learner = learner
         with gui.add_folder("Share the setting"):
             gui.add_html(_INTRO)

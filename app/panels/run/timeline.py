@@ -9,8 +9,8 @@ from functools import partial
 
 import viser
 
-from app.adapter.late import in_time
-from app.client.learner import Learner
+from app.adapter.removed_handle_errors import unless_removed
+from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.panels.widgets.command import add_command
 
@@ -23,7 +23,7 @@ class TimeLine:
     """`past` is the moment to show, None for now. Time that goes on again, by running, a step or a reset,
     brings the view back to now."""
 
-    def __init__(self, gui: viser.GuiApi, learner: Learner, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop) -> None:
         self.past: float | None = None
         self._learner, self._loop = learner, loop
         self._paused_at: float | None = None  # s, the simulated time that stands
@@ -85,13 +85,13 @@ class TimeLine:
     def _enter(self, first: float, last: float) -> None:
         self.past, self._paused_at = None, last
         self._slider.min = round(-math.floor((last - first) / _STEP) * _STEP, 3)
-        self._loop.call_soon_threadsafe(in_time, self._set, 0.0)
+        self._loop.call_soon_threadsafe(unless_removed, self._set, 0.0)
         self._slider.visible = True
 
     def _leave(self) -> None:
         self.past = self._paused_at = None
         self._slider.visible = False
-        self._loop.call_soon_threadsafe(in_time, self._set, 0.0)
+        self._loop.call_soon_threadsafe(unless_removed, self._set, 0.0)
 
     def _say(self) -> None:
         past, at = self.past, self._paused_at

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.text import block, esc
 from app.panels.torque.task_editor import AXES
 from himpc.stack import Stack

@@ -11,7 +11,7 @@ from app.panels.torque.deadline import DeadlineFolder
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
@@ -58,7 +58,7 @@ class ControllerPanel:
                 + formula(r"\rho(I - M^{-1} \bar M) < 1")
             )  # fmt: skip
 
-    def update(self, now: Snapshot[TorqueSettings]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         self._deadline.update(now)
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller

@@ -8,7 +8,7 @@ import viser
 
 from app.html.text import block
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 
 _LOOKS = 9
@@ -24,7 +24,7 @@ class DeadlineFolder:
             self._line = gui.add_html("")
         self._counts: deque[tuple[int, int]] = deque(maxlen=_LOOKS)
 
-    def update(self, now: Snapshot[TorqueSettings]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         ticks, late = now.status.ticks, now.status.late
         if self._counts and ticks < self._counts[-1][0]:
             self._counts.clear()

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.client.wish import Wish
+from app.client.pending_edit import PendingEdit
 from app.panels.widgets.mirror import Bindings
 from himpc.stack import Level
 from himpc.tasks import Joints, Posture
@@ -40,7 +40,7 @@ def add_joint_targets(
         return
     with gui.add_folder("Joint targets", expand_by_default=False):
         for task in tasks:
-            wish: Wish[tuple[float, ...]] = Wish()
+            wish: PendingEdit[tuple[float, ...]] = PendingEdit()
             for place, joint in enumerate(task.coordinates(robot)):
                 label = joint if len(tasks) == 1 else f"{task.name}: {joint}"
                 with gui.add_folder(None):
@@ -55,7 +55,7 @@ def _add_slider(
     joint: str,
     task: str,
     place: int,
-    wish: Wish[tuple[float, ...]],
+    wish: PendingEdit[tuple[float, ...]],
     targets: Callable[[], Targets],
 ) -> None:
     at = robot.joint_names.index(joint)

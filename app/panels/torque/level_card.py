@@ -12,7 +12,7 @@ from app.panels.torque.joint_targets import Targets, add_joint_targets
 from app.panels.torque.task_editor import TaskEditor
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
 from himpc.telemetry import FALLBACKS
 from lessons.events import Set
@@ -73,7 +73,7 @@ class LevelCard:
         async def _(_: object) -> None:
             shift(name, -1 if move.value == UP else 1)
 
-    def update(self, now: Snapshot[TorqueSettings], level: Level, place: int) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
         title = _title(place, level.name)
         if self._folder.label != title:
             self._folder.label = title

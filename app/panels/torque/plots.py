@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.client.decimated import BUCKETS, Window
+from app.client.decimated import BUCKETS, PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB
 from app.link.messages import Ready
-from app.panels.widgets.chart import Chart, Line, of_ghost
+from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 
 _ERROR = (1e-3, 1e3)  # mm or degrees
@@ -37,13 +37,13 @@ class LevelPlots:
             chart.remove()
         self._with_ghost = ghost
         errors = [
-            Line(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours.get(t.level, BOUND))
+            ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours.get(t.level, BOUND))
             for t in self._tasks
         ]
-        step = [Line("whole step", LEVELS[1], width=2.0)]
-        leaks = [Line("priority (own model)", LEVELS[2]), Line("dynamic (true plant)", BAD)]
+        step = [ChartLine("whole step", LEVELS[1], width=2.0)]
+        leaks = [ChartLine("priority (own model)", LEVELS[2]), ChartLine("dynamic (true plant)", BAD)]
         errors, step, leaks = ([*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks))
-        budget = Line("budget", GOOD, dashed=True, fill=0.12)
+        budget = ChartLine("budget", GOOD, dashed=True, fill=0.12)
         with self._place:
             self._charts = [
                 Chart(self._gui, self._in_view, title, lines, span, height=height, log=True)
@@ -54,7 +54,7 @@ class LevelPlots:
                 )
             ]
 
-    def draw(self, window: Window, ghost: Window | None, T_s: float) -> None:
+    def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float) -> None:
         """ghost: the same stretch of time of the ghost."""
         if (ghost is not None) != self._with_ghost:
             self._build(ghost is not None)
@@ -64,7 +64,7 @@ class LevelPlots:
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
         leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
 
-    def _errors(self, window: Window) -> list[np.ndarray]:
+    def _errors(self, window: PlotWindow) -> list[np.ndarray]:
         fields = window.layout.fields
         nothing = np.full(2 * BUCKETS, np.nan)  # of a ghost that does not have the new stack yet
         return [
@@ -76,11 +76,11 @@ class LevelPlots:
         ]
 
 
-def _times(window: Window) -> np.ndarray:
+def _times(window: PlotWindow) -> np.ndarray:
     return 1e-3 * window.columns(window.layout.fields["step_us"])[:, 0]
 
 
-def _leaks(window: Window) -> list[np.ndarray]:
+def _leaks(window: PlotWindow) -> list[np.ndarray]:
     fields = window.layout.fields
     known = np.isfinite(window.columns(fields["t"])[:, 0])
     return [

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import viser
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import BAD, GOOD, RGB
 from app.html.text import block, esc, quantity
 from app.link.messages import Ready
 from app.panels.torque.guide import guide
 from app.panels.widgets.command import add_command
-from app.panels.widgets.snapshot import Snapshot
-from app.view.reachability import Verdict
+from app.panels.widgets.snapshot import SessionSnapshot
+from app.view.reachability import Reachability
 from lessons.events import Push, Set
 from lessons.settings.torque import TorqueSettings
 
@@ -112,7 +112,7 @@ class StartPanel:
         """The first drag happened: go on to what comes next."""
         self._dragged = True
 
-    def show_verdict(self, verdict: Verdict | None, clamped: bool) -> None:
+    def show_verdict(self, verdict: Reachability | None, clamped: bool) -> None:
         """Where the target is, in words."""
         if verdict is None:
             self._where.content = block("The target is where the hand is.")
@@ -130,7 +130,7 @@ class StartPanel:
             text += " This orientation cannot be met there: the lower level gives way."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: Snapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
         """The guide names the levels as they are; the button offers what is not the case."""
         told = guide(now.ready.tasks, now.settings.levels, colours, self._dragged)
         if self._guide.content != told:

@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.wish import Wish
+from app.client.pending_edit import PendingEdit
 from app.html.palette import DAMPING, RGB
 from app.html.text import block, formula, swatch
 from app.panels.torque.add_task import AddTask
 from app.panels.torque.joint_targets import Targets
 from app.panels.torque.level_card import LevelCard
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Event, MoveLevel, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -65,8 +65,8 @@ class TasksPanel:
             )
 
     def _build(self, settings: TorqueSettings) -> None:
-        self._order: Wish[tuple[str, ...]] = Wish()
-        self._enabled: dict[str, Wish[bool]] = {level.name: Wish() for level in settings.levels}
+        self._order: PendingEdit[tuple[str, ...]] = PendingEdit()
+        self._enabled: dict[str, PendingEdit[bool]] = {level.name: PendingEdit() for level in settings.levels}
         self._bindings: Bindings[TorqueSettings] = Bindings(self._ask, self._loop)
         self._moves: Bindings[Targets] = Bindings(self._post, self._loop)
         with self._place:
@@ -128,7 +128,7 @@ class TasksPanel:
         if place >= len(names) or names[place] not in levels:
             return None
         name = names[place]
-        wish = self._enabled.setdefault(name, Wish())
+        wish = self._enabled.setdefault(name, PendingEdit())
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(levels[name].enabled)))
 
     def _move(self, name: str, by: int) -> None:
@@ -141,7 +141,7 @@ class TasksPanel:
             self._order.ask(tuple(names))
             self._post(MoveLevel(name, to))
 
-    def update(self, now: Snapshot[TorqueSettings]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         for place, level in enumerate(now.settings.levels):
             for card in self._cards:
                 if card.name == level.name:

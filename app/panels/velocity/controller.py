@@ -11,7 +11,7 @@ import viser
 from app.html.text import block, esc, formula
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import base_joints
 from himpc.htmpc.settings import efforts
@@ -93,7 +93,7 @@ class HtmpcPanel:
             entry = replace(entry, label=f"{entry.label}, {part}")
         self._controls.add_as(entry, lambda settings: now(settings)[joints].tolist(), made)
 
-    def update(self, now: Snapshot[VelocitySettings]) -> None:
+    def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         settings = now.settings
         if settings.controller != self._shown:
             self._shown = settings.controller

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
-from app.client.wish import Send
+from app.client.pending_edit import Send
 from app.html.palette import GOOD, RGB, css
 from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import Status, TaskView
 from app.link.mission_view import MissionRow
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
 from lessons.settings.velocity import VelocitySettings
 
@@ -108,7 +108,7 @@ class MissionPanel:
             InsertTask(name, role, goal, None if before == _END else before, hold=None if hold else 0.0)
         )
 
-    def update(self, now: Snapshot[VelocitySettings]) -> None:
+    def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         mission = now.status.mission
         if mission is None:
             return

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.client.decimated import BUCKETS, Window
+from app.client.decimated import BUCKETS, PlotWindow
 from app.html.palette import BOUND, GOOD, JOINTS, LEVELS, RGB
 from app.html.text import block
 from app.link.messages import Ready, TaskView
-from app.panels.widgets.chart import Chart, Line, of_ghost
+from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 from himpc.htmpc import base_joints
 
@@ -38,13 +38,15 @@ class TrackingPlots:
             chart.remove()
         self._with_ghost = ghost
         errors = [
-            Line(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours[t.level], width=2.0)
+            ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours[t.level], width=2.0)
             for t in self._tasks
         ]
-        bounds = [Line(f"|e*| + δ of {t.name}", self._colours[t.level], dashed=True) for t in self._tasks]
-        step = [Line("whole step", LEVELS[1], width=2.0)]
-        period = Line("period", GOOD, dashed=True, fill=0.12)
-        w = [Line("w", LEVELS[3])]
+        bounds = [
+            ChartLine(f"|e*| + δ of {t.name}", self._colours[t.level], dashed=True) for t in self._tasks
+        ]
+        step = [ChartLine("whole step", LEVELS[1], width=2.0)]
+        period = ChartLine("period", GOOD, dashed=True, fill=0.12)
+        w = [ChartLine("w", LEVELS[3])]
         with self._place:
             self._charts = [
                 self._chart(
@@ -56,20 +58,20 @@ class TrackingPlots:
             if self._base:
                 self._charts.append(self._speed(ghost))
 
-    def _chart(self, title: str, lines: list[Line], span: tuple[float, float], height: int) -> Chart:
+    def _chart(self, title: str, lines: list[ChartLine], span: tuple[float, float], height: int) -> Chart:
         return Chart(self._gui, self._in_view, title, lines, span, height=height, log=True)
 
     def _speed(self, ghost: bool) -> Chart:
         limit = float(self._limits[self._base].max())
-        speeds = [Line("x", JOINTS[0]), Line("y", JOINTS[3])]
+        speeds = [ChartLine("x", JOINTS[0]), ChartLine("y", JOINTS[3])]
         return Chart(
             self._gui,
             self._in_view,
             "Base speed, m/s",
             [
                 *speeds,
-                Line("upper bound", BOUND, dashed=True),
-                Line("lower bound", BOUND, dashed=True),
+                ChartLine("upper bound", BOUND, dashed=True),
+                ChartLine("lower bound", BOUND, dashed=True),
                 *of_ghost(speeds, ghost),
             ],
             (-1.2 * limit, 1.2 * limit),
@@ -77,7 +79,7 @@ class TrackingPlots:
             bands=((2, 3, GOOD),),
         )
 
-    def draw(self, window: Window, ghost: Window | None, T_s: float) -> None:
+    def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float) -> None:
         """ghost: the same stretch of time of the ghost."""
         if (ghost is not None) != self._with_ghost:
             self._build(ghost is not None)
@@ -99,18 +101,18 @@ class TrackingPlots:
         if self._base:
             self._charts[3].show(window, lambda: self._speeds(window, beside))
 
-    def _speeds(self, window: Window, beside: list[Window]) -> list[np.ndarray]:
+    def _speeds(self, window: PlotWindow, beside: list[PlotWindow]) -> list[np.ndarray]:
         fields = window.layout.fields
         limit = window.columns(fields["v_limit"])[:, self._base].min(axis=1)
         limit = np.where(np.isfinite(limit), limit, float(self._limits[self._base].max()))
         own, *rest = (each.columns(fields["v"])[:, self._base].T for each in (window, *beside))
         return [*own, limit, -limit, *(curve for each in rest for curve in each)]
 
-    def _bounds(self, window: Window) -> list[np.ndarray]:
+    def _bounds(self, window: PlotWindow) -> list[np.ndarray]:
         fields = window.layout.fields
         return [_unit(task) * window.columns(fields[f"bound/{task.level}"])[:, 0] for task in self._tasks]
 
-    def _errors(self, window: Window) -> list[np.ndarray]:
+    def _errors(self, window: PlotWindow) -> list[np.ndarray]:
         fields = window.layout.fields
         return [
             _unit(task) * np.linalg.norm(window.columns(fields[f"error/{task.name}"]), axis=1)
@@ -118,7 +120,7 @@ class TrackingPlots:
         ]
 
 
-def _times(window: Window) -> np.ndarray:
+def _times(window: PlotWindow) -> np.ndarray:
     return 1e-3 * window.columns(window.layout.fields["step_us"])[:, 0]
 
 

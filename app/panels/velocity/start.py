@@ -8,7 +8,7 @@ import viser
 
 from app.html.palette import RGB
 from app.html.text import badge, block, esc, quantity, swatch
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball
 
@@ -86,7 +86,7 @@ class BeginPanel:
         """The first drag happened: go on to what comes next."""
         self._dragged = True
 
-    def update(self, now: Snapshot[VelocitySettings]) -> None:
+    def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
         told = guide(self._scene, self._drives, places, self._dragged)
         if self._guide.content != told:
@@ -100,7 +100,7 @@ class BeginPanel:
             self._clear.visible = there
         self._live.content = block("<br>".join(lines))
 
-    def _line(self, now: Snapshot[VelocitySettings], role: str, unit: str) -> str:
+    def _line(self, now: SessionSnapshot[VelocitySettings], role: str, unit: str) -> str:
         head = f"{swatch(self._colours[role])}<b>{esc(role)}</b>"
         place, error = now.number(f"level/{role}"), now.error(role)
         if place != place:

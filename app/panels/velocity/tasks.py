@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.wish import Wish
+from app.client.pending_edit import PendingEdit
 from app.html.palette import BAD, DAMPING, RGB, css
 from app.html.text import badge, block, esc, quantity, swatch
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import Snapshot
+from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
 from lessons.events import Set
 from lessons.session.velocity_rows import FALLBACKS
@@ -31,7 +31,7 @@ class RolesPanel:
     ) -> None:
         self._current = current
         self._order = tuple(level.name for level in settings.levels)
-        self._enabled: dict[str, Wish[bool]] = {name: Wish() for name in self._order}
+        self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
         gui.add_html(
             block("The levels come in the order of the tasks in the mission's window: change it in the tab "
                   "<b>Mission</b>. The numbers are keys.")
@@ -50,7 +50,7 @@ class RolesPanel:
         wish = self._enabled[name]
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(enabled)))
 
-    def update(self, now: Snapshot[VelocitySettings]) -> None:
+    def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
         inside = sorted((name for name in places if places[name] == places[name]), key=places.__getitem__)
         self._order = (*inside, *(name for name in places if name not in inside))
@@ -82,7 +82,7 @@ class _Card:
             on, lambda s: _find(s, name).enabled, lambda value: Set(f"levels.{name}.enabled", bool(value))
         )
 
-    def update(self, now: Snapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
+    def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
         title = _title(place, level.name)
         if self._folder.label != title:
             self._folder.label = title

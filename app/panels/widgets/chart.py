@@ -11,8 +11,8 @@ import viser
 from viser import uplot
 
 from app.adapter import private
-from app.client.corners import corners
-from app.client.decimated import BUCKETS, WINDOW, Window
+from app.client.decimate import decimate
+from app.client.decimated import BUCKETS, WINDOW, PlotWindow
 from app.html.palette import RGB, css
 from app.html.text import block
 from app.panels.widgets.in_view import InView
@@ -37,7 +37,7 @@ _NOTHING = block("Nothing has happened yet: run (Space), or take single ticks (T
 
 
 @dataclass(frozen=True)
-class Line:
+class ChartLine:
     """label: of the legend; fill: opacity of the area below, down to the axis; dashed: for bounds and, finer,
     for ghosts."""
 
@@ -48,12 +48,12 @@ class Line:
     width: float = 1.6
     dash: tuple[float, float] = (6.0, 4.0)
 
-    def of_ghost(self) -> Line:
+    def of_ghost(self) -> ChartLine:
         """The same curve of the ghost."""
         return replace(self, label=f"{self.label}, ghost", dashed=True, width=1.3, dash=(3.0, 3.0))
 
 
-def of_ghost(lines: Sequence[Line], ghost: bool) -> list[Line]:
+def of_ghost(lines: Sequence[ChartLine], ghost: bool) -> list[ChartLine]:
     """The ghost's curves beside these, if there is one."""
     return [line.of_ghost() for line in lines] if ghost else []
 
@@ -66,7 +66,7 @@ class Chart:
         gui: viser.GuiApi,
         in_view: InView,
         title: str,
-        lines: Sequence[Line],
+        lines: Sequence[ChartLine],
         span: tuple[float, float],
         height: int,
         log: bool = False,
@@ -109,7 +109,7 @@ class Chart:
         """Whether the browser shows it."""
         return self._in_view.sees(self._title)
 
-    def show(self, window: Window, curves: Callable[[], Sequence[np.ndarray]]) -> None:
+    def show(self, window: PlotWindow, curves: Callable[[], Sequence[np.ndarray]]) -> None:
         """curves: (2 · BUCKETS,) values of each line; not asked for while nobody sees the chart.
 
         What is beyond the axis is drawn at its edge. uPlot cannot leave out what is before the first known
@@ -132,7 +132,7 @@ class Chart:
             start = int(np.argmax(known))
             values[:, :start] = values[:, start : start + 1]
         values = (values - low) * (_TOP / (high - low))
-        kept = corners(values, self._tolerance, window.first)
+        kept = decimate(values, self._tolerance, window.first)
         self._send(kept, values[:, kept], window.ages()[kept])
 
     def _send(self, kept: np.ndarray, values: np.ndarray, ages: np.ndarray) -> None:
@@ -182,7 +182,7 @@ def _round(step: float) -> float:
     return next(scale * digit for digit in (1.0, 2.0, 5.0, 10.0) if scale * digit >= step - 1e-12 * scale)
 
 
-def _series(line: Line) -> uplot.Series:
+def _series(line: ChartLine) -> uplot.Series:
     series: uplot.Series = {
         "label": line.label,
         "stroke": css(line.colour),

@@ -10,9 +10,9 @@ from typing import Any, Generic, TypeVar
 
 import viser
 
-from app.adapter.late import in_time
 from app.adapter.private import send_again
-from app.client.wish import HOLD, Send
+from app.adapter.removed_handle_errors import unless_removed
+from app.client.pending_edit import HOLD, Send
 from lessons.events import Event
 
 REMIND = 2.0
@@ -66,7 +66,7 @@ class Bindings(Generic[S]):
 
     def refresh(self, present: S) -> None:
         """Shows what the session has. Returns at once; the event loop does it."""
-        self._loop.call_soon_threadsafe(in_time, self._write, present)
+        self._loop.call_soon_threadsafe(unless_removed, self._write, present)
 
     def close(self) -> None:
         """The controls are about to be removed: writes nothing any more."""

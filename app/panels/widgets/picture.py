@@ -29,7 +29,7 @@ window.__himpcLabPaint = (title, count, changes) => {
 """
 
 
-class Picture:
+class SvgPicture:
     """An SVG that is as wide as its panel."""
 
     def __init__(

@@ -14,7 +14,7 @@ S_co = TypeVar("S_co", bound=Settings, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot(Generic[S_co]):
+class SessionSnapshot(Generic[S_co]):
     """latest: the last telemetry row; bound_seconds (n, 3): s each joint spent at its torque, velocity and
     position bound since the last reset."""
 

@@ -10,7 +10,7 @@ import viser
 from app.panels.widgets.command import add_command
 
 
-class Window:
+class PopupWindow:
     """Filled afresh each time it opens."""
 
     def __init__(

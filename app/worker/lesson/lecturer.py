@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from app.link.exercise import Answer, Curve, Exercise, Lecture, Phase, signals_of
+from app.link.exercise import Answer, Lecture, LessonPlace, Phase, SignalCurve, signals_of
 from app.worker.lesson.reference_run import ghost_of
-from app.worker.lesson.rows import Record, thinned
+from app.worker.lesson.rows import LessonRows, thinned
 from lessons.events import Event
 from lessons.session.session import Session
 from lessons.settings.settings import Settings, settings_after
@@ -22,7 +22,7 @@ from lessons.teaching.challenge import Challenge
 from lessons.teaching.control import within
 from lessons.teaching.lesson import Step
 from lessons.teaching.measure import Measure, Signal
-from lessons.teaching.prediction import Choice, Grade, Sketch, Value
+from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError
 
 _JUDGE_EVERY = 5  # reports: twice a second
@@ -36,7 +36,7 @@ Array = np.ndarray
 class Lecturer:
     """Of one exercise. A session is handed over at t = 0, before its first tick."""
 
-    def __init__(self, exercise: Exercise, session: Session, seed: int = 0) -> None:
+    def __init__(self, exercise: LessonPlace, session: Session, seed: int = 0) -> None:
         self.exercise = exercise
         self.answer: Answer | None = None
         self.fast = False
@@ -44,9 +44,9 @@ class Lecturer:
         self._ghost = ghost_of(exercise, seed)
         self._attempt = 0
         self._reports = 0
-        self._grade: Grade | None = None
+        self._grade: PredictionResult | None = None
         self._truth = math.nan
-        self._sketched: Curve | None = None
+        self._sketched: SignalCurve | None = None
         self._posted: list[Event] = []
         self._own = session.settings
         self._phase: Phase = "waiting"
@@ -61,9 +61,9 @@ class Lecturer:
         self._lost_at: float | None = None
         self._last: Lecture | None = None
 
-    def _empty_record(self) -> Record:
+    def _empty_record(self) -> LessonRows:
         ticks = math.ceil(self._part.duration / self._session.settings.T_s)
-        return Record(self._session.layout, ticks + 1)
+        return LessonRows(self._session.layout, ticks + 1)
 
     # ---------------------------------------------------------------- the run
 
@@ -201,7 +201,7 @@ class Lecturer:
             lost_at=self._lost_at,
         )
 
-    def _ghost_so_far(self) -> Record | None:
+    def _ghost_so_far(self) -> LessonRows | None:
         if self._ghost is None or not len(self._record) or not len(self._ghost.record):
             return None
         if self._phase == "done":  # a mission may take one of the two longer than the other
@@ -236,13 +236,13 @@ class Lecturer:
                 self._grade = prediction.grade(answer, self._record, ghost)
 
 
-def _value(measure: Measure, record: Record, ghost: Record | None) -> float:
+def _value(measure: Measure, record: LessonRows, ghost: LessonRows | None) -> float:
     return measure.value(record, ghost) if len(record) else math.nan
 
 
-def _curve(signal: Signal, record: Record) -> Curve:
-    return Curve(*thinned(record["t"][:, 0], signal.over(record)))
+def _curve(signal: Signal, record: LessonRows) -> SignalCurve:
+    return SignalCurve(*thinned(record["t"][:, 0], signal.over(record)))
 
 
-def _curves(signals: tuple[Signal, ...], record: Record) -> tuple[Curve, ...]:
+def _curves(signals: tuple[Signal, ...], record: LessonRows) -> tuple[SignalCurve, ...]:
     return tuple(_curve(signal, record) for signal in signals) if len(record) else ()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from time import perf_counter
 
-from app.link.exercise import Exercise
-from app.worker.lesson.rows import Record
+from app.link.exercise import LessonPlace
+from app.worker.lesson.rows import LessonRows
 from lessons.scenes.scene import Scene
 from lessons.session.start import begin
 from lessons.teaching.lesson import Step
@@ -17,7 +17,7 @@ class GhostRun:
     def __init__(self, scene: Scene, seed: int) -> None:
         self._session = begin(scene, seed)
         self._ticks = max(1, round(scene.duration / self._session.settings.T_s))
-        self.record = Record(self._session.layout, self._ticks)
+        self.record = LessonRows(self._session.layout, self._ticks)
 
     @property
     def finished(self) -> bool:
@@ -31,7 +31,7 @@ class GhostRun:
             self.record.add(self._session.tick())
 
 
-def ghost_of(exercise: Exercise, seed: int) -> GhostRun | None:
+def ghost_of(exercise: LessonPlace, seed: int) -> GhostRun | None:
     """The second robot's run, where a claim or a prediction is measured against it."""
     step = exercise.part
     if not isinstance(step, Step) or step.ghost is None:

@@ -9,7 +9,7 @@ from himpc.telemetry import Layout
 BUCKETS = 120
 
 
-class Record:
+class LessonRows:
     """Telemetry rows since the run's start; `record[field]` is (ticks, width), like a finished recording."""
 
     def __init__(self, layout: Layout, room: int, rows: np.ndarray | None = None) -> None:
@@ -30,10 +30,10 @@ class Record:
         self._rows[self._count] = row
         self._count += 1
 
-    def until(self, t: float) -> Record:
+    def until(self, t: float) -> LessonRows:
         """The rows up to a time, s."""
         count = int(np.searchsorted(self["t"][:, 0], t + 1e-9, "right"))
-        return Record(self._layout, count, self._rows[:count])
+        return LessonRows(self._layout, count, self._rows[:count])
 
 
 def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

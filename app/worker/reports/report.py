@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.link.inside import Inside, Watch
+from app.link.inside import Inside, InsideRequest
 from app.link.messages import BindingRow, TaskView
 from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
@@ -16,7 +16,7 @@ LISTED = 24
 """Binding rows sent to the page: more cannot be read in a tenth of a second."""
 
 
-class Run(ABC):
+class SessionReport(ABC):
     """What there is to see of a session.
 
     watch: what the page wants to see of its inside.
@@ -25,7 +25,7 @@ class Run(ABC):
     def __init__(self, session: Any) -> None:
         """session: of the kind that the subclass is for."""
         self.session = session
-        self.watch = Watch()
+        self.watch = InsideRequest()
 
     def own(self) -> OwnCode | None:
         """Of a controller from a file: whether it runs; what was saved meanwhile takes over."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from app.worker.reports.report import Run
+from app.worker.reports.report import SessionReport
 from app.worker.reports.torque import TorqueRun
 from app.worker.reports.velocity import VelocityRun
 from lessons.scenes.scene import Scene
@@ -11,12 +11,15 @@ from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession
 
-__all__ = ["Run", "TorqueRun", "VelocityRun", "start"]
+__all__ = ["SessionReport", "TorqueRun", "VelocityRun", "start"]
 
-_REPORTS: Mapping[type[Session], type[Run]] = {TorqueSession: TorqueRun, VelocitySession: VelocityRun}
+_REPORTS: Mapping[type[Session], type[SessionReport]] = {
+    TorqueSession: TorqueRun,
+    VelocitySession: VelocityRun,
+}
 
 
-def start(scene: Scene, seed: int) -> Run:
+def start(scene: Scene, seed: int) -> SessionReport:
     """A scene from its beginning. Raises InputError if its settings do not fit its robot."""
     session = begin(scene, seed)
     return _REPORTS[type(session)](session)

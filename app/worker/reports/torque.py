@@ -6,11 +6,11 @@ from typing import final
 
 import numpy as np
 
-from app.link.inside import Inside, Watch
+from app.link.inside import Inside, InsideRequest
 from app.link.messages import TaskView
 from app.link.own_code import OwnCode
 from app.worker.reports.own_code import File
-from app.worker.reports.report import Run
+from app.worker.reports.report import SessionReport
 from himpc.tasks import PlaneDistance, Task
 from himpc.tasks.kinds import word_of
 from lessons.geometry.look import matrix_of, plane_of
@@ -19,7 +19,7 @@ from robots import InputError, convergence_eigenvalues, convergence_gauge
 
 
 @final
-class TorqueRun(Run):
+class TorqueRun(SessionReport):
     """See `app.worker.reports.report.Run`."""
 
     session: TorqueSession
@@ -70,7 +70,7 @@ class TorqueRun(Run):
 
     def inside(self) -> Inside | None:
         session, watch = self.session, self.watch
-        if watch == Watch():
+        if watch == InsideRequest():
             return None
         mechanics = self._mechanics() if watch.spectrum else None
         spectrum = None if mechanics is None else convergence_eigenvalues(*mechanics)

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.link.messages import TaskView
 from app.link.mission_view import MissionRow, MissionView, Person
-from app.worker.reports.report import Run
+from app.worker.reports.report import SessionReport
 from himpc.htmpc import base_joints
 from himpc.missions import Go, MissionTask
 from himpc.rotation import quaternion
@@ -24,7 +24,7 @@ _AROUND = 1.9
 
 
 @final
-class VelocityRun(Run):
+class VelocityRun(SessionReport):
     """See `app.worker.reports.report.Run`.
 
     A target belongs to a role: it is the goal of the role's first open task, (m,) m or (3, 3)."""

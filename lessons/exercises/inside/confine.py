@@ -50,7 +50,7 @@ _SYSCALLS = (
 )
 
 
-class Refused(list[str]):
+class RefusedCalls(list[str]):
     """What was tried and refused, in order."""
 
 
@@ -171,7 +171,7 @@ def hide_the_lab() -> None:
     sys.meta_path.insert(0, _Hidden())
 
 
-def refuse(places: Sequence[Path], refused: Refused) -> None:
+def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
     """From now on Python itself refuses what the system may not: opening files that no import reads,
     programs, signals, the network; in every thread. Alone this is politeness, no prison.
 

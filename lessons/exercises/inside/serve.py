@@ -18,7 +18,7 @@ import numpy as np
 
 import himpc.qp  # noqa: F401  # what a solution may import of the lab
 from lessons.exercises.inside import wire
-from lessons.exercises.inside.confine import Refused, confine, hide_the_lab, limited, readable, refuse
+from lessons.exercises.inside.confine import RefusedCalls, confine, hide_the_lab, limited, readable, refuse
 from lessons.exercises.inside.now import Now, rebuilt
 from lessons.own.files import Source, execute, sentence
 from lessons.own.kinds import law_of, line_of
@@ -46,7 +46,7 @@ def serve(parent: int, memory: int, kernel: bool) -> None:
     sys.dont_write_bytecode = True
     _, data = wire.read(heard)
     source = Source(*json.loads(data))
-    refused = Refused()
+    refused = RefusedCalls()
     np.linalg.inv(np.eye(2))  # what libraries set up when first used
     hide_the_lab()
     places = readable()

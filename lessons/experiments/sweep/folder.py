@@ -18,7 +18,7 @@ from typing import Any
 
 from lessons.experiments.sweep.cells import Cell, perform_cell
 from lessons.experiments.sweep.grid import Sweep
-from lessons.parallel import Failed, Spread
+from lessons.parallel import FailedJob, Spread
 from robots import InputError
 
 
@@ -93,7 +93,7 @@ def carry_on(
                     f"{', '.join(files['files'])}: was changed while it was swept, and cells of two contents "
                     "are no map: repeat the command with another folder for --out"
                 )
-            if isinstance(outcome, Failed):
+            if isinstance(outcome, FailedJob):
                 cell = Cell(missing[place], None, outcome.reason)
             else:
                 cell = Cell(missing[place], outcome, None)

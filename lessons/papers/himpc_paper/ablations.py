@@ -8,31 +8,31 @@ from typing import Literal
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Results, Run, Work
+from lessons.experiments.jobs import Job, JobResult, Results, Work
 from lessons.papers.himpc_paper.effort import EffortJob
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET
 from lessons.papers.himpc_paper.planar import RT1
 from lessons.papers.himpc_paper.table_7 import step_seconds
-from lessons.papers.item import Check, Item, Row, Section, Table
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table
 from lessons.papers.printed import printed
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
 _FAINTEST = 1e-3
 """mm: errors below are drawn here, since a logarithmic axis has no zero."""
 
 
-def _level_1(run: Run, scale: float = 1e3) -> float:
+def _level_1(run: JobResult, scale: float = 1e3) -> float:
     """The largest RMSE of level 1's coordinates after the first second, mm; NaN if control was lost."""
     if not run.completed:
         return math.nan
     return scale * max(value for value in run.summary["tasks"][0]["rmse_after_1s"])
 
 
-def _line(runs: Mapping[float, Run], label: str, colour: str) -> Curve:
+def _line(runs: Mapping[float, JobResult], label: str, colour: str) -> PlotCurve:
     errors = np.array([_level_1(run) for run in runs.values()])
-    return Curve(np.array(list(runs)), np.maximum(errors, _FAINTEST), label, colour)
+    return PlotCurve(np.array(list(runs)), np.maximum(errors, _FAINTEST), label, colour)
 
 
 # -------------------------------------------------------------------------------- Remark 8
@@ -59,11 +59,11 @@ def _remark_8(results: Results, quick: bool) -> Section:
         rows.append((str(knots), number(medians[-1]), *map(number, errors[-1]), trouble(run)))
     x = np.array(_SHORTER[quick], float)
     panels = (
-        Panel("median step (ms)", (Curve(x, np.array(medians), colour="0"),), "knots of levels 2 and 3"),
+        Panel("median step (ms)", (PlotCurve(x, np.array(medians), colour="0"),), "knots of levels 2 and 3"),
         Panel(
             "RMSE over that with all knots",
             tuple(
-                Curve(x, np.array([each[k] / errors[0][k] for each in errors]), label, str(k))
+                PlotCurve(x, np.array([each[k] / errors[0][k] for each in errors]), label, str(k))
                 for k, label in enumerate(("level 1, worst axis", "$o_Z$", "$q_1$"))
             ),
             "knots of levels 2 and 3",
@@ -101,7 +101,7 @@ def _over(
     title: str,
     what: str,
     values: tuple[float, ...],
-    runs: Mapping[str, Mapping[float, Run]],
+    runs: Mapping[str, Mapping[float, JobResult]],
     note: str,
     log: bool,
 ) -> Section:
@@ -216,12 +216,12 @@ def _section_4c(results: Results, quick: bool) -> Section:
         ),
         tables=(Table("Section IV-C: level-1 RMSE, worst axis (mm)", columns, tuple(rows)),),
         checks=(
-            Check(
+            PaperCheck(
                 f"with ‖Δτ‖² some R keeps all references within {_FINE:g} mm: how many of the tried",
                 float(len(usable["Δτ"])),
                 len(usable["Δτ"]) > 0,
             ),
-            Check(
+            PaperCheck(
                 "with ‖τ‖² fewer of the tried R do",
                 float(len(usable["τ"])),
                 len(usable["τ"]) < len(usable["Δτ"]),

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.planar import RT1
 from lessons.papers.item import Item, Section, Table, between
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import NominalModel
@@ -56,7 +56,7 @@ class ModelErrors:
     epsilon: float
 
 
-def model_errors(run: Run) -> ModelErrors:
+def model_errors(run: JobResult) -> ModelErrors:
     """The errors along a run, from their definitions.
 
     With q̈_k the mean acceleration of period k, from the plant's true velocities:
@@ -136,8 +136,8 @@ def _section(results: Results, quick: bool) -> Section:
 def _panel(label: str, errors: dict[float, ModelErrors]) -> Panel:
     x = np.array(list(errors))
 
-    def line(field: str, symbol: str, colour: str) -> Curve:
-        return Curve(x, np.array([getattr(each, field) for each in errors.values()]), symbol, colour)
+    def line(field: str, symbol: str, colour: str) -> PlotCurve:
+        return PlotCurve(x, np.array([getattr(each, field) for each in errors.values()]), symbol, colour)
 
     curves = (
         line("gamma", r"$\gamma$ (21), rad/s²", "1"),

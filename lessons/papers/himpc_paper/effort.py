@@ -13,7 +13,7 @@ from himpc.formulation.forms import StackForm, measure, stack_form
 from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
 from himpc.references.hold import still
-from lessons.experiments.jobs import Run, Work
+from lessons.experiments.jobs import JobResult, Work
 from lessons.scenes.catalog import prepared, torque_scene
 from robots import Plant
 
@@ -41,7 +41,7 @@ class EffortJob(Work):
     R: float = 0.05
     hold_deg: tuple[float, ...] = ()
 
-    def do(self) -> Run:
+    def do(self) -> JobResult:
         """The run; see `Work.do`."""
         scene = prepared(torque_scene(self.spec.scene), self.spec.controller, self.spec.set)
         robot, T_s = scene.robot, scene.settings.T_s
@@ -76,7 +76,7 @@ class EffortJob(Work):
             change = np.linalg.solve(G.T @ G + self.R * np.eye(robot.n), -(G.T @ free + pull))
             plant.step(plant.tau + change, T_s)
         t = np.array([T_s * k for k in range(len(errors))])
-        return Run(self, _summary(form, t, np.array(errors), len(errors) < ticks), {"t": t[:, None]})
+        return JobResult(self, _summary(form, t, np.array(errors), len(errors) < ticks), {"t": t[:, None]})
 
     @property
     def words(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import RT4, rt4
 from lessons.papers.himpc_paper.iiwa import SOURCE as SECTION_VI
 from lessons.papers.himpc_paper.planar import ENCODER, RT1, level_1, roughness, rt1, rt2, rt3
@@ -40,7 +40,7 @@ def _own(quantity: str, unit: str, ours: float, why: str = "the paper prints no 
     return Row(quantity, unit, None, ours, why)
 
 
-def _lost(run: Run) -> float:
+def _lost(run: JobResult) -> float:
     return math.nan if run.lost_at is None else run.lost_at
 
 
@@ -89,7 +89,7 @@ def _conflict(results: Results, quick: bool) -> Section:
     return Section(rows=tuple(rows))
 
 
-def _swing(run: Run, start: float, end: float) -> tuple[float, float]:
+def _swing(run: JobResult, start: float, end: float) -> tuple[float, float]:
     """Of joint 3: the largest speed, deg/s, and half its changes of direction per second."""
     v = DEG * run.column("v", 2)[(run.t >= start) & (run.t <= end)]
     if not len(v):
@@ -222,7 +222,7 @@ def _settings(results: Results, quick: bool) -> Section:
 _AXES = ((0, "x"), (1, "y"))
 
 
-def _farthest(run: Run) -> float:
+def _farthest(run: JobResult) -> float:
     error = run["error/position"]
     return float(np.linalg.norm(error, axis=1).max()) if run.completed and len(error) else math.nan
 

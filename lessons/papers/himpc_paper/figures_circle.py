@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.curves import (
     PLANAR_ERRORS,
     banded,
@@ -20,7 +20,7 @@ from lessons.papers.himpc_paper.planar import COMPARED, ENCODER, SOURCE, roughne
 from lessons.papers.item import Item, Row, Section, Table
 from lessons.papers.printed import printed
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import name
 
 DEG = 180 / np.pi
@@ -32,7 +32,7 @@ def encoder_runs(controllers: Sequence[str]) -> tuple[Job, ...]:
     return tuple(rt1(controller, *ENCODER) for controller in controllers)
 
 
-def _runs(results: Results, jobs: Sequence[Job]) -> list[Run]:
+def _runs(results: Results, jobs: Sequence[Job]) -> list[JobResult]:
     return [results[job] for job in jobs]
 
 
@@ -43,13 +43,14 @@ def _picture(name: str, caption: str, panels: Sequence[Panel | Bars], columns: i
 # ------------------------------------------------------------------------ Figs. 3 and 9: references
 
 
-def _reference(run: Run, field: str, k: int, label: str, colour: str, scale: float = 1.0) -> Curve:
+def _reference(run: JobResult, field: str, k: int, label: str, colour: str, scale: float = 1.0) -> PlotCurve:
     return curve(run, f"x_d/{field}", k, scale, label=label, colour=colour)
 
 
-def _path(*runs: Run) -> Panel:
+def _path(*runs: JobResult) -> Panel:
     curves = tuple(
-        Curve(run.column("x_d/position"), run.column("x_d/position", 1), colour="reference") for run in runs
+        PlotCurve(run.column("x_d/position"), run.column("x_d/position", 1), colour="reference")
+        for run in runs
     )
     return Panel("$y_d$ (m)", curves, "$x_d$ (m)", equal=True, title="EE")
 

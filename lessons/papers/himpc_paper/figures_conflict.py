@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.curves import PLANAR_ERRORS, curve, error_panels, joint_panels
 from lessons.papers.himpc_paper.planar import SOURCE, level_1, rt1, rt2, rt3
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.printed import printed
 from lessons.papers.words import trouble
-from lessons.plots.panels import Bars, Curve, Panel, Picture
+from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import name
 from robots import Robot, load_robot
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 DEG = 180 / np.pi
 
 
-def _runs(results: Results, jobs: Sequence[Job]) -> list[Run]:
+def _runs(results: Results, jobs: Sequence[Job]) -> list[JobResult]:
     return [results[job] for job in jobs]
 
 
@@ -140,7 +140,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
         for title, chosen in (("0 to 8 s", places[:10]), ("8 to 16 s", places[9:])):
             chains = [(place, skeleton(robot, run["q"][place])) for place in chosen]
             arms = tuple(
-                Curve(
+                PlotCurve(
                     points[:, 0],
                     points[:, 1],
                     label="HIMPC" if k == 0 else "",
@@ -151,7 +151,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             )
             span = slice(chosen[0], chosen[-1] + 1)
             x_d = run["x_d/position"][span]
-            path = Curve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
+            path = PlotCurve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
             # The last pose is the first of the other panel, or where that began.
             notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
-from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Bars, Picture
 from lessons.scenes.run_spec import RunSpec
@@ -39,12 +39,12 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
 _KINDS = ("position", "velocity")
 
 
-def _over(run: Run, kind: str) -> float:
+def _over(run: JobResult, kind: str) -> float:
     """The largest |value| over its limit; 1 is the limit."""
     return run.figure("limits", kind, "max_ratio")
 
 
-def _level_1_mm(run: Run) -> float:
+def _level_1_mm(run: JobResult) -> float:
     return 1e3 * max(run.error_of("position", k) for k in range(3))
 
 
@@ -77,7 +77,7 @@ def _section(results: Results, quick: bool) -> Section:
         "",
     )
     own = [run for _, mode, run in cases if mode == "barrier and margin"]
-    checks: tuple[Check, ...] = tuple(
+    checks: tuple[PaperCheck, ...] = tuple(
         check
         for plant, run in zip(plants, own, strict=True)
         for check in (
@@ -109,7 +109,7 @@ _WHY = "the paper prints no number; its Fig. 13 shows slight violations of speed
 
 
 def _picture(results: Results, plants: list[str]) -> Picture:
-    def bars(label: str, value: Callable[[Run], float]) -> Bars:
+    def bars(label: str, value: Callable[[JobResult], float]) -> Bars:
         series = tuple(
             (mode, str(place), tuple(value(results[_job(mode, plant)]) for plant in plants))
             for place, mode in enumerate(MODES)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Run
+from lessons.experiments.jobs import Job, JobResult
 from lessons.scenes.run_spec import RunSpec
 
 RT1, RT2, RT3 = "planar3-circle", "planar3-conflict", "planar3-singular"
@@ -34,12 +34,12 @@ def rt3(controller: str) -> Job:
     return Job(RunSpec(RT3, controller=controller))
 
 
-def level_1(run: Run) -> float:
+def level_1(run: JobResult) -> float:
     """The larger RMSE of x and y after the first second, m; NaN if the run was too short for one."""
     return float(np.maximum(run.error_of("position", 0), run.error_of("position", 1)))
 
 
-def largest_error(run: Run) -> float:
+def largest_error(run: JobResult) -> float:
     """The largest distance of the EE from its reference, m; infinite if control was lost."""
     if run.error is not None:
         return math.nan
@@ -47,12 +47,12 @@ def largest_error(run: Run) -> float:
     return math.inf if run.lost_at is not None else float(np.linalg.norm(error, axis=1).max())
 
 
-def whole_run(run: Run) -> float:
+def whole_run(run: JobResult) -> float:
     """The larger RMSE of x and y over the whole run, m."""
     return float(np.maximum(run.error_of("position", 0, "rmse"), run.error_of("position", 1, "rmse")))
 
 
-def roughness(run: Run) -> float:
+def roughness(run: JobResult) -> float:
     """RMS of ‖Δτ‖ over the run, N·m per tick."""
     steps = run["delta_tau"]
     return float(np.sqrt((steps**2).sum(axis=1).mean())) if len(steps) else math.nan

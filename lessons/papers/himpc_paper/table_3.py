@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.planar import (
     COMPARED,
     SOURCE,
@@ -17,7 +17,7 @@ from lessons.papers.himpc_paper.planar import (
     rt3,
     whole_run,
 )
-from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
 from lessons.papers.printed import printed
 from lessons.papers.words import number, trouble
 from lessons.plots.style import name
@@ -39,7 +39,7 @@ CRITERIA = {
 
 
 @dataclass(frozen=True)
-class Verdict:
+class PropertyResult:
     """Whether a property holds, None if a run it needs failed, and the numbers that decided it."""
 
     holds: bool | None
@@ -51,7 +51,7 @@ class Verdict:
         return {True: "✓", False: "✗", None: "–"}[self.holds]
 
 
-def verdicts(results: Results, controller: str) -> dict[str, Verdict]:
+def verdicts(results: Results, controller: str) -> dict[str, PropertyResult]:
     """The verdict on each property."""
     circle, conflict, singular = (results[make(controller)] for make in (rt1, rt2, rt3))
     accuracy, speed = level_1(circle), conflict.figure("limits", "velocity", "max_ratio")
@@ -68,9 +68,9 @@ def verdicts(results: Results, controller: str) -> dict[str, Verdict]:
     }
 
 
-def _verdict(runs: Sequence[Run], holds: bool, numbers: str) -> Verdict:
+def _verdict(runs: Sequence[JobResult], holds: bool, numbers: str) -> PropertyResult:
     failed = next((run.error for run in runs if run.error is not None), None)
-    return Verdict(bool(holds), numbers) if failed is None else Verdict(None, failed)
+    return PropertyResult(bool(holds), numbers) if failed is None else PropertyResult(None, failed)
 
 
 def _distance(error: float) -> str:
@@ -133,7 +133,7 @@ def _section(results: Results, quick: bool) -> Section:
         tables=(_conflict_table(results),),
         checks=(
             *(
-                Check(f"HIMPC: {text}", float(verdict.holds or 0), bool(verdict.holds))
+                PaperCheck(f"HIMPC: {text}", float(verdict.holds or 0), bool(verdict.holds))
                 for text, verdict in own.items()
             ),
             *_conflict_checks(results),
@@ -170,7 +170,7 @@ def _conflict_table(results: Results) -> Table:
     return Table("Under conflict (RT2)", columns, tuple(rows))
 
 
-def _conflict_checks(results: Results) -> Sequence[Check]:
+def _conflict_checks(results: Results) -> Sequence[PaperCheck]:
     own, hqp = results[rt2("himpc")], results[rt2("hqp")]
     worse = level_1(hqp) / level_1(own)
     speed = hqp.figure("limits", "velocity", "max_ratio")
@@ -197,7 +197,7 @@ def _conflict_checks(results: Results) -> Sequence[Check]:
         run = results[rt2(controller)]
         error, demand = largest_error(run), run.figure("limits", "torque", "max_ratio")
         checks.append(
-            Check(
+            PaperCheck(
                 f"{name(controller)}, RT2: loses level 1 (error > 3 cm, or torque demand > 4 × its bound)",
                 demand,
                 bool(error > LOST_LEVEL_1 or demand > LOST_TORQUE),

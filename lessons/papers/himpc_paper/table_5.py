@@ -6,7 +6,7 @@ import numpy as np
 
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import COORDINATES, DISTURBED, OPEN, RT4, RT4_DATA_SHEET, SOURCE, rt4
-from lessons.papers.item import Check, Item, Row, Section, Table, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
 from lessons.papers.printed import printed
 from lessons.papers.words import gain_rows, number, trouble
 from lessons.scenes.run_spec import RunSpec
@@ -180,7 +180,7 @@ def _change(results: Results, scene: str, extra: tuple[str, ...]) -> list[float]
     return [disturbed.error_of("position", k) / nominal.error_of("position", k) for k in range(3)]
 
 
-def _table_5_checks(results: Results, quick: bool) -> tuple[Check, ...]:
+def _table_5_checks(results: Results, quick: bool) -> tuple[PaperCheck, ...]:
     checks = []
     for scene in _SCENES[quick]:
         for reading in _CHECKED:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import RT4, SOURCE
 from lessons.papers.item import Item, Row, Section, Table, between
 from lessons.papers.printed import printed
@@ -22,7 +22,7 @@ def timed(controller: str, N: int, quick: bool) -> Job:
     )
 
 
-def step_seconds(run: Run) -> dict[str, float]:
+def step_seconds(run: JobResult) -> dict[str, float]:
     """Average, median and maximum step time, s; the first ten steps warm up. NaN for a failed run."""
     times = 1e-6 * run.column("step_us")[10:]
     if not len(times):
@@ -91,7 +91,7 @@ MACHINE = 9.0
 """A time may be ten times longer or shorter on another machine, or on this one under load."""
 
 
-def _iterations(run: Run) -> tuple[float, float, float]:
+def _iterations(run: JobResult) -> tuple[float, float, float]:
     return run.figure("solver", "iterations", "mean"), 1.5, 3.5
 
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Results, Run
+from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
-from lessons.papers.item import Check, Item, Row, Section, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, between
 from lessons.papers.printed import printed
 from lessons.papers.words import trouble
 
@@ -28,7 +28,7 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
     return tuple(resolution_job(each, quick) for each in (paper["benchmark"], *paper["resolution"]))
 
 
-def smoothness(run: Run, benchmark: Run) -> float:
+def smoothness(run: JobResult, benchmark: JobResult) -> float:
     """S of section VI-D: the RMS of ‖τ − τ of the benchmark‖, N·m, over the time both ran."""
     ticks = min(len(run.t), len(benchmark.t))
     if not ticks:
@@ -62,7 +62,7 @@ def _section(results: Results, quick: bool) -> Section:
         ),
         rows=rows,
         checks=(
-            Check(
+            PaperCheck(
                 "S strictly increases with the resolution: least difference (N·m) above 0", rising, rising > 0
             ),
             between("largest deviation of S from the paper's, as a share", worst, 0.05, 0.3),

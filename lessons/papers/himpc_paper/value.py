@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.experiments.jobs import Job, Results, Run
-from lessons.papers.item import Check, Item, Section
+from lessons.experiments.jobs import Job, JobResult, Results
+from lessons.papers.item import Item, PaperCheck, Section
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def _section(results: Results, quick: bool) -> Section:
     epsilon, alpha = decrease(run.column("cost/position"), run.t)
     curves = tuple(_value(run, level, k) for k, level in enumerate(_LEVELS))
     V = run.column("cost/position")
-    ratio = Curve(V[:-1], V[1:] / V[:-1], "level 1", "0", "dots") if len(V) else Curve(V, V)
+    ratio = PlotCurve(V[:-1], V[1:] / V[:-1], "level 1", "0", "dots") if len(V) else PlotCurve(V, V)
     panels = (
         Panel("$V_N(k)$", curves, log_y=True),
         Panel(
@@ -69,7 +69,7 @@ def _section(results: Results, quick: bool) -> Section:
             f"as level 1 lets them. ε_N = {number(epsilon)}. {trouble(run)}",
         ),
         checks=(
-            Check(
+            PaperCheck(
                 f"level 1, ticks with V_N above {_FAR:g} ε_N: least α of (39) > 0",
                 alpha,
                 bool(alpha > 0),
@@ -79,8 +79,8 @@ def _section(results: Results, quick: bool) -> Section:
     )
 
 
-def _value(run: Run, level: str, place: int) -> Curve:
-    return Curve(run.t, run.column(f"cost/{level}"), f"level {place + 1}", str(place))
+def _value(run: JobResult, level: str, place: int) -> PlotCurve:
+    return PlotCurve(run.t, run.column(f"cost/{level}"), f"level {place + 1}", str(place))
 
 
 ITEMS = (

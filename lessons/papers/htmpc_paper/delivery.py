@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE
-from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
 from lessons.papers.printed import printed
 from lessons.papers.words import number
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def _report(results: Results, quick: bool) -> Section:
     )
     turns = float(done["decoupled", "5 cm, at rest"].mean())
     checks = [
-        Check("every layout completes, HT and ST", float(together.mean()), bool(together.all())),
+        PaperCheck("every layout completes, HT and ST", float(together.mean()), bool(together.all())),
         between("share of the layouts that the decoupled one completes", turns, 0.5, 1.0),
     ]
     for rule in RULES:
@@ -84,7 +84,7 @@ def _report(results: Results, quick: bool) -> Section:
         run = results[_job(layouts[0], architecture, "80 cm")]
         if len(run.t):
             base = run["x/base"]
-            curves.append(Curve(base[:, 0], base[:, 1], architecture, str(place)))
+            curves.append(PlotCurve(base[:, 0], base[:, 1], architecture, str(place)))
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     return Section(
         rows=_ratios(time),

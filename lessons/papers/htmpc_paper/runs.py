@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lessons.experiments.jobs import Job, Run
+from lessons.experiments.jobs import Job, JobResult
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.missions import random_peaks
 
@@ -38,12 +38,12 @@ def example(controller: str, *assignments: str) -> Job:
     return Job(RunSpec(SQUARE, controller=controller, set=assignments))
 
 
-def part(runs: Sequence[Run], place: int, key: str = "normalised_base_error") -> Array:
+def part(runs: Sequence[JobResult], place: int, key: str = "normalised_base_error") -> Array:
     """A figure of one part of each run; NaN where there is none."""
     return np.array([run.figure("parts", place, key) for run in runs])
 
 
-def hand_mm(run: Run) -> tuple[float, float, float]:
+def hand_mm(run: JobResult) -> tuple[float, float, float]:
     """Mean, standard deviation and maximum of the EE error over the whole run, mm; NaN if it failed."""
     if not len(run.t):
         return float("nan"), float("nan"), float("nan")
@@ -51,7 +51,7 @@ def hand_mm(run: Run) -> tuple[float, float, float]:
     return float(error.mean()), float(error.std()), float(error.max())
 
 
-def normalised(run: Run) -> Array:
+def normalised(run: JobResult) -> Array:
     """The base error over time, over its value at the start of each part."""
     error = np.linalg.norm(run["error/base"], axis=1)
     half = len(error) // 2

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lessons.experiments.jobs import Job, Results, Run, Work
+from lessons.experiments.jobs import Job, JobResult, Results, Work
 from lessons.papers.htmpc_paper.runs import (
     EE_HOME,
     METHODS,
@@ -20,10 +20,10 @@ from lessons.papers.htmpc_paper.runs import (
     peaks,
     square,
 )
-from lessons.papers.item import Check, Item, Row, Section, Table, at_most, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
 from lessons.papers.printed import printed
 from lessons.papers.words import number
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 
 BASE_GAINS = (0.3, 0.6, 0.65, 0.7, 0.75)
 """1/s: base gains of HTIDKC that are tried to match HTMPC on Part 1; the authors' is the first."""
@@ -45,7 +45,7 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
     )
 
 
-def _runs(results: Results, quick: bool) -> dict[str, list[Run]]:
+def _runs(results: Results, quick: bool) -> dict[str, list[JobResult]]:
     """Runs by method, among them the HTIDKC that matches HTMPC best on Part 1."""
     found = {
         words: [results[square(controller, peak)] for peak in peaks(quick)]
@@ -63,11 +63,11 @@ def _runs(results: Results, quick: bool) -> dict[str, list[Run]]:
 def _fig_3(results: Results, quick: bool) -> Section:
     run = results[example("htmpc")]
     targets = np.array(peaks(quick))
-    home = Curve(EE_HOME[:1], EE_HOME[1:], "EE", "reference", "dots")
-    curves = [Curve(targets[:, 0], targets[:, 1], "peak targets", "0", "dots"), home]
+    home = PlotCurve(EE_HOME[:1], EE_HOME[1:], "EE", "reference", "dots")
+    curves = [PlotCurve(targets[:, 0], targets[:, 1], "peak targets", "0", "dots"), home]
     if len(run.t):
         base = run["x/base"]
-        curves.append(Curve(base[:, 0], base[:, 1], "base path of the example", "htmpc"))
+        curves.append(PlotCurve(base[:, 0], base[:, 1], "base path of the example", "htmpc"))
     caption = "Peak targets of the random square waves, all out of reach, and one base path."
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     return Section(pictures=(Picture("htmpc-fig-3", caption, (panel,)),))
@@ -78,11 +78,11 @@ def _fig_4(results: Results, quick: bool) -> Section:
     # Until shortly before 8 s HTMPC and HTMPC_WPT do the same: the first is broad.
     weights = dict.fromkeys(runs, 1.0) | {"HTMPC": 2.6}
     base = tuple(
-        Curve(run.t, normalised(run), words, run.controller, weight=weights[words])
+        PlotCurve(run.t, normalised(run), words, run.controller, weight=weights[words])
         for words, run in runs.items()
     )
     hand = tuple(
-        Curve(
+        PlotCurve(
             run.t, 1e3 * np.linalg.norm(run["error/ee"], axis=1), words, run.controller, weight=weights[words]
         )
         for words, run in runs.items()
@@ -150,7 +150,7 @@ def _fig_6(results: Results, quick: bool) -> Section:
             0.02 if not quick else 0.05,
             band=None,
         ),
-        Check(
+        PaperCheck(
             "Part 2: HTMPC_WPT − HTMPC, lower end of the 95 % interval > 0",
             gap.mean() - margin,
             bool(gap.mean() - margin > 0),
@@ -186,7 +186,7 @@ def _apart(a: Array, b: Array) -> float:
     return abs(float(a.mean() / b.mean()) - 1.0)
 
 
-def _line(words: str, runs: list[Run], errors: tuple[Array, Array], authors: float) -> tuple[str, ...]:
+def _line(words: str, runs: list[JobResult], errors: tuple[Array, Array], authors: float) -> tuple[str, ...]:
     hands = np.array([hand_mm(run) for run in runs])
     on_line = np.array([collinear(run.job) for run in runs])
     subset = errors[1][on_line].mean() if on_line.any() else math.nan
@@ -207,13 +207,13 @@ def _strip(title: str, values: dict[str, Array]) -> Panel:
     for place, each in enumerate(values.values()):
         if np.isfinite(each).all() and np.ptp(each) > 0:
             curves.append(_violin(place, each))
-        curves.append(Curve(np.full(len(each), float(place)), each, "", str(place), "dots"))
+        curves.append(PlotCurve(np.full(len(each), float(place)), each, "", str(place), "dots"))
         across = np.linspace(place - 0.2, place + 0.2, 20)  # so many that none is drawn as a dot
-        curves.append(Curve(across, np.full(20, each.mean()), "", str(place)))
+        curves.append(PlotCurve(across, np.full(20, each.mean()), "", str(place)))
     return Panel("base error (1)", tuple(curves), "method", title=title, x_names=tuple(values))
 
 
-def _violin(place: int, values: Array) -> Curve:
+def _violin(place: int, values: Array) -> PlotCurve:
     """The outline of the fitted density, from the smallest to the largest value."""
     from scipy.stats import gaussian_kde  # here: it takes longer than all that the papers' jobs load
 
@@ -221,7 +221,7 @@ def _violin(place: int, values: Array) -> Curve:
     density = gaussian_kde(values)(y)
     half = 0.4 * density / density.max()
     x, y = np.append(place - half, (place + half)[::-1]), np.append(y, y[::-1])
-    return Curve(np.append(x, x[0]), np.append(y, y[0]), "", str(place))
+    return PlotCurve(np.append(x, x[0]), np.append(y, y[0]), "", str(place))
 
 
 def _fig_7(results: Results, quick: bool) -> Section:
@@ -234,7 +234,7 @@ def _fig_7(results: Results, quick: bool) -> Section:
         for place, (low, high) in enumerate(pairwise(edges)):
             inside = (errors >= low) & (errors < high)
             label = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
-            curves.append(Curve(targets[inside, 0], targets[inside, 1], label, str(place), "dots"))
+            curves.append(PlotCurve(targets[inside, 0], targets[inside, 1], label, str(place), "dots"))
         panels.append(Panel("y from the EE (m)", tuple(curves), "x (m)", title=words, equal=True))
         on_line = np.array([collinear(run.job) for run in runs])
         apart = [errors[chosen].mean() if chosen.any() else math.nan for chosen in (on_line, ~on_line)]

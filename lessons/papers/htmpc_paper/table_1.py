@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE, example, hand_mm, normalised
-from lessons.papers.item import Check, Item, Row, Section, Table, between
+from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
 from lessons.papers.printed import printed
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 
 EQUATIONS = {"cost": "(11)", "per_coordinate": "(12)"}
 LETTERS = {"paper": "A", "proximal": "C"}
@@ -83,7 +83,7 @@ def _order(results: Results, f: str, d: str) -> Row:
     )
 
 
-def _base_checks(results: Results) -> tuple[Check, ...]:
+def _base_checks(results: Results) -> tuple[PaperCheck, ...]:
     """Fig. 5: the base's error in Part 1 under (11), less that under (12)."""
     checks = []
     for f in FORMULATIONS:
@@ -101,7 +101,7 @@ def _fig_5(results: Results, quick: bool) -> Section:
         curves = []
         for place, (e, d) in enumerate((e, d) for e in EQUATIONS for d in DELTAS):
             run = results[_job(f, e, d)]
-            curves.append(Curve(run.t, normalised(run), f"{EQUATIONS[e]}, {d} δ", str(place)))
+            curves.append(PlotCurve(run.t, normalised(run), f"{EQUATIONS[e]}, {d} δ", str(place)))
         panels.append(
             Panel(
                 "base error (1)",

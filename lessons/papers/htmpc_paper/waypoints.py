@@ -6,7 +6,7 @@ from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE
 from lessons.papers.item import Item, Section, Table
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Curve, Panel, Picture
+from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
 HEIGHTS = (0.5, 0.8, 1.2)
@@ -36,7 +36,7 @@ def _report(results: Results, quick: bool) -> Section:
         )
         if len(run.t):
             base = run["x/base"]
-            curves.append(Curve(base[:, 0], base[:, 1], words, str(place)))
+            curves.append(PlotCurve(base[:, 0], base[:, 1], words, str(place)))
     caption = "Base paths. The paper's waypoints are not printed: these are ours."
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     columns = ("architecture", "way of the base (m)", "time (s)", "mission")

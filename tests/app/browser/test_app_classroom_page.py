@@ -11,7 +11,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.classroom import STEERING, Classroom
 from app.server.server import PageServer
-from browsing.hands import open_page, press, write
+from browsing.browser_actions import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")

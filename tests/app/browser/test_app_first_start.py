@@ -12,7 +12,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server.opening import opened_in_a_browser
 from app.server.server import PageServer
-from browsing.hands import SLOW, eventually, new_page
+from browsing.browser_actions import SLOW, eventually, new_page
 from lessons.scenes.run_spec import RunSpec
 
 

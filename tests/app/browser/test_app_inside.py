@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.inside import Watch
+from app.link.inside import InsideRequest
 from app.link.messages import Play, Post
 from app.panels.inside.matrix import TITLE as HESSIAN
 from app.panels.inside.plane import TITLE as PLANE
 from app.panels.inside.spectrum import TITLE as SPECTRUM
 from app.server.server import PageServer
-from browsing.another import show_scene
-from browsing.hands import drag_target, eventually, often, open_page, press, set_number, tab
+from browsing.browser_actions import drag_target, eventually, often, open_page, press, set_number, tab
+from browsing.scene_switch import show_scene
 from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
 from lessons.scenes.run_spec import RunSpec
@@ -52,7 +52,7 @@ def sheet(shared: Page, drawing: PageServer) -> Page:
     return shared
 
 
-def learner_of(server: PageServer) -> Learner:
+def learner_of(server: PageServer) -> SimulationClient:
     return server.sessions.learners[0]
 
 
@@ -213,5 +213,5 @@ def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
     expect(page.get_by_text("Later knots are held")).to_be_hidden()
     learner.send(Post(Set("controller", "osf")))
     expect(page.get_by_text("osf solves no such QP")).to_be_visible()
-    learner.send(Watch(plane=(7, 9)))  # a stranger's joints
+    learner.send(InsideRequest(plane=(7, 9)))  # a stranger's joints
     assert eventually(page, lambda: learner.failure is None and learner.status is not None)

@@ -11,10 +11,10 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.link.choice import SceneChoice
-from app.link.exercise import Exercise, parts_of
+from app.link.exercise import LessonPlace, parts_of
 from app.link.messages import Post
 from app.server.server import PageServer
-from browsing.hands import eventually, key, open_page, press
+from browsing.browser_actions import eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
 from lessons.authoring.lesson import lesson_named
 from lessons.authoring.new import text_of
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 @pytest.fixture(scope="module")
 def school() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice.of_lesson(Exercise(COURSE[0], 1)), port=0, max_sessions=1)
+    running = PageServer(SceneChoice.of_lesson(LessonPlace(COURSE[0], 1)), port=0, max_sessions=1)
     yield running
     running.close()
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.server.server import PageServer
-from browsing.another import show_scene
-from browsing.hands import drag_target, eventually, open_page, press, target_position
+from browsing.browser_actions import drag_target, eventually, open_page, press, target_position
+from browsing.scene_switch import show_scene
 from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
@@ -29,7 +29,7 @@ def one(kind: str, axis: str) -> SceneChoice:
     return SceneChoice(RunSpec("hold"), urdf_text=ONE_JOINT.format(kind=kind, axis=axis))
 
 
-def joint(learner: Learner) -> float:
+def joint(learner: SimulationClient) -> float:
     found = learner.read(lambda _, history: float(history.latest[history.layout.fields["q"]][0]))
     assert found is not None
     return found

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.mission_view import MissionView
 from app.server.server import PageServer
-from browsing.hands import (
+from browsing.browser_actions import (
     camera,
     drag_target,
     eventually,
@@ -61,7 +61,7 @@ def page(shared_page: Page) -> Page:
 
 
 @pytest.fixture
-def learner(server: PageServer, page: Page) -> Learner:
+def learner(server: PageServer, page: Page) -> SimulationClient:
     """The simulation behind `page`, which was reset first."""
     assert eventually(page, lambda: bool(server.sessions.learners))
     found = server.sessions.learners[0]
@@ -69,34 +69,34 @@ def learner(server: PageServer, page: Page) -> Learner:
     return found
 
 
-def mission(learner: Learner) -> MissionView:
+def mission(learner: SimulationClient) -> MissionView:
     assert learner.status is not None and learner.status.mission is not None
     return learner.status.mission
 
 
-def latest(learner: Learner, field: str) -> np.ndarray:
+def latest(learner: SimulationClient, field: str) -> np.ndarray:
     """A field of the newest row of telemetry."""
     found = learner.read(lambda _, history: history.latest[history.layout.fields[field]].copy())
     assert found is not None
     return found
 
 
-def error(learner: Learner, role: str) -> float:
+def error(learner: SimulationClient, role: str) -> float:
     return float(np.linalg.norm(latest(learner, f"error/{role}")))
 
 
-def goal(learner: Learner, place: int) -> np.ndarray:
+def goal(learner: SimulationClient, place: int) -> np.ndarray:
     """Where the task at a place of the mission goes, m."""
     found = mission(learner).rows[place].goal
     assert found is not None
     return np.array(found)
 
 
-def at_rest(learner: Learner) -> bool:
+def at_rest(learner: SimulationClient) -> bool:
     return bool(np.abs(latest(learner, "v")).max() < 0.02)
 
 
-def load(page: Page, learner: Learner, scene: str) -> None:
+def load(page: Page, learner: SimulationClient, scene: str) -> None:
     """By the menu of the Robot tab, unless it is there already."""
     if learner.ready is not None and learner.ready.choice.run.scene == scene:
         return
@@ -109,7 +109,9 @@ def load(page: Page, learner: Learner, scene: str) -> None:
     wait_for_scene(page, "/goal/base")
 
 
-def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(page: Page, learner: Learner) -> None:
+def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(
+    page: Page, learner: SimulationClient
+) -> None:
     load(page, learner, "ridgeback-ur10-drag")
     expect(page.get_by_text("Drag the two targets by their arrows")).to_be_visible()
     for _ in range(2):
@@ -137,7 +139,7 @@ def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(page: Page, le
     assert error(learner, "ee") > 0.2
 
 
-def test_the_camera_goes_along_with_the_base(page: Page, learner: Learner) -> None:
+def test_the_camera_goes_along_with_the_base(page: Page, learner: SimulationClient) -> None:
     """As far as the base went, though a browser without a graphics card tells late where it looks from."""
     load(page, learner, "ridgeback-ur10-drag")
     tab(page, "Start")
@@ -157,7 +159,9 @@ def test_the_camera_goes_along_with_the_base(page: Page, learner: Learner) -> No
     page.get_by_text("Show", exact=True).first.click()
 
 
-def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(page: Page, learner: Learner) -> None:
+def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
+    page: Page, learner: SimulationClient
+) -> None:
     load(page, learner, "ridgeback-ur10-cluttered")
     assert eventually(page, lambda: is_drawn(page, "/obstacle/1"))
     before = goal(learner, 1)
@@ -183,7 +187,7 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(page: Page, 
     assert latest(learner, "clearance")[0] > 0.0
 
 
-def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Learner) -> None:
+def test_tasks_are_added_released_and_settings_changed(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-handover")
     assert eventually(page, lambda: is_drawn(page, "/person/1"))
     tab(page, "Control")
@@ -212,7 +216,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Lear
     assert learner.failure is None
 
 
-def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Learner) -> None:
+def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-cluttered")
     assert eventually(page, lambda: is_drawn(page, "/obstacle_arrows/1"))
 

@@ -13,8 +13,8 @@ from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.spares import Spares
 from app.server.server import PageServer
-from browsing.another import show_scene
-from browsing.hands import eventually, open_page, press, tab, wait_for_scene
+from browsing.browser_actions import eventually, open_page, press, tab, wait_for_scene
+from browsing.scene_switch import show_scene
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 

@@ -7,13 +7,13 @@ from functools import partial
 import numpy as np
 from playwright.sync_api import Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.server.server import PageServer
-from browsing.hands import eventually, row, tab
+from browsing.browser_actions import eventually, row, tab
 from himpc.catalog import CONTROLLERS
 
 
-def runs(learner: Learner, name: str) -> bool:
+def runs(learner: SimulationClient, name: str) -> bool:
     return learner.settings is not None and learner.settings.controller == name
 
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from app.link.messages import Post
 from app.server.server import PageServer
-from browsing.hands import eventually, is_drawn, key, position, press, row, tab
+from browsing.browser_actions import eventually, is_drawn, key, position, press, row, tab
 from lessons.events import MoveTarget
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.server.server import PageServer
-from browsing.hands import eventually, press, row, set_number, tab, write
+from browsing.browser_actions import eventually, press, row, set_number, tab, write
 from lessons.replay.state import decode
 from lessons.settings.torque import TorqueSettings
 
 
-def horizon(learner: Learner) -> int:
+def horizon(learner: SimulationClient) -> int:
     assert isinstance(learner.settings, TorqueSettings)
     return learner.settings.horizon
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from playwright.sync_api import Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.server.server import PageServer
-from browsing.hands import (
+from browsing.browser_actions import (
     BETWEEN,
     click_on,
     drag_target,
@@ -27,20 +27,20 @@ from lessons.settings.torque import TorqueSettings
 ELBOW = "/targets/elbow/control/mark"
 
 
-def settings(learner: Learner) -> TorqueSettings:
+def settings(learner: SimulationClient) -> TorqueSettings:
     assert isinstance(learner.settings, TorqueSettings)
     return learner.settings
 
 
-def levels(learner: Learner) -> list[str]:
+def levels(learner: SimulationClient) -> list[str]:
     return [level.name for level in settings(learner).levels]
 
 
-def error(learner: Learner, task: str) -> float:
+def error(learner: SimulationClient, task: str) -> float:
     return now(learner, f"error/{task}")
 
 
-def now(learner: Learner, field: str) -> float:
+def now(learner: SimulationClient, field: str) -> float:
     """How large it is in the newest row."""
     found = learner.read(lambda _, history: (history.layout, history.latest))
     assert found is not None
@@ -139,7 +139,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
 
 
-def axes(learner: Learner, name: str) -> str:
+def axes(learner: SimulationClient, name: str) -> str:
     tasks = (task for level in settings(learner).levels for task in level.tasks if task.name == name)
     found = next(tasks)
     assert isinstance(found, OnAxes)

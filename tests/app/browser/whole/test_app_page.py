@@ -12,13 +12,13 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.adapter import private
-from app.adapter.wake import WakeUp
-from app.client.learner import Learner
+from app.adapter.thread_safe_event import ThreadSafeEvent
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load
 from app.link.process import wait_until
 from app.server.server import PageServer
-from browsing.hands import (
+from browsing.browser_actions import (
     camera,
     drag_target,
     eventually,
@@ -44,13 +44,13 @@ from robots import CATALOG
 
 
 @pytest.fixture
-def learner(server: PageServer, page: Page) -> Learner:
+def learner(server: PageServer, page: Page) -> SimulationClient:
     """The simulation behind `page`, which was opened first and never left for long."""
     assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
     return server.sessions.learners[0]
 
 
-def error(learner: Learner, task: str) -> float:
+def error(learner: SimulationClient, task: str) -> float:
     """‖x̃‖ now, m or rad."""
     row = learner.read(lambda _, history: (history.layout, history.latest))
     assert row is not None
@@ -58,14 +58,14 @@ def error(learner: Learner, task: str) -> float:
     return float(np.linalg.norm(latest[layout.fields[f"error/{task}"]]))
 
 
-def test_the_page_invites_and_holds(page: Page, learner: Learner) -> None:
+def test_the_page_invites_and_holds(page: Page, learner: SimulationClient) -> None:
     expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
     expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.5)
     assert error(learner, "position") < 1e-3
 
 
-def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: Learner) -> None:
+def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: SimulationClient) -> None:
     before = position(page, "/actual")
     drag_target(page, axis=1, along=0.15)
     assert eventually(page, lambda: position(page, "/actual")[1] > before[1] + 0.08)
@@ -76,7 +76,7 @@ def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: Learner) -> None:
     expect(page.get_by_text("Now switch a level off")).to_be_visible()
 
 
-def test_rings_turn_the_target_while_its_level_is_on(page: Page, learner: Learner) -> None:
+def test_rings_turn_the_target_while_its_level_is_on(page: Page, learner: SimulationClient) -> None:
     assert learner.status is not None
     before = learner.status.targets
     turn_target(page, 30.0)
@@ -90,14 +90,14 @@ def test_rings_turn_the_target_while_its_level_is_on(page: Page, learner: Learne
     assert eventually(page, lambda: is_drawn(page, "/target/turn"))
 
 
-def turned(learner: Learner, before: np.ndarray) -> float:
+def turned(learner: SimulationClient, before: np.ndarray) -> float:
     """Angle of the orientation target's turn since `before`, rad."""
     assert learner.status is not None
     trace = float(np.trace(learner.status.targets["orientation"] @ before.T))
     return float(np.arccos(np.clip((trace - 1) / 2, -1.0, 1.0)))
 
 
-def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: Learner) -> None:
+def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: SimulationClient) -> None:
     for _ in range(3):
         drag_target(page, axis=1, along=-0.6)  # away from who looks: it stays in the picture
     expect(page.get_by_text("Out of reach by")).to_be_visible()
@@ -108,7 +108,7 @@ def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: 
     expect(page.get_by_text("Target within reach")).to_be_visible()
 
 
-def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: Learner) -> None:
+def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: SimulationClient) -> None:
     tab(page, "Tasks")
     key(page, "2")
     assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[1].enabled)
@@ -121,7 +121,7 @@ def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: 
     assert eventually(page, lambda: error(learner, "orientation") < np.radians(1.0))
 
 
-def test_levels_move_and_gains_change(page: Page, learner: Learner) -> None:
+def test_levels_move_and_gains_change(page: Page, learner: SimulationClient) -> None:
     tab(page, "Tasks")
     page.get_by_text("Gains and weights").first.click()
     set_number(page, "Q", 300)
@@ -140,7 +140,7 @@ def test_levels_move_and_gains_change(page: Page, learner: Learner) -> None:
     assert eventually(page, lambda: number(page, "Q") == 200)
 
 
-def test_N_and_M_bar_change_while_it_runs(page: Page, learner: Learner) -> None:
+def test_N_and_M_bar_change_while_it_runs(page: Page, learner: SimulationClient) -> None:
     tab(page, "Control")
     set_number(page, "N", 10)
     set_number(page, "M̄ scale", 1.5)
@@ -158,7 +158,7 @@ def test_N_and_M_bar_change_while_it_runs(page: Page, learner: Learner) -> None:
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
 
 
-def test_pause_step_reset(page: Page, learner: Learner) -> None:
+def test_pause_step_reset(page: Page, learner: SimulationClient) -> None:
     drag_target(page, axis=1, along=0.15)
     assert eventually(page, lambda: position(page, "/actual")[1] > 0.05)
     assert target_position(page)[1] > 0.1
@@ -177,7 +177,7 @@ def test_pause_step_reset(page: Page, learner: Learner) -> None:
     expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
 
 
-def test_paused_edits_show_at_once(page: Page, learner: Learner) -> None:
+def test_paused_edits_show_at_once(page: Page, learner: SimulationClient) -> None:
     """Nothing moves, but panel, order of the stack and gauge are those of the edited settings."""
     key(page, "Space")
     expect(page.get_by_text("PAUSED", exact=True).first).to_be_visible()
@@ -194,7 +194,7 @@ def test_paused_edits_show_at_once(page: Page, learner: Learner) -> None:
     assert learner.status.t == t
 
 
-def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: Learner) -> None:
+def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: SimulationClient) -> None:
     """Typed into a field they are text; pressed twice quickly they cancel out."""
     tab(page, "Robot")
     row(page, "Hand frame").locator("input").click()
@@ -214,10 +214,12 @@ def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: Learner) ->
 def test_no_thread_can_hold_up_what_is_sent(page: Page, server: PageServer) -> None:
     everybody, *each = private.senders(server._viser)
     assert each
-    assert all(isinstance(event, WakeUp) for event in (everybody, *each))
+    assert all(isinstance(event, ThreadSafeEvent) for event in (everybody, *each))
 
 
-def test_the_browser_tells_which_charts_it_shows(page: Page, server: PageServer, learner: Learner) -> None:
+def test_the_browser_tells_which_charts_it_shows(
+    page: Page, server: PageServer, learner: SimulationClient
+) -> None:
     """Of the others nothing is sent."""
     pages = [each._page for each in server._visits.values() if each._page is not None]
     (shown,) = (each for each in pages if each.learner is learner)
@@ -236,7 +238,7 @@ def test_the_browser_tells_which_charts_it_shows(page: Page, server: PageServer,
         )
 
 
-def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> None:
+def test_a_reload_resumes(page: Page, server: PageServer, learner: SimulationClient) -> None:
     tab(page, "Control")
     set_number(page, "N", 7)
     assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 7)
@@ -248,7 +250,7 @@ def test_a_reload_resumes(page: Page, server: PageServer, learner: Learner) -> N
 
 
 def test_two_browsers_and_no_third(
-    browser: Browser, server: PageServer, page: Page, learner: Learner
+    browser: Browser, server: PageServer, page: Page, learner: SimulationClient
 ) -> None:
     second = open_page(browser, server.link)
     other = server.sessions.learners[-1]
@@ -269,7 +271,7 @@ def test_two_browsers_and_no_third(
     third.context.close()
 
 
-def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Learner) -> None:
+def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: SimulationClient) -> None:
     pid = learner.pid
     assert pid is not None
     view = camera(page)
@@ -284,7 +286,9 @@ def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Learner
     assert np.allclose(camera(page), view, atol=1e-3)  # looked at from where it was
 
 
-def test_wrong_robots_are_one_sentence_and_uploads_work(page: Page, learner: Learner, tmp_path: Path) -> None:
+def test_wrong_robots_are_one_sentence_and_uploads_work(
+    page: Page, learner: SimulationClient, tmp_path: Path
+) -> None:
     tab(page, "Robot")
     write(page, "File", "/nowhere/<b>robot</b>.urdf")
     press(page, "Load file")

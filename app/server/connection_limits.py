@@ -17,7 +17,7 @@ class _Guest:
     spoke: bool = False
 
 
-class Crowd:
+class ConnectionLimits:
     """Those who are connected, oldest first, by whatever identifies a connection."""
 
     def __init__(self, total: int = TOTAL, per_address: int = PER_ADDRESS) -> None:

@@ -12,23 +12,23 @@ from typing import Any
 _LATE = " on a removed "
 
 
-def too_late(error: BaseException) -> bool:
+def is_removed_handle_error(error: BaseException) -> bool:
     """Whether an exception is viser's refusal of a write to a control or node that was removed. Nobody
     sees it any more, so nothing is missed."""
     return isinstance(error, RuntimeError) and _LATE in str(error)
 
 
-def in_time(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+def unless_removed(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     """What a function gives; None if what it wrote to is gone meanwhile."""
     try:
         return fn(*args, **kwargs)
     except RuntimeError as error:
-        if not too_late(error):
+        if not is_removed_handle_error(error):
             raise
         return None
 
 
-def told(future: Future[Any]) -> None:
+def print_exception(future: Future[Any]) -> None:
     """Done-callback: an exception in a thread of its own is not lost."""
     if not future.cancelled() and (error := future.exception()) is not None:
         traceback.print_exception(error, file=sys.stderr)
@@ -39,4 +39,4 @@ async def call(back: Callable[[Any], Any], event: Any, threads: Executor) -> Non
     if inspect.iscoroutinefunction(back):
         await back(event)
     else:
-        threads.submit(back, event).add_done_callback(told)
+        threads.submit(back, event).add_done_callback(print_exception)

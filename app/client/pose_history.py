@@ -24,7 +24,7 @@ class Frame:
     status: Status | None
 
 
-class Tape:
+class PoseHistory:
     """Frames in order of time, no older than a minute of simulated time. A reset empties it."""
 
     def __init__(self) -> None:

@@ -18,7 +18,7 @@ Send = Callable[["Event"], None]
 T = TypeVar("T")
 
 
-class Wish(Generic[T]):
+class PendingEdit(Generic[T]):
     """What was last asked for, as long as the session's answer may be on its way. A second key press or
     click in that time builds on the first instead of on what the page still shows."""
 

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 
 
-class WakeUp(asyncio.Event):
+class ThreadSafeEvent(asyncio.Event):
     """An event that is set on its loop only.
 
     asyncio's own may not be set elsewhere, and viser 1.1 sets its sender's from whatever thread writes, and

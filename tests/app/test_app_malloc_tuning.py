@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.server.arenas import ARENAS
+from app.server.malloc_tuning import ARENAS
 
 ROOT = Path(__file__).parents[2]
 COUNT = """

@@ -7,7 +7,7 @@ import numpy as np
 _LEVELS = (2, 4, 8, 16, 32)
 
 
-def corners(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
+def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
     """Which points of some curves are needed to draw them all.
 
     Points lie at equal distances. Of a block of 2, 4, … 32 only the ends are kept where every curve is

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from playwright.sync_api import Page, expect
 
-from app.client.learner import Learner
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load
-from browsing.hands import eventually, tab, wait_for_scene
+from browsing.browser_actions import eventually, tab, wait_for_scene
 
 
-def show_scene(page: Page, learner: Learner, choice: SceneChoice) -> None:
+def show_scene(page: Page, learner: SimulationClient, choice: SceneChoice) -> None:
     """Loads a torque-level scene, unless it is there, and waits for the page to be built anew."""
     if learner.choice == choice:
         return

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Result:
+class RunFigures:
     """How well a run went.
 
     Attributes:
@@ -35,7 +35,7 @@ _PER_DECADE = 80  # bins of the histogram of step times
 _DECADES = 8  # from 1 µs
 
 
-class Score:
+class RunStatistics:
     """Takes portions of rows in order; `clear` where a run begins."""
 
     def __init__(self, layout: Layout) -> None:
@@ -52,7 +52,7 @@ class Score:
         self._t = -1.0
         self._first = 0.0
 
-    def take(self, rows: np.ndarray) -> None:
+    def append_rows(self, rows: np.ndarray) -> None:
         fields = self._layout.fields
         t = rows[:, fields["t"].start]
         if t[0] < self._t:
@@ -82,11 +82,11 @@ class Score:
         finite = share[np.isfinite(share)]
         return float(finite.max()) if finite.size else 0.0
 
-    def result(self) -> Result | None:
+    def result(self) -> RunFigures | None:
         """None before the first row."""
         if not self._ticks:
             return None
-        return Result(
+        return RunFigures(
             seconds=self._t - self._first,
             rmse={
                 name: float(np.sqrt(total / self._known[name])) if self._known[name] else float("nan")

@@ -7,21 +7,21 @@ from collections import deque
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, final
 
-from app.client.ghost import Ghost
+from app.client.ghost import GhostClient
 from app.client.simulation import Simulation, aside
 from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture
 from app.link.messages import (
-    Failed,
     Lead,
     Load,
     Loading,
+    LoadRefused,
     Ready,
-    Refused,
     Report,
     ResetAll,
     Script,
+    SimulationFailed,
     Status,
     Tell,
     Told,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @final
-class Learner(Simulation):
+class SimulationClient(Simulation):
     """The simulation of one browser tab, and the ghost that follows it, if there is one."""
 
     who = "The simulation"
@@ -45,7 +45,7 @@ class Learner(Simulation):
         self.choice = self._start_choice = choice
         self.attached = False
         self.left_at = time.monotonic()
-        self.ghost: Ghost | None = None
+        self.ghost: GhostClient | None = None
         self.lecture: Lecture | None = None
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
@@ -124,7 +124,7 @@ class Learner(Simulation):
                 with self._lock:
                     if self._asking:
                         self._asking.popleft().put(report)
-            case Failed(_, died):
+            case SimulationFailed(_, died):
                 with self._lock:
                     self._forget_questions()
                     if died and self._unheard is not None and process is self._process:
@@ -141,7 +141,7 @@ class Learner(Simulation):
             match report, self._unheard:
                 case Status(resets=resets), (_, before) if resets != before:
                     self._unheard = None
-                case Loading() | Ready() | Refused(), _:
+                case Loading() | Ready() | LoadRefused(), _:
                     self._unheard = None
                 case _:
                     pass
@@ -178,7 +178,7 @@ class Learner(Simulation):
             if self._closed:
                 return
             before = self.ghost
-            self.ghost = Ghost(
+            self.ghost = GhostClient(
                 words, own, self._spares, lambda until: self.send(WaitAt(until)), self._lost_ghost
             )
         if before is not None:
@@ -193,7 +193,7 @@ class Learner(Simulation):
         if before is not None:
             aside(before.close)
 
-    def _lost_ghost(self, ghost: Ghost, sentence: str) -> None:
+    def _lost_ghost(self, ghost: GhostClient, sentence: str) -> None:
         with self._lock:
             if ghost is not self.ghost:
                 return

@@ -8,7 +8,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from app.adapter.wake import WakeUp
+from app.adapter.thread_safe_event import ThreadSafeEvent
 
 
 class Meeting(deque[Any]):
@@ -41,17 +41,17 @@ async def wakes(event: asyncio.Event) -> bool:
 
 def test_a_sender_wakes_though_it_is_called_while_it_goes_to_sleep() -> None:
     async def both() -> tuple[bool, bool]:
-        return await wakes(WakeUp(asyncio.get_running_loop())), await wakes(asyncio.Event())
+        return await wakes(ThreadSafeEvent(asyncio.get_running_loop())), await wakes(asyncio.Event())
 
     with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
         ours, plain = elsewhere.submit(lambda: asyncio.run(both())).result()
     assert ours
-    assert not plain  # or `WakeUp` is needed no longer
+    assert not plain  # or `ThreadSafeEvent` is needed no longer
 
 
 def test_a_call_after_the_end_is_no_error() -> None:
     loop = asyncio.new_event_loop()
-    event = WakeUp(loop)
+    event = ThreadSafeEvent(loop)
     loop.close()
     event.set()
     assert not event.is_set()
