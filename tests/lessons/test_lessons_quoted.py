@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from interventions_course import COURSE_ROWS
-from interventions_documents import DOCUMENT_ROWS
+from interventions_all import ROWS
 from quoted import QUOTED, CourseRuns, Quoted, specs, step_of
 
 from himpc.limits import Limits
@@ -50,7 +49,6 @@ def test_a_number_in_a_sentence_is_measured(quoted: Quoted, course_runs: CourseR
 # -------------------------------------------------- numbers that follow from settings, or are the papers'
 
 
-ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
 WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
 LOOSE = re.compile(rf"(?<![\w.−-])−?\d+(?:\.\d+)?|\b(?:{WORDS})\b")
 """Digits, and words that are numbers."""
