@@ -28,7 +28,7 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "torque-has-a-limit/1", "the order makes no difference",
-        Q1, (9, 13), ("order=q1,position",), (9, 13), of=("q1_amplitude_deg=60",), stays=True,
+        Q1, (2, 3), ("order=q1,position",), (2, 3), of=("q1_amplitude_deg=60",), seconds=1.5, stays=True,
     ),
     Intervention(
         "torque-has-a-limit/2", "for with joint 1 first it is the same",
@@ -98,7 +98,7 @@ LIMIT_ROWS = (
     Intervention(
         "deadlines/2", "noise counts double",
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
-        of=("plant.encoder_resolution_deg=0.001",),
+        of=("plant.encoder_resolution_deg=0.001",), seconds=0.3,
     ),
     # ---------------------------------------- sensors-are-coarse
     Intervention(
@@ -133,13 +133,13 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "the-model-is-wrong/1", "here that is mostly the friction",
-        HAND, (1.0, 2.5), ("plant.friction=0",), (0, 0.3),
+        HAND, (0.7, 1.6), ("plant.friction=0",), (0, 0.3), seconds=0.75,
     ),
     Intervention(
         "the-model-is-wrong/1", "here that is mostly the friction",
-        HAND, (1.0, 2.5),
-        ("nominal.mass_scale=1", "nominal.inertia_scale=1", "nominal.armature=[0.05,0.05,0.03]"), (1.0, 2.5),
-        stays=True,
+        HAND, (0.7, 1.6),
+        ("nominal.mass_scale=1", "nominal.inertia_scale=1", "nominal.armature=[0.05,0.05,0.03]"), (0.7, 1.6),
+        seconds=0.75, stays=True,
     ),
     Intervention(
         "the-model-is-wrong/2", "a larger $\\bar M$ takes it back",
@@ -154,25 +154,25 @@ LIMIT_ROWS = (
         "the-model-is-wrong/2",
         "the inertia of the motors is left: with links of a twentieth the gauge reads 0.47",
         RADIUS, (0.465, 0.475), ("plant.armature=0.01",), (1.2, 4),
-        of=("plant.mass_scale=0.05", "plant.inertia_scale=0.05"), seconds=0.5,
+        of=("plant.mass_scale=0.05", "plant.inertia_scale=0.05"), seconds=0.05,
     ),
     Intervention(
         "the-model-is-wrong/2", "for links of this weight so large an M̄ is beyond the cliff",
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
-        of=("M_bar_scale=4",), seconds=0.5,
+        of=("M_bar_scale=4",), seconds=0.05,
     ),
     Intervention(
         "the-model-is-wrong/2", "its model knows no friction",
-        HAND, (1, 2), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
+        HAND, (0.9, 1.6), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.6,
     ),
     Intervention(
         "further/the-model-is-wrong", "That is why most of OSF's error in *As identified* is friction's",
-        HAND, (1.0, 2.5), ("plant.friction=0",), (0, 0.3), on="the-model-is-wrong/1",
+        HAND, (0.7, 1.6), ("plant.friction=0",), (0, 0.3), on="the-model-is-wrong/1", seconds=0.75,
     ),
     # ---------------------------------------- inside-the-qp
     Intervention(
         "inside-the-qp/3", "Time-delay estimation notices it at the next tick and corrects it",
-        of("error/reach", "mm", "rms", 1.0), (0, 0.05), ("controller=hqp",), (0.5, 2),
+        of("error/reach", "mm", "rms", 0.5), (0, 0.6), ("controller=hqp",), (1.2, 3), seconds=0.9,
     ),
     Intervention(
         "inside-the-qp/3", "over tens of ticks",

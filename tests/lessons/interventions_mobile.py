@@ -71,7 +71,7 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "seeing-ahead/2", "with a gain of 2 1/s it arrives",
-        of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[0.5,2]",), (0, 0.01),
+        of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[2,2]",), (0, 0.01),
     ),
     Intervention(
         "seeing-ahead/2", "it is as quick as the limits let it be",
@@ -95,15 +95,15 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "seeing-ahead/3", "the faster the base, the further the hand drifts",
-        EE, (15, 25), ("gains=[2,0.3]",), (0, 6),
+        EE, (15, 25), ("gains=[2,0.3]",), (0, 6), seconds=4.0,
     ),
     Intervention(
         "seeing-ahead/3", "Asked for a hundred times a second it drifts half as far.",
-        EE, (15, 25), ("rate_hz=100",), (6, 14),
+        EE, (15, 25), ("rate_hz=100",), (6, 14), seconds=4.0,
     ),
     Intervention(
         "seeing-ahead/3", "with 5 1/s for the hand it is off by half", EE, (15, 25), ("gains=[5,2]",),
-        (7, 13),
+        (7, 13), seconds=4.0,
     ),
     Intervention(
         "seeing-ahead/3", "with 20 1/s by 3 mm", EE, (15, 25), ("gains=[20,2]",), (2, 4),
@@ -113,7 +113,8 @@ MOBILE_ROWS = (
         of("error/base", "m", "mean", 8.0), (0.18, 0.21), ("gains=[20,2]",), (0.18, 0.21), stays=True,
     ),
     Intervention(
-        "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (28, 50),
+        "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (26, 50),
+        seconds=4.0,
     ),
     # ---------------------------------------- your-robot
     Intervention(
@@ -134,7 +135,7 @@ MOBILE_ROWS = (
         "your-robot/1", "what it does not know of the weight, the springs must carry",
         of("error/position", "mm", "last"), (10, 100),
         ("nominal.mass_scale=1.5", "nominal.inertia_scale=1.5"),
-        (0, 0.1), of=("controller=hqp",),
+        (0, 0.2), of=("controller=hqp",), seconds=0.3,
     ),
     Intervention(
         "further/your-robot", "Safer, and less accurate.",

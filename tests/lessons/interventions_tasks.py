@@ -38,7 +38,7 @@ TASK_ROWS = (
     Intervention(
         "one-task/0", "because by then the torques had learned to push back",
         of("error/position", "mm", "mean", 0.35, 0.4, column=0), (-2, -0.3), ("controller=osf", *EXACT),
-        (5, 90),
+        (5, 90), seconds=0.45,
     ),
     Intervention(
         "one-task/2", "with $\\bar M^{-1} = 30$ here", HAND, (3.6, 4.2), ("R_on=acceleration",), (10, 40),
@@ -69,7 +69,7 @@ TASK_ROWS = (
     Intervention(
         "no-model-needed/0", "its springs hold that, so it sags by centimetres",
         of("error/position", "mm", "last"), (20, 90), ("nominal.payload_kg=1",), (0, 0.1),
-        of=("controller=hqp",),
+        of=("controller=hqp", "plant.payload_kg=1"), seconds=0.4,
     ),
     Intervention(
         "no-model-needed/1", "every millisecond only a part of the error in $\\ddot q$ is removed",
@@ -82,7 +82,7 @@ TASK_ROWS = (
     # ---------------------------------------- two-tasks
     Intervention(
         "two-tasks/0", "its model knows no friction",
-        HAND, (2.5, 3.2), NO_FRICTION, (0, 0.3), of=("controller=osf",),
+        HAND, (0.7, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.6,
     ),
     Intervention(
         "two-tasks/0", "They still do wherever a bound is in the way of one of them",
@@ -112,7 +112,7 @@ TASK_ROWS = (
     Intervention(
         "further/two-tasks", "Level 2 then weighs little beside $R$",
         Q1, (0.15, 0.4), ("levels.q1.R=0.1", "levels.position.R=0.1"), (0, 0.05),
-        of=("q1_amplitude_deg=20", "levels.q1.Q=1e-3"), on="two-tasks/3",
+        of=("q1_amplitude_deg=20", "levels.q1.Q=1e-3"), on="two-tasks/3", seconds=0.6,
     ),
     # ---------------------------------------- swap-the-priorities
     Intervention(
@@ -141,8 +141,7 @@ TASK_ROWS = (
     ),
     Intervention(
         "when-tasks-fight/1", "its model knows no friction",
-        of("error/position", "mm", "largest", 0.0, 1.0), (3, 4), NO_FRICTION, (0, 0.3),
-        of=("controller=osf",),
+        HAND, (2, 2.7), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.5,
     ),
     Intervention(
         "when-tasks-fight/2", "Level 2 wants something it cannot have",
@@ -162,15 +161,15 @@ TASK_ROWS = (
     ),
     Intervention(
         "when-tasks-fight/2", "without those on speed and position every motor comes to its limit",
-        of("torque share", "%"), (15, 30), NO_BOUNDS[2:], (99, 101),
+        of("torque share", "%"), (15, 30), NO_BOUNDS[2:], (99, 101), seconds=2.5,
     ),
     Intervention(
         "when-tasks-fight/2", "the hand is off by 11 mm",
-        HAND, (0.7, 1), NO_BOUNDS[2:], (10.5, 11.5),
+        HAND, (0.7, 1), NO_BOUNDS[2:], (10.5, 11.5), seconds=2.5,
     ),
     Intervention(
         "when-tasks-fight/2", "without any bound the arm is lost as with a projection",
-        HAND, (0.7, 1), NO_BOUNDS, (1000, INF),
+        HAND, (0.7, 1), NO_BOUNDS, (1000, INF), seconds=2.5,
     ),
     # ---------------------------------------- stretched-out
     Intervention(
@@ -183,11 +182,11 @@ TASK_ROWS = (
     ),
     Intervention(
         "stretched-out/2", "its model knows no friction, smooth or not",
-        HAND, (1.5, 2.5), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
+        HAND, (0.7, 1.3), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.5,
     ),
     Intervention(
         "stretched-out/0", "for a tenth of a second the demand is small",
-        of("torque share", "%", "largest", 0.0, 0.1), (1e6, INF), ("smooth=true",), (0, 1),
+        of("torque share", "%"), (1e6, INF), ("smooth=true",), (0, 1), seconds=0.1,
     ),
     Intervention(
         "stretched-out/0", "A damped inverse, `osf_damped`, asks for a fifth of the limit.",
@@ -204,7 +203,7 @@ TASK_ROWS = (
     Intervention(
         "further/stretched-out", "the run with $R = 10^7$ swings by decimetres",
         of("error/position", "mm", "range", 1.0), (100, 900), ("R=1e5",), (0, 5),
-        of=("R=1e7",), on="stretched-out/1", seconds=4.0,
+        of=("R=1e7",), on="stretched-out/1",
     ),
     Intervention(
         "further/stretched-out", "is why the ghost does as well: between the two lies no tuning",
