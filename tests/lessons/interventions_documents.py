@@ -108,7 +108,7 @@ DOCUMENT_ROWS = (
     # ---------------------------------------- horizon
     RT4(
         "disagreements", "ours only where joints meet their position limits",
-        X, (0.47, 0.475), ("horizon=30",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
+        X, (0.47, 0.475), ("horizon=15",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
         seconds=4.0, stays=True,
     ),
     RT4(

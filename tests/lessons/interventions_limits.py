@@ -66,12 +66,12 @@ LIMIT_ROWS = (
     # ---------------------------------------- how-far-ahead
     Intervention(
         "how-far-ahead/0", "a longer horizon sees the ends of the joints' ranges sooner",
-        X, (0.56, 0.57), ("horizon=30",), (0.528, 0.538), of=("horizon=5",), on="iiwa14-circle-paper",
+        X, (0.56, 0.57), ("horizon=15",), (0.538, 0.547), of=("horizon=5",), on="iiwa14-circle-paper",
         seconds=4.0,
     ),
     Intervention(
         "how-far-ahead/0", "a longer horizon sees the ends of the joints' ranges sooner",
-        X, (0.47, 0.475), ("horizon=30",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
+        X, (0.47, 0.475), ("horizon=15",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
         on="iiwa14-circle-paper", seconds=4.0, stays=True,
     ),
     Intervention(
