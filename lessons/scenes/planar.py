@@ -154,7 +154,7 @@ def planar3_singular() -> TorqueScene:
     return replace(
         scene,
         name="planar3-singular",
-        title="planar arm on RT3: straight, thus singular, three times",
+        title="planar arm on RT3: straight and singular three times",
         settings=replace(scene.settings, options=SingularOptions()),
         q_0=np.zeros(3),
         duration=16.0,
