@@ -15,7 +15,7 @@ from pathlib import Path
 from docs.further import further
 from docs.pages.api import INSIDE, PACKAGES
 from lessons.course import COURSE, load_lesson
-from lessons.exercises import EXERCISES, load_exercise
+from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.teaching.lesson import Step
 
 ROOT = Path(__file__).parents[2]
@@ -32,11 +32,14 @@ DOCUMENTS = {
 
 CAUSE = re.compile(
     r"""
-    \b(?:because|therefore|hence|thus|consequently|owing\ to|due\ to|thanks\ to|as\ a\ result)\b
-    | (?<!ever\ )\bsince\b(?!\ (?:when|it\ was|both\ began|(?:the|its|their)\ (?:last|start|reset|switch)))
+    \b(?:because(?!:)|therefore|hence|thus|consequently|owing\ to|due\ to|thanks\ to|as\ a\ result)\b
+    | (?<!ever\ )(?<!gone\ on\ )\bsince\b(?![.:,]|\ (?:t\ =|(?:when|then|it\ was|both\ began)\b)
+        |\ (?:the|its|their)\ (?:last|first|start|reset|switch)\b)
     | \b(?:is|are|was|were)\ why\b | \bthe\ reason\b | \bcaus(?:e|es|ed|ing)\b
-    | \b(?:comes?|came)\ from\b | \b(?:leads?|led)\ to\b | \bresult(?:s|ed)?\ (?:in|from)\b
-    | (?:^|[,;:]\ |\band\ )so\b(?!\ (?:far|many|much|long|often|few|little|large|on|what|would|does|it\ was)\b)
+    | \b(?:comes?|came)\ from\b
+    | \b(?:leads?|led)\ to\b | \bresult(?:s|ed)?\ (?:in|from)\b
+    | (?:^|[,;:]\ |\band\ )so\b(?!\ (?:far|many|much|long|often|few|little|large|on)\b
+        |\ (?:what|would|does|do|it\ was|are\ those)\b)
     | \bso\ that\b
     """,
     re.VERBOSE | re.IGNORECASE,
@@ -54,6 +57,7 @@ _END = re.compile(
     | \s*\n\s*\n\s*  # a paragraph
     | \s*(?:^|\s)\|(?:\s|$)\s*  # a cell of a table
     | \n\s*(?:[-#]|\d+\.)\s  # a line of a list
+    | \n\s+(?=[\w, *]+:\s)  # an argument or attribute
     """,
     re.VERBOSE,
 )
@@ -62,7 +66,8 @@ _END = re.compile(
 def sentences(text: str) -> list[str]:
     """Of a text in Markdown, each in one line; formulas and programs of their own lines are left out."""
     plain = _LABEL.sub("\n\n", _PROGRAM.sub(" … ", text))
-    return [" ".join(each.split()) for each in _END.split(plain) if each and each.strip()]
+    found = (" ".join(each.split()).strip("| ") for each in _END.split(plain) if each)
+    return [each for each in found if each]
 
 
 def causal(text: str) -> list[str]:
@@ -95,7 +100,12 @@ def passages() -> Iterator[tuple[str, str]]:
         yield from ((f"further/{name}", text) for text in told)
     for name in EXERCISES:
         exercise = load_exercise(name)
-        told = [exercise.card.question, *exercise.hints, *(each.says for each in exercise.mistakes)]
+        told = [
+            exercise.card.question,
+            start_of(name),
+            *exercise.hints,
+            *(each.says for each in exercise.mistakes),
+        ]
         told += [text for check in exercise.checks(0) for text in (check.text, check.why)]
         yield from ((f"exercise/{name}", text) for text in told)
     for name, file in DOCUMENTS.items():
@@ -116,12 +126,10 @@ def _sources() -> Iterator[tuple[str, str]]:
 
 def _strings(path: Path, place: str) -> Iterator[str]:
     module = place.removesuffix(".py").replace("/", ".")
-    shown = place.startswith("examples/") or (
-        not place.startswith("app/") and not module.startswith(INSIDE)
-    )
+    shown = place.startswith("examples/") or (not place.startswith("app/") and not module.startswith(INSIDE))
     tree = ast.parse(path.read_text(encoding="utf-8"))
     notes = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
-        words = isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value
-        if words and (shown or id(node) not in notes):
-            yield node.value
+        value = node.value if isinstance(node, ast.Constant) else None
+        if isinstance(value, str) and " " in value and (shown or id(node) not in notes):
+            yield value

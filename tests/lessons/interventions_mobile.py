@@ -122,6 +122,10 @@ MOBILE_ROWS = (
         TILT, (11, 12), ("levels.orientation.enabled=false",), (17, 20),
     ),
     Intervention(
+        "further/your-robot", "Three coordinates of orientation cannot all be had with two freedoms",
+        TILT, (11, 12), ("levels.position.enabled=false",), (0, 1), on="your-robot/0",
+    ),
+    Intervention(
         "your-robot/0", "the posture goes without",
         of("error/posture", "deg", "last"), (20, 30),
         ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 1),
@@ -138,7 +142,9 @@ MOBILE_ROWS = (
         (0, 0.2), of=("controller=hqp",), seconds=0.3,
     ),
     Intervention(
-        "further/your-robot", "Safer, and less accurate.",
+        "further/your-robot",
+        "The small ones become smaller, so slow components are corrected more slowly still. Safer, and less "
+        "accurate.",
         HAND, (9, 16), ("plant.mass_scale=1", "plant.inertia_scale=1"), (5, 8.5), on="your-robot/1",
     ),
 )
