@@ -40,7 +40,7 @@ CAUSE = re.compile(
     | \b(?:leads?|led)\ to\b | \bresult(?:s|ed)?\ (?:in|from)\b
     | (?:^|[,;:]\ |\band\ )so\b(?!\ (?:far|many|much|long|often|few|little|large|on)\b
         |\ (?:what|would|does|do|it\ was|are\ those)\b)
-    | \bso\ that\b
+    | \bso\ that\b | \bto\ blame\b | (?:'s|s')\ doing\b
     """,
     re.VERBOSE | re.IGNORECASE,
 )
@@ -71,8 +71,9 @@ def sentences(text: str) -> list[str]:
 
 
 def causal(text: str) -> list[str]:
-    """Its sentences that give a reason, and do not say that it is given."""
-    return [each for each in sentences(text) if CAUSE.search(each) and not GIVEN.search(each)]
+    """Its sentences that give a reason: they do not ask for it, and do not say that it is given."""
+    found = [each for each in sentences(text) if CAUSE.search(each) and not GIVEN.search(each)]
+    return [each for each in found if not each.endswith("?")]
 
 
 def of_step(step: Step) -> Iterator[str]:

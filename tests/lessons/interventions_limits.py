@@ -19,7 +19,8 @@ LIMIT_ROWS = (
         HAND, (0.03, 0.07), ("limits.torque_scale=1",), (0.03, 0.07), stays=True,
     ),
     Intervention(
-        "torque-has-a-limit/1", "With joint 1 first it is the hand that goes without, by 1.6 mm",
+        "torque-has-a-limit/1",
+        "That is the order's doing. With joint 1 first it is the hand that goes without, by 1.6 mm",
         HAND, (0, 0.1), ("order=q1,position",), (1.55, 1.7),
     ),
     Intervention(
@@ -57,6 +58,10 @@ LIMIT_ROWS = (
     Intervention(
         "stopping-takes-distance/0", "With three times the torque 0.2° is left",
         JOINT_2, (150.55, 150.75), ("limits.torque_scale=3", "plant.saturate=false"), (150.15, 150.25),
+    ),
+    Intervention(
+        "stopping-takes-distance/1", "20 ms are enough for an emergency stop",
+        JOINT_2, (149.8, 150.0), ("horizon=5",), (150.5, 150.8),
     ),
     Intervention(
         "stopping-takes-distance/2", "The price is time: the last degrees are crept",

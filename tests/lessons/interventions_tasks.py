@@ -6,6 +6,7 @@ from interventions import Intervention, of
 
 HAND = of("error/position", "mm")
 Q1 = of("error/q1", "deg")
+TILT = of("error/orientation", "deg", "last")
 RADIUS = of("gauge_radius")
 NO_FRICTION = ("plant.friction=0", "plant.damping=0")
 NO_BOUNDS = (
@@ -33,6 +34,10 @@ TASK_ROWS = (
         "a-redundant-arm/1", "only the part of the wish that lies in the null space is granted",
         of("q", "deg", "range", column=2), (27, 31),
         ("levels.position.enabled=false", "levels.orientation.enabled=false"), (57, 61),
+    ),
+    Intervention(
+        "a-redundant-arm/2", "the hand pays with a tilt nobody objects to",
+        TILT, (15, 17), ("levels.orientation.enabled=true",), (0, 0.1),
     ),
     # ---------------------------------------- one-task
     Intervention(

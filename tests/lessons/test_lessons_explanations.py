@@ -12,8 +12,10 @@ from explanations_exempt import TEXTS, Exempt
 from explanations_reference import REFERENCE
 from interventions import Intervention
 from interventions_all import ROWS
+from quoted import QUOTED
 
 from docs.pages import texts
+from lessons.course import COURSE, load_lesson
 from lessons.papers.topics import topics
 
 EXEMPT = (*TEXTS, *REFERENCE)
@@ -83,6 +85,14 @@ def test_an_exemption_names_the_test_that_holds_it() -> None:
             assert name in {each.name for each in tree.body if isinstance(each, ast.FunctionDef)}, (
                 group.held_by
             )
+
+
+def test_every_step_is_measured_beyond_its_claims() -> None:
+    """A row of the interventions, a number that is quoted, or a test of its own."""
+    named = {at for group in EXEMPT if group.held_by for at, _ in group.sentences}
+    held = named | {row.at for row in ROWS} | {each.step for each in QUOTED}
+    steps = {f"{name}/{k}" for name in COURSE for k in range(len(load_lesson(name).steps))}
+    assert steps - held == set()
 
 
 def test_every_likely_cause_is_held_or_not_known() -> None:

@@ -79,7 +79,7 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "torque-has-a-limit/1": ("60",),  # settings
     "torque-has-a-limit/2": ("−30",),
     "stopping-takes-distance/0": ("57", "0.3", "100", "60", "41"),
-    "stopping-takes-distance/1": ("20", "50"),
+    "stopping-takes-distance/1": ("50",),
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
     "inside-the-qp/3": ("half",),  # 5 of 10 cm, 7 of 14 degrees
     # Every other torque counts, or is computed.
