@@ -142,7 +142,7 @@ def test_the_average_cost_of_a_noisy_run_is_noise() -> None:
     assert "whose noise is nearly the same for all three" in told("disagreements")
 
     def costs(*more: str) -> list[float]:
-        specs = [RunSpec("planar3-circle", duration=0.4).but(f"controller={c}", *more) for c in COMPARED]
+        specs = [RunSpec("planar3-circle", duration=1.0).but(f"controller={c}", *more) for c in COMPARED]
         return [summary(run(spec.prepared()))["average_cost"][0] for spec in specs]
 
     noisy, ideal = costs("plant.encoder_resolution_deg=0.00125"), costs()
