@@ -44,10 +44,10 @@ PRINTED = Step(
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
     To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². The motor can do less than
-    60, and the rows on speed let it change by even less, 41. In more than twenty ticks the problem has
-    no solution, the torque hits its limit, and the joint overruns its range by 0.6°. With three times
-    the torque 0.2° is left; with the rows on speed off as well only 0.1° is left. (Whether what is
-    applied in those ticks has a part in it was not tried.) The row is true to the letter and comes too
+    60, and the rows on speed let it change by even less, 41. More than twenty of the problems have no
+    solution, the torque hits its limit, and the joint overruns its range by 0.6°. With three times the
+    torque 0.2° is left; with the rows on speed off as well only 0.1° is left. (Whether what is applied
+    where there is none has a part in it was not tried.) The row is true to the letter and comes too
     late.
     """,
     prediction=Choice(
