@@ -153,6 +153,10 @@ TASK_ROWS = (
         of("v", "deg/s", "range", 2.5, column=2), (170, 200), ("q1_amplitude_deg=20",), (40, 80),
     ),
     Intervention(
+        "when-tasks-fight/2", "with twice the $\\bar M$ it swings as before",
+        of("v", "deg/s", "range", 2.5, column=2), (170, 200), ("M_bar_scale=2",), (170, 200), stays=True,
+    ),
+    Intervention(
         "when-tasks-fight/2", "HQP has rows on torque only, none on speed",
         of("speed share", "%"), (300, 700), ("controller=hiqp",), (95, 105), of=("controller=hqp",),
     ),
