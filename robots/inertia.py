@@ -54,8 +54,8 @@ def suggest_M_bar(
     1. shape: D_i = min over samples of 1/(M⁻¹)_ii, the least inertia joint i ever shows when the other
        joints are free, so joints of very different size each get their own scale;
     2. size: M̄ = LARGEST_EIGENVALUE · D / max over samples of λ_max(D^½ M⁻¹ D^½). Between the samples
-       λ(S) is larger, up to 1.75 on the robots of the catalog and the lamp of `lessons.course.your_robot`,
-       so it stays below 2 for a plant that is 12 % lighter than the model.
+       λ(S) is larger: the page of the lesson *Your robot* finds 1.74 on its lamp, which leaves room for a
+       plant that is 13 % lighter than the model.
 
     Larger M̄ estimates better and amplifies noise (Remark 4).
     """

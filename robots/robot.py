@@ -18,7 +18,7 @@ class Robot:
 
     All vectors are in Pinocchio's joint order, all frames are URDF links. SI units; angles in rad,
     prismatic joints in m. The arrays are read-only: derive a changed robot with `dataclasses.replace`.
-    Picklable, so it can be sent to a spawned child.
+    Picklable: it can be sent to a spawned child.
     """
 
     name: str

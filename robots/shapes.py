@@ -28,7 +28,7 @@ class Shape:
 
     joint: the Pinocchio joint whose frame it moves with, 0 = the world; vertices (V, 3) float32, m, in that
     joint's frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique.
-    Vertices are shared only where the surface is smooth, so averaged vertex normals shade it well.
+    Vertices are shared only where the surface is smooth; averaged vertex normals shade it well.
     """
 
     joint: int

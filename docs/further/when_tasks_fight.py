@@ -97,8 +97,8 @@ FURTHER = Further(
             "that small? What else keeps the torque possible?",
             r"$\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: finite is not yet possible. $R$ "
             r"makes the "
-            "problem well posed at the singularity (Lemma 1); that the torque stays within its limits is "
-            "due to the bounds (34f), which a projection does not have.",
+            "problem well posed at the singularity (Lemma 1); the bounds (34f) keep the torque "
+            "within its limits, and a projection does not have them.",
             {"cap": (0.5 * math.sqrt(200 / 10) * 50, ".0f")},
         ),
     ),

@@ -28,8 +28,9 @@ class Limits:
         torque_scale, velocity_scale: factors on the robot's limits, > 0.
         velocity_approach: 1/s; how fast a velocity bound may be approached, as a share of the distance left
             (a barrier: q̈ ≤ rate·(q̇_max − q̇)). Time-delay estimation needs tens of ticks to stop an
-            acceleration (M̄ < M), so a bound met at full acceleration is overrun: by 17 % on the iiwa's
-            circle with rate 0, which is (32e) as printed, by 0.2 % with 15.
+            acceleration (M̄ < M), and a bound met at full acceleration is overrun: by 17 % on the iiwa's
+            circle with rate 0, which is (32e) as printed, by 0.2 % with 15 (`himpc-lab reproduce
+            himpc-limits`).
     """
 
     torque: bool = True

@@ -28,20 +28,20 @@ PLOTS = (HAND, LATE, Signal("torque share", "%"))
 ONE_MORE = Step(
     title="One knot more",
     text=r"""
-    So far time stood still while the controller computed. Now it does not: measure, solve, apply,
-    all within $T_s = 1$ ms. If the torque is not ready when it is due, the motors hold the previous
-    one, and the late torque acts at the next tick. The computer of this lesson needs 0.1 ms for each
-    of the $N$ knots, so that every run is the same on every machine. (That is an assumption, and a
-    slow computer: this lab's own step takes about 0.01 ms a knot.) $N = 10$ is just in time; now $N
-    = 11$. The target moves by 13 cm in half a second.
+    So far time stood still while the controller computed. Now it does not: measure, solve, apply, all
+    within $T_s = 1$ ms. If the torque is not ready when it is due, the motors hold the previous one,
+    and the late torque acts at the next tick. The computer of this lesson needs 0.1 ms for each of the
+    $N$ knots, on every machine the same. (That is an assumption, and a slow computer: this lab's own
+    step takes about 0.01 ms a knot.) $N = 10$ is just in time; now $N = 11$. The target moves by 13 cm
+    in half a second.
     """,
     do="Where is the edge if the deadline is 2 ms? And what happens beyond it, at N = 20, N = 30?",
     why=r"""
-    The error more than doubles, between one knot and the next. Nothing is gained by the longer
-    horizon, and every single torque is one tick late. Each $\Delta\tau$ is meant as a change of the
-    torque that acts now; when it arrives, another torque has taken that one's place. So the even and
-    the odd ticks are two sequences of torques, each corrected only once in 2 ms, and neither knows of
-    the other's corrections. None of these is lost: it is a loop of half the rate.
+    The error more than doubles, between one knot and the next. Nothing is gained by the longer horizon,
+    and every single torque is one tick late. Each $\Delta\tau$ is meant as a change of the torque that
+    acts now; when it arrives, another torque has taken that one's place. The even and the odd ticks are
+    two sequences of torques, each corrected only once in 2 ms, and neither knows of the other's
+    corrections. None of these is lost: it is a loop of half the rate.
     """,
     prediction=Choice(
         "Eleven knots instead of ten, 0.1 ms too slow: the largest error of this motion …",
@@ -83,8 +83,8 @@ SLOWER = Step(
     title="Promise less, keep it",
     text=r"""
     Eleven knots again, but asked for every 2 ms only, and due after 2 ms: now they are in time. The
-    controller is told, so its prediction uses $T_s = 2$ ms. The ghost keeps asking every
-    millisecond and is always one tick late.
+    controller is told: its prediction uses $T_s = 2$ ms. The ghost keeps asking every millisecond and
+    is always one tick late.
     """,
     do="What do 5 ms and 10 ms do? Where does the arm stop to be usable?",
     why=r"""

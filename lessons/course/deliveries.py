@@ -42,12 +42,11 @@ OVERLAP = Step(
     """,
     do="Could the ghost keep up with a higher speed of the paths? What does its base do at each stop?",
     why=r"""
-    Less than two thirds of the time, and of the way. While the hand holds the ball out, the base
-    sets out for the next person as far as the arm allows: that alone would save 9 of the ghost's
-    31 seconds. While the base drives, the hand already reaches: that alone would save 7. Both
-    together save 11, for a way that is already driven need not be driven while the hand reaches.
-    The way is shorter because the base stays behind its hand: the ghost's only task is the hand, so
-    the base goes along with it up to every person and has to come back.
+    Less than two thirds of the time, and of the way. While the hand holds the ball out, the base sets
+    out for the next person as far as the arm allows: that alone would save 9 of the ghost's 31 seconds.
+    While the base drives, the hand already reaches: that alone would save 7. Both together save 11,
+    less than the two alone. The way is shorter because the base stays behind its hand: the ghost's only
+    task is the hand, so the base goes along with it up to every person and has to come back.
     """,
     prediction=Choice(
         "The same places, the same speed of the paths. Two tasks at a time take …",
@@ -219,10 +218,10 @@ MOVES = Step(
     """,
     do="Move the people yourself, while the ball waits and while the robot is on its way.",
     why=r"""
-    At 8 s the base, waiting at the edge for the old place, goes along the edge to where it is
-    nearest to the new one. At 16.5 s the hand turns to the new spot, and a second later it is there
-    within two centimetres. A joint-space plan for the whole sequence would have been
-    void twice. What is fixed is only what the people want, in the space in which they move.
+    At 8 s the base, waiting at the edge for the old place, goes along the edge to where it is nearest
+    to the new one. At 16.5 s the hand turns to the new spot, and a second later it is there within two
+    centimetres. Twice a goal changed, and nothing but the references was told to the controller. What
+    is fixed is only what the people want, in the space in which they move.
     """,
     prediction=Choice(
         "At 16.5 s the goal jumps by 36 cm, when the hand is all but there. One second later it is …",

@@ -29,8 +29,8 @@ NOTHING = Step(
     text=r"""
     The hand holds its place, the base is sent out of reach, 2.2 m from the hand. Level 2 must keep
     (12), $|e_{kp}| \le |e_{kp}|^*$. The errors are curved functions of the joints; the quadratic
-    program of level 2 knows their tangents only. So its answer is a direction, and along it a line
-    search looks for a step $\alpha = 1, \frac12, \frac14, \ldots$ with which the true errors keep
+    program of level 2 knows their tangents only. Its answer is a direction, and along it a line search
+    looks for a step $\alpha = 1, \frac12, \frac14, \ldots$ with which the true errors keep
 
     $$h_i \le \delta_i \quad (13)$$
 
@@ -86,11 +86,11 @@ LITTLE = Step(
     """,
     do="Watch the hand while δ goes from 1 mm to 5 cm. Does the base thank you for it?",
     why=r"""
-    Less than a tenth of it is used. $\delta$ bounds the *plan* at every knot; a tenth of a second
-    later the next plan starts afresh, with level 1 solved again first, and takes back what the one
-    before had allowed itself further on. The paper adds the reverse in a footnote: a bound on plans
-    is no bound on what the robot does in the end, and its own low $\delta$ was missed, 3 mm instead
-    of 1 mm (Table I).
+    Less than a tenth of it is used. $\delta$ bounds the *plan* at every knot; a tenth of a second later
+    the next plan starts afresh, with level 1 solved again first, and takes back what the one before had
+    allowed itself further on. The paper adds the reverse in a footnote (given, not tried here): a bound
+    on plans is no bound on what the robot does in the end, and its own low $\delta$ was missed, 3 mm
+    instead of 1 mm (Table I).
     """,
     prediction=Choice(
         "The hand may be off by 1 cm. How far is it off at most?",
@@ -190,10 +190,9 @@ EFFORT = Step(
     $$\mathcal J_{eff} = \tfrac12 \left\{ \lVert \bar x \rVert_{\bar S}^2 + \lVert \bar u
     \rVert_{\bar R}^2 + \lVert \Delta \bar u \rVert_{\bar W}^2 \right\} \quad (10)$$
 
-    so $|e|^*$ is the best *compromise between error and effort*. So far the first level only paid
-    for leaving the plan it had; now it pays for all effort, as the paper prints it, and its bounds
-    are softened, as the paper does on the real robot. $Q = 10$, (12) and $\delta = 1$ cm are as
-    before.
+    with which $|e|^*$ is the best *compromise between error and effort*. So far the first level only
+    paid for leaving the plan it had; now it pays for all effort, as the paper prints it, and its bounds
+    are softened, as the paper does on the real robot. $Q = 10$, (12) and $\delta = 1$ cm are as before.
     """,
     do="What does our default, Q = 1, do? And a Q of 100: is the hand safe then?",
     why=r"""

@@ -201,11 +201,11 @@ SUM = Step(
     """,
     do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never gets there.",
     why=r"""
-    The diamond lies between the valley and the ring, where the two costs pull equally hard: the
-    wrist is left 5 cm short and the joints give 7 degrees, half of each. The disc 2 never leaves the
-    line, so nothing leaks, up to rounding. It is the line of $\bar M$, though. With the true $M$ a
-    leak remains, the second meter: the arm is not made the way the controller thinks. Time-delay
-    estimation notices it at the next tick and corrects it over tens of ticks.
+    The diamond lies between the valley and the ring, where the two costs pull equally hard: the wrist
+    is left 5 cm short and the joints give 7 degrees, half of each. The disc 2 never leaves the line:
+    nothing leaks, up to rounding. It is the line of $\bar M$, though. With the true $M$ a leak remains,
+    the second meter: the arm is not made the way the controller thinks. Time-delay estimation notices
+    it at the next tick and corrects it over tens of ticks.
     """,
     prediction=Choice(
         "With the arm's true inertia instead of M̄, the leak of the same torques is …",

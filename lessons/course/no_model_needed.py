@@ -67,7 +67,7 @@ LOAD = Step(
             "at most",
             0.1,
             fails_with=("controller=hqp",),
-            because="the load is never noticed, so the sag stays",
+            because="it never notices the load",
         ),
     ),
     events=((0.2, Set("plant.payload_kg", 1.0)),),
@@ -91,9 +91,9 @@ SMALL = Step(
     why=r"""
     The torque is right in the end, but it comes late: every millisecond only a part of the error in
     $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$: of the slowest
-    component of that error this share is left after each step. Close to 1 it says *slow* here, since
-    the eigenvalue behind it is near +1. Near −1 it would say *almost unstable*; the radius alone
-    does not tell which.
+    component of that error this share is left after each step. Close to 1 it says *slow* here: the
+    eigenvalue behind it is near +1. Near −1 it would say *almost unstable*; the radius alone does not
+    tell which.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",

@@ -154,9 +154,8 @@ FREE = Step(
     title="What nobody asks for",
     text=r"""
     Two coordinates of the hand, three joints: one direction of motion is nobody's task. $R$ weighs
-    changes of torque, so in that direction the torque stays what it is, as long as no bound changes
-    it. A short push, 10 N for 0.2 s on the middle link, and the last level, `damping`, is switched
-    off.
+    changes of torque, so in that direction the torque stays what it is, as long as no bound changes it.
+    A short push, 10 N for 0.2 s on the middle link, and the last level, `damping`, is switched off.
     """,
     do="Take the speed limits away and push again: which way does the elbow go? Then switch damping on.",
     why=r"""

@@ -178,13 +178,13 @@ GAINS = Step(
     do="Is there a pair of gains that is good to both, hand and base? Try [5, 2] and [20, 2].",
     why=r"""
     The base is quick now, and the hand pays with 2 cm although it ranks first. A velocity is held for
-    the 20 ms until the next one is asked for. Meanwhile base and arm move on, and what kept the hand
-    in place at the beginning no longer does: the faster the base, the further the hand drifts. Asked
-    for a hundred times a second it drifts half as far. What has drifted is brought back in proportion
-    to $K$: with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as
-    before. Limits are not to blame: without any the hand is off by more. So a good pair exists, and
-    has to be found. The paper says (given, not tried here) that HTIDKC would need its parameters
-    scheduled, where one set of weights serves HTMPC in both parts.
+    the 20 ms until the next one is asked for. Meanwhile base and arm move on, and what kept the hand in
+    place at the beginning no longer does: the faster the base, the further the hand drifts. Asked for a
+    hundred times a second it drifts half as far. What has drifted is brought back in proportion to $K$:
+    with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as before.
+    Limits are not to blame: without any the hand is off by more. A good pair exists, and has to be
+    found. The paper says (given, not tried here) that HTIDKC would need its parameters scheduled, where
+    one set of weights serves HTMPC in both parts.
     """,
     prediction=Choice(
         "Gains four and seven times as high. The largest error of the hand, in the first task, …",

@@ -44,10 +44,11 @@ PRINTED = Step(
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
     To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². The motor can do less than
-    60, and the rows on speed let it change by even less, 41. So the problem has no solution, a fallback
-    takes over, the torque hits its limit and the joint overruns its range by 0.6°. With three times the
-    torque 0.2° is left; with the rows on speed off as well only 0.1° is left. The row is true to the
-    letter and comes too late.
+    60, and the rows on speed let it change by even less, 41. More than twenty of the problems have no
+    solution, the torque hits its limit, and the joint overruns its range by 0.6°. With three times the
+    torque 0.2° is left; with the rows on speed off as well only 0.1° is left. (Whether what is applied
+    where there is none has a part in it was not tried.) The row is true to the letter and comes too
+    late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -183,7 +184,7 @@ VIABLE = Step(
             "at most",
             20.0,
             fails_with=("limits.velocity_approach=0",),
-            because="t = Tₛ allows 106°/s there, so it comes at full speed",
+            because="t = Tₛ allows 106°/s there",
         ),
         Claim(
             "Every QP has a solution.",

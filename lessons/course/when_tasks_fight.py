@@ -136,11 +136,12 @@ EQUALITY = Step(
     why=r"""
     Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links
     2 and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge,
-    to and fro with 94°/s, a little more than once a second, until joint 1 is called back. Strict is
-    not calm. But torque and speed stay within their bounds, and the hand on its circle. That is the
-    bounds' doing, too, not the equality's alone: without those on speed and position every motor comes
-    to its limit and the hand is off by 11 mm, and without any bound the arm is lost as with a
-    projection.
+    to and fro with 94°/s, a little more than once a second, until joint 1 is called back.
+    Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it swings as
+    before. What does, we did not find. Strict is not calm. But torque and speed stay within their
+    bounds, and the hand on its circle. That is the bounds' doing, too, not the equality's alone:
+    without those on speed and position every motor comes to its limit and the hand is off by 11 mm,
+    and without any bound the arm is lost as with a projection.
     """,
     claims=(
         Claim(

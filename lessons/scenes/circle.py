@@ -53,9 +53,9 @@ def iiwa14_circle_paper() -> TorqueScene:
     The paper leaves open what its plant was. A weightless robot without friction or armature, started with
     the reference's velocity, under no velocity limit and with the position rows (32d) as printed gives its q₁
     error to a thousandth (8.768°, paper 8.773), and joints 5 and 7 at their limits from 3.5 s on, as section
-    VI-B says of [3.8, 4] s. There three QPs have no solution, since 5 ms are too short to stop in: their
-    position rows give way, and `solver.unsolved` counts them. With `limits.position=viability`, this lab's
-    default elsewhere, no QP fails and q₁ is 9.15°. Everything stays settable: `plant.gravity=true`,
+    VI-B says of [3.8, 4] s. There three QPs have no solution: their position rows give
+    way, and `solver.unsolved` counts them. With `limits.position=viability`, this lab's default
+    elsewhere, no QP fails and q₁ is 9.15°. Everything stays settable: `plant.gravity=true`,
     `limits.velocity=true`.
 
     The start: q̇₀ = J₁₂⁺ ẋ_d(0), J₁₂ the Jacobian of levels 1 and 2, and the torque of q̈ = 0 there. At q₀ the

@@ -14,10 +14,8 @@ from robots import load_robot
 def ridgeback_hold() -> TorqueScene:
     """`ridgeback-ur10-hold`: EE position, then the base's place; the rest is damped.
 
-    The base's M̄ is half its mass, so its loop is slower than the arm's: it gets softer gains. R weighs
-    accelerations: as printed it weighs N, of which 130 kg need so many that with R = 10 and Q = 200 a posture
-    of the base swings by 3 cm under HIMPC (the increments lag by R M̄²/Q = 0.8 s) and HQP gives 1/3000 of
-    the force it should.
+    The base's M̄ is half its mass, and it has softer gains than the arm. R weighs
+    accelerations: as printed it would weigh N for the base and N·m for the arm.
     """
     robot = load_robot("ridgeback-ur10")
     levels = (

@@ -33,10 +33,9 @@ NOMINAL = NominalSettings(
 """The identified model: everything that is inert 20 % light, friction unknown."""
 
 CONFLICT_LIMITS = Limits(velocity_approach=8.0)
-"""Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other. The
-faster it may come up to them, the more the lag of time-delay estimation (M̄ is far below M) costs level 1: its
-RMSE is 0.15 mm with a rate of 5, 0.25 with 8, 0.36 with 10, 0.69 with 15 and 0.54 with 0, as printed. Below 8
-the bounds would get in the way of RT1 too (q₁ off by 1.4° with 5)."""
+"""Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other, and
+level 1 errs less if it may come up to them less fast than with the default: `himpc-lab reproduce
+himpc-table-3` measures it with 0, 8 and 15 1/s."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ def planar3_singular() -> TorqueScene:
     return replace(
         scene,
         name="planar3-singular",
-        title="planar arm on RT3: straight, thus singular, three times",
+        title="planar arm on RT3: straight and singular three times",
         settings=replace(scene.settings, options=SingularOptions()),
         q_0=np.zeros(3),
         duration=16.0,

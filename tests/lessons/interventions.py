@@ -1,8 +1,8 @@
 """Explanations tested by intervention: the cause is taken away, and the effect has to go.
 
 Each row quotes a sentence, names a run that shows the effect, what takes the cause away, and what is measured
-with it and without. The rows of the course are in `interventions_course`, those of the documents in
-`interventions_documents`.
+with it and without. `interventions_all` has all of them: the course's are in `interventions_tasks`,
+`interventions_limits` and `interventions_mobile`, the documents' in `interventions_documents`.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,9 @@ from himpc.limits.rows import REACTION
 from himpc.limits.viability import viability_bounds
 from himpc.prediction.task import residual_model
 from lessons.course import load_lesson
+from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
 from robots import Plant, convergence_gauge, load_robot
 
 Array = NDArray[np.float64]
@@ -153,6 +156,41 @@ def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
     G = plant.jacobian(robot.tip)[:2] / np.array(scene.settings.M_bar)
     largest = 200.0 * np.linalg.norm(G, 2) ** 2
     assert 3e4 < largest < 3e5
+
+
+@pytest.mark.parametrize(
+    ("change", "kept"),
+    [("limits.velocity=false", True), ("damping=true", False), ("limits.velocity=true", False)],
+)
+def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -> None:
+    """*What nobody asks for*: under a push Δτ has no part along the torques that move no task, unless a bound
+    or a level of its own asks for it."""
+    lesson = load_lesson("one-task")
+    assert "in that direction the torque stays what it is, as long as no bound changes it" in " ".join(
+        lesson.steps[3].text.split()
+    )
+    off = () if change == "limits.velocity=true" else ("limits.velocity=false",)
+    scene = replace(lesson.run_of(lesson.steps[3]), duration=0.18).but(*off, change).prepared()
+    assert isinstance(scene, TorqueScene)
+    found, plant, M_bar = run(scene), Plant(scene.robot, scene.settings.plant), np.array(scene.settings.M_bar)
+
+    def part(q: Array, delta: Array) -> float:
+        plant.reset(q)
+        return abs(float(np.linalg.svd(plant.jacobian(scene.robot.tip)[:2] / M_bar)[2][2] @ delta))
+
+    pushed = slice(105, None)
+    largest = max(map(part, found["q"][pushed], found["delta_tau"][pushed]))
+    assert np.abs(found["delta_tau"][pushed]).max() > 0.05
+    assert largest < 1e-9 if kept else largest > 0.01
+
+
+def test_RT4_asks_joint_1_for_more_than_its_data_sheet_allows() -> None:
+    """The page of disagreements: 141°/s, and the data sheet 85."""
+    scene = torque_scene("iiwa14-circle-paper")
+    q1 = scene.references(scene.robot, scene.settings.levels)["q1"]
+    asked = np.abs(q1.preview(0.0, 1e-3, 4000).velocity).max()
+    assert math.degrees(asked) == pytest.approx(141.0, abs=0.5)
+    assert math.degrees(scene.robot.v_limit[0]) == pytest.approx(85.0, abs=0.5)
 
 
 def test_one_digit_of_a_coarse_encoder_is_almost_3_newton_metres() -> None:

@@ -1,6 +1,6 @@
 """Explanations: where a text names a cause, a run takes it away, and the effect goes.
 
-`interventions` says what a row is; the rows are in `interventions_course` and `interventions_documents`.
+`interventions` says what a row is; `interventions_all` has the rows.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from interventions import Intervention
-from interventions_course import COURSE_ROWS
-from interventions_documents import DOCUMENT_ROWS
+from interventions_all import ROWS
 from quoted import CourseRuns, step_of
 from test_lessons_quoted import texts
 
@@ -38,7 +37,6 @@ DOCUMENTS = {
 }
 """Names of documents in `Intervention.at`."""
 COMPARED = ("himpc", "tdeosf", "hiqp")
-ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
 
 
 @cache

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from interventions_course import COURSE_ROWS
-from interventions_documents import DOCUMENT_ROWS
+from interventions_all import ROWS
 from quoted import QUOTED, CourseRuns, Quoted, specs, step_of
 
 from himpc.limits import Limits
@@ -22,6 +21,7 @@ from lessons.events import MoveTarget
 from lessons.papers.printed import printed
 from lessons.papers.stored import stored
 from lessons.scenes.catalog import torque_scene
+from lessons.scenes.planar import CONFLICT_LIMITS
 from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 from lessons.teaching.lesson import Step
@@ -50,7 +50,6 @@ def test_a_number_in_a_sentence_is_measured(quoted: Quoted, course_runs: CourseR
 # -------------------------------------------------- numbers that follow from settings, or are the papers'
 
 
-ROWS = (*COURSE_ROWS, *DOCUMENT_ROWS)
 WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
 LOOSE = re.compile(rf"(?<![\w.−-])−?\d+(?:\.\d+)?|\b(?:{WORDS})\b")
 """Digits, and words that are numbers."""
@@ -80,7 +79,7 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "torque-has-a-limit/1": ("60",),  # settings
     "torque-has-a-limit/2": ("−30",),
     "stopping-takes-distance/0": ("57", "0.3", "100", "60", "41"),
-    "stopping-takes-distance/1": ("20", "50"),
+    "stopping-takes-distance/1": ("50",),
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
     "inside-the-qp/3": ("half",),  # 5 of 10 cm, 7 of 14 degrees
     # Every other torque counts, or is computed.
@@ -139,11 +138,29 @@ def test_joint_3_swings_a_little_more_than_once_a_second() -> None:
 
 
 def test_a_printed_bound_on_speed_is_overrun() -> None:
-    """docs/house.md, 17 %."""
+    """docs/house.md, and what `Limits` says of itself: 17 %, and 0.2 % with a barrier."""
     house = (Path(__file__).parents[2] / "docs/house.md").read_text(encoding="utf-8")
     assert "with 0, as printed, the limit is overrun by 17 %" in " ".join(house.split())
-    overrun = stored(False)["himpc-limits"].rows["nominal, as printed: largest velocity over its limit"][0]
-    assert overrun == pytest.approx(1.17, abs=0.005)
+    told = " ".join((Limits.__doc__ or "").split())
+    assert "by 17 % on the iiwa's circle with rate 0, which is (32e) as printed, by 0.2 % with 15" in told
+    rows = stored(False)["himpc-limits"].rows
+    printed_one, ours = (
+        rows[f"nominal, {how}: largest velocity over its limit"][0]
+        for how in ("as printed", "barrier and margin")
+    )
+    assert printed_one == pytest.approx(1.17, abs=0.005)
+    assert ours == pytest.approx(1.002, abs=5e-4)
+
+
+def test_a_gentler_bound_on_speed_helps_level_1_under_conflict() -> None:
+    """`CONFLICT_LIMITS`: the approach that the scene has, against the default and the printed one."""
+    rows = stored(False)["himpc-table-3"].rows
+    of = {
+        rate: next(row[0] for name, row in rows.items() if f"velocity_approach = {rate}," in name)
+        for rate in ("0", "8", "15")
+    }
+    assert CONFLICT_LIMITS.velocity_approach == 8.0 < Limits().velocity_approach == 15.0
+    assert of["8"] < 0.5 * of["0"] < 0.5 * of["15"]
 
 
 def test_the_inverse_of_a_straight_arm_magnifies_many_million_times() -> None:

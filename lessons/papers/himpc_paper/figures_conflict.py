@@ -155,7 +155,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             # The last pose is the first of the other panel, or where that began.
             notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
-    caption = f"HIMPC on RT3 in {POSES} poses; straight, thus singular, in the 1st, 10th and 19th (thick)."
+    caption = f"HIMPC on RT3 in {POSES} poses; straight and singular in the 1st, 10th and 19th (thick)."
     return _picture("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)
 
 
@@ -163,7 +163,7 @@ def _fig_15(results: Results, quick: bool) -> Section:
     run = results[rt3("himpc")]
     whole = [run.error_of("position", k, "rmse") for k in (0, 1)]
     panels = tuple(
-        replace(panel, marks=(0.0, 8.0, 16.0), mark_label="straight, thus singular")
+        replace(panel, marks=(0.0, 8.0, 16.0), mark_label="straight and singular")
         for panel in error_panels([run], PLANAR_ERRORS)
     )
     found = _picture("himpc-fig-15", "Tracking errors of HIMPC on RT3.", panels)

@@ -91,8 +91,7 @@ def _table_6(results: Results, quick: bool) -> Section:
             f"RMSE of x over the whole run. {OPEN} With R on Δτ as printed the step is all but deadbeat: a "
             "longer horizon gains little: a third of the paper's gain, and that where joints meet their "
             "limits, which it sees sooner. With R on M̄⁻¹Δτ, the accelerations, the paper's trend appears; "
-            "position limits are then those one can stop before, since the printed rows break a soft "
-            "controller.",
+            "position limits are then those one can stop before.",
             *(("Quick: 2 s of the 4, without N = 30 and most of NHIMPC.",) if quick else ()),
         ),
         rows=tuple(rows),

@@ -59,8 +59,7 @@ def _section(results: Results, quick: bool) -> Section:
     )
     caption = (
         "Value functions of the three levels from rest on RT4, and level 1's from tick to tick. Level 3 "
-        "climbs: joint 1 may not turn as fast as asked, so its error grows, and (39) promises nothing for "
-        "lower levels."
+        "climbs: joint 1 may not turn as fast as asked, and (39) promises nothing for lower levels."
     )
     return Section(
         notes=(

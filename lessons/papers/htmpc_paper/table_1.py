@@ -16,7 +16,7 @@ FORMULATIONS = {"paper": "A, as printed", "proximal": "C, the default"}
 _TOPIC = {"paper": "hand-under-11-and-12", "proximal": "proximal-hand"}
 _WHY = {
     "paper": "the paper does not print its peak target, nor all its weights, and the numbers hang on them",
-    "proximal": "not the paper's formulation: upper levels keep to their plan, so the hand hardly moves",
+    "proximal": "not the paper's formulation: upper levels keep to their plan",
 }
 
 

@@ -1,0 +1,196 @@
+"""The same as `explanations_exempt` for words in the source: the reference, and what the program says."""
+
+from __future__ import annotations
+
+from explanations_exempt import FURTHER, HIMPC, LESSONS, Exempt
+
+ROBOTS, HTMPC = "tests/robots/test_robots_", "tests/himpc/test_htmpc_"
+
+# fmt: off
+REFERENCE = (
+    # ---------------------------------------- nothing that could be wrong
+    Exempt("definition", "", (
+        ("himpc/cascade/compiled.py", "What is on disk is current as long as"),
+        ("himpc/cascade/compiling.py", "Functions of a module with a decorator"),
+        ("himpc/cascade/loading.py", "How a compiled function comes from disk"),
+        ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
+        ("himpc/cascade/polish.py", "From the rows that a solver's point says bind"),
+        ("himpc/controllers/nhimpc.py", "J_i(q_{k+j|k}) in place of"),
+        ("himpc/controllers/nhimpc.py", "Whether every level is at its optimum"),
+        ("himpc/controllers/null_space_control.py", "There is no QP, so the KKT residual is NaN."),
+        ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
+        ("himpc/limits/braking.py", "How far the state rows must give way"),
+        ("himpc/tasks/pointing.py", "s = Rᵀ(c − p) is the point as the frame sees it"),
+        ("lessons/own/files.py", "Where in the file an exception came from"),
+        ("lessons/own/folder.py", "Whether a path leads to below the folder"),
+        ("lessons/papers/reproduce.py", "*agrees*: the ratio is within 10 % of 1"),
+        ("lessons/recording/arrays.py", "how: what is worth telling of where it came from"),
+        ("lessons/replay/state.py", "InputError: the robot comes from a file"),
+        ("lessons/session/session.py", "seed: seed of the run; all randomness comes from it"),
+    )),
+    Exempt("purpose", "", (
+        ("robots/capsules.py", "Vertices modelled along z"),
+        ("robots/capsules.py", "Caps and mantle with vertices of their own"),
+        ("robots/catalog.py", "Angles in degrees here"),
+        ("robots/reach.py", "placo's solver for one robot"),
+        ("himpc/cascade/compiling.py", "Everything that is compiled, in one place"),
+        ("himpc/controllers/forms.py", "All active levels, their rows stacked"),
+        ("himpc/limits/rows.py", "All rows are in N·m"),
+        ("himpc/references/square_wave.py", "s: a switch counts as reached this much early"),
+        ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
+        ("lessons/own/deadline.py", "How long it waited is asked from the first alarm on"),
+        ("lessons/papers/himpc_paper/ablations.py", "All tasks in one cost, one step ahead"),
+        ("lessons/scenes/planar.py", "The plant takes any torque"),
+        ("lessons/scenes/torque_scene.py", "sources: catalog name or URDF path and tip"),
+        ("lessons/settings/assignments.py", "The controller comes first"),
+        ("lessons/settings/missions.py", "Scenes whose tasks last for the whole run"),
+    )),
+    # ---------------------------------------- what follows from equations
+    Exempt("mathematics", (
+        LESSONS + "derivations.py::test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar"
+    ), (
+        ("robots/inertia.py", "The estimation error is multiplied by I − M⁻¹M̄"),
+        ("examples/horizon_and_M_bar.py", "Time-delay estimation multiplies its error"),
+    )),
+    Exempt("mathematics", FURTHER + "an_equation_holds", (
+        ("robots/inertia.py", "M⁻¹M̄ is similar to S"),
+    )),
+    Exempt("mathematics", ROBOTS + "inertia.py::test_suggestion_is_stable_at_unseen_configurations", (
+        ("robots/inertia.py", "1. shape: D_i = min over samples"),
+    )),
+    Exempt("mathematics", ROBOTS + "urdf_fuzz.py::test_the_nearest_physical_inertia_is_physical", (
+        ("robots/urdf/inertials.py", "A body's inertia is I = tr(Σ)·1 − Σ"),
+    )),
+    Exempt("mathematics", HIMPC + (
+        "adaptation.py::test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one"
+    ), (
+        ("himpc/adaptation.py", "By construction M̄ ⪯ M̂, so"),
+    )),
+    Exempt("mathematics", HIMPC + "oracle.py::test_where_nothing_binds_it_is_the_closed_form", (
+        ("himpc/cascade/white.py", "An orthonormal basis of √R ∘ span Z"),
+    )),
+    Exempt("mathematics", HIMPC + "rivals.py::test_hqp_meets_its_kkt_conditions", (
+        ("himpc/controllers/hqp.py", "Multiplied out, as here, no product of Jacobians is inverted"),
+    )),
+    Exempt("mathematics", HIMPC + "variants.py::test_a_heavier_level_comes_closer_to_a_strict_one", (
+        ("himpc/controllers/weighted.py", "Model, weights, bounds and hand-over are HIMPC's"),
+    )),
+    Exempt("mathematics", HIMPC + (
+        "variants.py::test_the_weighted_evidence_is_that_of_the_levels_above_alone"
+    ), (
+        ("himpc/controllers/weighted.py", "The leak thus tells, as for HIMPC"),
+    )),
+    Exempt("mathematics", HTMPC + "equations.py::test_the_shifted_plan_has_the_old_plans_velocities", (
+        ("himpc/htmpc/continuing.py", "Each is the mean of the old input over the new interval"),
+    )),
+    Exempt("mathematics", HTMPC + "equations.py::test_prediction_is_the_integral_of_the_inputs", (
+        ("himpc/htmpc/prediction.py", "The input is constant between knots"),
+    )),
+    Exempt("mathematics", HTMPC + "equations.py::test_ramp_and_stop_rows_leave_a_way_on", (
+        ("himpc/htmpc/rows.py", "Two groups see past the horizon"),
+    )),
+    Exempt("mathematics", HTMPC + "loop.py::test_htidkc_first_step_by_hand", (
+        ("himpc/htmpc/htidkc.py", "Level 0 minimises the violation of the bounds"),
+    )),
+    Exempt("mathematics", HIMPC + (
+        "errors.py::test_what_controllers_take_for_its_derivative_is_the_errors_own"
+    ), (
+        ("himpc/tasks/orientation.py", "On two or three it is so along x̃"),
+    )),
+    Exempt("mathematics", HIMPC + "references.py::test_a_dragged_position_keeps_its_caps_and_its_promises", (
+        ("himpc/references/target.py", "A target that a hand drags"),
+        ("himpc/references/target.py", "Each step holds one acceleration a"),
+    )),
+    Exempt("mathematics", LESSONS + "geometry.py::test_the_box_is_where_the_rows_hold", (
+        ("lessons/geometry/plane.py", "In that cut the cost of a level is"),
+    )),
+    Exempt("mathematics", LESSONS + "geometry.py::test_geometry_and_solver_find_the_same_points", (
+        ("lessons/scenes/plane.py", "The wrist is where joint 3 sits"),
+    )),
+    # ---------------------------------------- what the program does
+    Exempt("software", ROBOTS + "reach.py::test_a_target_out_of_reach_is_said_to_be", (
+        ("robots/reach.py", "Tasks are soft"),
+        ("robots/reach.py", "The residual by our own kinematics"),
+    )),
+    Exempt("software", ROBOTS + "mobile.py::test_ideal_kinematics_are_the_double_integrator", (
+        ("robots/servo.py", "mode: \"ideal\": the velocity moves linearly"),
+    )),
+    Exempt("software", ROBOTS + "signals.py::test_configure_keeps_the_state_and_the_memory", (
+        ("robots/signals.py", "The memory is kept in time"),
+    )),
+    Exempt("software", ROBOTS + "shapes.py::test_simplified_surfaces_stay_where_they_were", (
+        ("robots/simplify.py", "Vertices in one cell of a grid"),
+    )),
+    Exempt("software", ROBOTS + "urdf.py::test_continuous_becomes_unbounded_with_one_coordinate", (
+        ("robots/urdf/joints.py", "Rewrites every joint so that"),
+    )),
+    Exempt("software", ROBOTS + (
+        "urdf.py::test_the_driver_of_a_mimic_gripper_is_fixed_but_a_parallel_arm_is_not"
+    ), (
+        ("robots/urdf/joints.py", "' mimics it, so it drives a gripper"),
+    )),
+    Exempt("software", HIMPC + "braking.py::test_braking_meets_all_rows_whenever_any_increments_do", (
+        ("himpc/cascade/cascade.py", "So the increments meet all rows"),
+    )),
+    Exempt("software", HIMPC + "compiling.py::test_who_has_it_compiled_runs_what_is_on_disk", (
+        ("himpc/cascade/compiler.py", "A process of its own that compiles"),
+    )),
+    Exempt("software", HIMPC + "ladder.py::test_least_slack_makes_any_rows_feasible", (
+        ("himpc/cascade/last_resort.py", "N·m added to the least slack"),
+    )),
+    Exempt("software", HIMPC + "cascade.py::test_routes_agree_on_rank_deficient_stacks", (
+        ("himpc/cascade/null_space.py", "Where the rank differs between knots"),
+    )),
+    Exempt("software", HIMPC + "cascade.py::test_corners_that_many_bounds_make_are_found", (
+        ("himpc/cascade/polish.py", "A row that blocks the way depends on none of those held"),
+    )),
+    Exempt("software", HIMPC + "controller.py::test_the_controller_sees_no_mass", (
+        ("himpc/configuration.py", "Only geometry is read, no inertia or gravity"),
+    )),
+    Exempt("software", HTMPC + "active_set.py::test_rows_that_contradict_each_other_are_found_out", (
+        ("himpc/htmpc/active_set.py", "The rows held are kept as combinations"),
+    )),
+    Exempt("software", HTMPC + "loop.py::test_every_setting_changes_live_without_a_jump", (
+        ("himpc/htmpc/htmpc.py", "`configure` changes settings and keeps that plan"),
+    )),
+    Exempt("software", HTMPC + "equations.py::test_too_many_coordinates_are_explained", (
+        ("himpc/htmpc/tracking.py", "InputError: they do not, so that no freedom is left"),
+        ("himpc/htmpc/tracking.py", "joints: their sum must be smaller"),
+    )),
+    Exempt("software", HIMPC + "limits.py::test_tightened_limits_close_in_and_arrive", (
+        ("himpc/limits/ramp.py", "A tightened one first falls to the present value"),
+    )),
+    Exempt("software", LESSONS + "sweep.py::test_a_stopped_sweep_goes_on_to_the_same_result", (
+        ("lessons/experiments/sweep/folder.py", "The folder of a sweep"),
+    )),
+    Exempt("software", "tests/commands/test_commands_reproduce.py::test_a_sweep_that_is_stopped_carries_on", (
+        ("lessons/experiments/sweep/folder.py", "Where a sweep goes if nobody says"),
+    )),
+    Exempt("software", LESSONS + "sweep.py::test_all_cores_give_the_same_result_as_one", (
+        ("lessons/parallel.py", "Outcomes come as they are ready"),
+    )),
+    Exempt("software", (
+        LESSONS + "export.py::test_a_script_of_measured_deadlines_says_that_it_cannot_repeat"
+    ), (
+        ("lessons/replay/script.py", "Measured computing times took part in it"),
+    )),
+    Exempt("software", LESSONS + "switch.py::test_the_torque_goes_from_one_controller_to_the_other", (
+        ("lessons/session/bumpless.py", "Both see the measured state and the torque"),
+    )),
+    Exempt("software", LESSONS + "deadline.py::test_always_late_is_one_tick_of_delay", (
+        ("lessons/session/deadline.py", "So one late tick costs one tick of holding"),
+    )),
+    Exempt("software", LESSONS + "architectures.py::test_all_architectures_have_one_mission", (
+        ("lessons/settings/missions.py", "All but the tasks in the window is the same"),
+    )),
+    Exempt("software", LESSONS + "deadline.py::test_the_clock_decides_only_if_asked_to", (
+        ("lessons/settings/settings.py", "Whether the clock on the wall decides anything"),
+    )),
+    Exempt("software", LESSONS + "deadline.py::test_the_horizon_decides_what_is_late", (
+        ("lessons/settings/torque.py", "solve_ms_per_knot: how long the computer"),
+    )),
+    Exempt("software", LESSONS + "own.py::test_own_files_are_run_only_where_the_command_line_says_so", (
+        ("lessons/settings/torque.py", "No path reaches them: what comes from elsewhere"),
+    )),
+)
+# fmt: on

@@ -1,0 +1,151 @@
+"""What the lessons on a mobile robot, and the one on your own, say of causes, in the order of the course."""
+
+from __future__ import annotations
+
+from interventions import Intervention, of
+
+HAND = of("error/position", "mm")
+EE = of("error/ee", "mm")
+NO_LIMITS = ("limits.velocity=false", "limits.acceleration=false", "limits.jerk=false")
+TILT = of("error/orientation", "deg", "last")
+BASE_10 = of("error/base", "m", "mean", 10.0, 10.2)
+
+# fmt: off
+MOBILE_ROWS = (
+    # ---------------------------------------- first-hold-then-reach
+    Intervention(
+        "first-hold-then-reach/0", "priorities say who may be disturbed meanwhile",
+        EE, (0, 0.1), ("order=base,ee",), (100, 140),
+    ),
+    Intervention(
+        "first-hold-then-reach/2", "the hand is left behind by exactly these 1.63 m",
+        of("error/ee", "m", "mean", 8.5), (1.625, 1.635), ("levels.base.enabled=false",), (0, 0.01),
+    ),
+    Intervention(
+        "first-hold-then-reach/1", "it is where no plan is left that makes $\\mathcal J_2$ smaller",
+        of("error/base", "m", "mean", 7.0), (1.55, 1.7), ("order=base,ee",), (0, 0.05),
+    ),
+    # ---------------------------------------- how-strict-is-strict
+    Intervention(
+        "how-strict-is-strict/0", "with $\\delta = 0$ the line search halves and halves",
+        of("way of the base", "m"), (0, 0.01), ("delta_m=0.001",), (1.0, 3.0),
+    ),
+    Intervention(
+        "how-strict-is-strict/1",
+        "a tenth of a second later the next plan starts afresh, with level 1 solved again first, and takes "
+        "back what the one before had allowed itself further on",
+        EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
+    ),
+    Intervention(
+        "how-strict-is-strict/2", "its gradient says nothing about which way is harmful",
+        of("step/base", "", "mean"), (0.015, 0.03), ("formulation=paper",), (0.045, 0.2),
+    ),
+    Intervention(
+        "how-strict-is-strict/3", "its own best plan lets the hand slip a little",
+        EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
+    ),
+    Intervention(
+        "how-strict-is-strict/3", "$\\delta$ comes on top", EE, (12, 20), ("delta_m=0.001",), (2, 9),
+    ),
+    # ---------------------------------------- seeing-ahead
+    Intervention(
+        "seeing-ahead/0", "it cannot leave for a place that it does not know of",
+        of("way of the base", "m", "range", 6.5, 8.0), (0, 0.05), ("controller=htmpc",), (0.4, 0.8),
+        of=("controller=htmpc_wpt",), seconds=8.0,
+    ),
+    Intervention(
+        "seeing-ahead/1", "Without the bound on that change the same 0.2 s are enough for 6 mm",
+        EE, (25, 40), ("limits.jerk=false",), (5.5, 6.9),
+    ),
+    Intervention(
+        "seeing-ahead/1", "with half the top speed for 4 mm", EE, (25, 40), ("limits.velocity_scale=0.5",),
+        (3.5, 4.5),
+    ),
+    Intervention(
+        "seeing-ahead/1", "three times the acceleration hardly helps",
+        EE, (20, 40), ("limits.acceleration_scale=3",), (20, 40), stays=True,
+    ),
+    Intervention(
+        "seeing-ahead/2", "without any limit on speed and acceleration it is hardly nearer home",
+        of("error/base", "m", "mean", 15.9), (0.14, 0.17), NO_LIMITS, (0.14, 0.17), stays=True,
+    ),
+    Intervention(
+        "seeing-ahead/2", "with a gain of 2 1/s it arrives",
+        of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[2,2]",), (0, 0.01),
+    ),
+    Intervention(
+        "seeing-ahead/2", "it is as quick as the limits let it be",
+        BASE_10, (0, 0.06), ("limits.velocity_scale=0.5",), (0.4, 0.6), of=("controller=htmpc_wpt",),
+    ),
+    Intervention(
+        "seeing-ahead/2", "later with half the speed or a third of the acceleration",
+        BASE_10, (0, 0.06), ("limits.acceleration_scale=0.33",), (0.15, 0.25), of=("controller=htmpc_wpt",),
+    ),
+    Intervention(
+        "seeing-ahead/2", "where HTIDKC comes home as late as before",
+        BASE_10, (0.85, 0.95), ("limits.velocity_scale=0.5",), (0.85, 0.95), stays=True,
+    ),
+    Intervention(
+        "seeing-ahead/2", "where HTIDKC comes home as late as before",
+        BASE_10, (0.85, 0.95), ("limits.acceleration_scale=0.33",), (0.85, 0.95), stays=True,
+    ),
+    Intervention(
+        "further/seeing-ahead", "With a thousandth of this $\\rho$ the difference goes.",
+        of("error/base", "m", "mean", 15.9), (0.15, 0.17), ("rho=1e-5",), (0.13, 0.14), on="seeing-ahead/2",
+    ),
+    Intervention(
+        "seeing-ahead/3", "the faster the base, the further the hand drifts",
+        EE, (15, 25), ("gains=[2,0.3]",), (0, 6), seconds=4.0,
+    ),
+    Intervention(
+        "seeing-ahead/3", "Asked for a hundred times a second it drifts half as far.",
+        EE, (15, 25), ("rate_hz=100",), (6, 14), seconds=4.0,
+    ),
+    Intervention(
+        "seeing-ahead/3", "with 5 1/s for the hand it is off by half", EE, (15, 25), ("gains=[5,2]",),
+        (7, 13), seconds=4.0,
+    ),
+    Intervention(
+        "seeing-ahead/3", "with 20 1/s by 3 mm", EE, (15, 25), ("gains=[20,2]",), (2, 4),
+    ),
+    Intervention(
+        "seeing-ahead/3", "the base is as quick as before",
+        of("error/base", "m", "mean", 8.0), (0.18, 0.21), ("gains=[20,2]",), (0.18, 0.21), stays=True,
+    ),
+    Intervention(
+        "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (26, 50),
+        seconds=4.0,
+    ),
+    # ---------------------------------------- your-robot
+    Intervention(
+        "your-robot/0", "the orientation as far as five joints can",
+        TILT, (11, 12), ("levels.orientation.enabled=false",), (17, 20),
+    ),
+    Intervention(
+        "further/your-robot", "Three coordinates of orientation cannot all be had with two freedoms",
+        TILT, (11, 12), ("levels.position.enabled=false",), (0, 1), on="your-robot/0",
+    ),
+    Intervention(
+        "your-robot/0", "the posture goes without",
+        of("error/posture", "deg", "last"), (20, 30),
+        ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 1),
+    ),
+    Intervention(
+        "your-robot/0", "A weighted sum gives up the position instead",
+        of("error/position", "mm", "last"), (90, 120), ("controller=himpc",), (0, 0.2),
+        of=("controller=weighted",),
+    ),
+    Intervention(
+        "your-robot/1", "what it does not know of the weight, the springs must carry",
+        of("error/position", "mm", "last"), (10, 100),
+        ("nominal.mass_scale=1.5", "nominal.inertia_scale=1.5"),
+        (0, 0.2), of=("controller=hqp",), seconds=0.3,
+    ),
+    Intervention(
+        "further/your-robot",
+        "The small ones become smaller, so slow components are corrected more slowly still. Safer, and less "
+        "accurate.",
+        HAND, (9, 16), ("plant.mass_scale=1", "plant.inertia_scale=1"), (5, 8.5), on="your-robot/1",
+    ),
+)
+# fmt: on
