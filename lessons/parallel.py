@@ -60,7 +60,7 @@ def on_cores(
         items: its arguments.
 
     Yields:
-        (place of the item, what the function returned, or `FailedJob` if it raised or its process died twice).
+        (place of the item, its result, or `FailedJob` where it raised or its process died twice).
     """
     waiting = deque(range(len(items)))
     while waiting:
