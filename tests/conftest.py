@@ -65,11 +65,33 @@ _LONG = (
 """What takes long comes first, of that what mostly waits: no worker is left alone with it at the end."""
 
 
+_QUICK = (
+    "tests/test_structure.py",
+    "tests/himpc/test_himpc_errors.py",
+    "tests/himpc/test_himpc_limits.py",
+    "tests/himpc/test_himpc_one_step.py",
+    "tests/himpc/test_himpc_prediction.py",
+    "tests/himpc/test_himpc_references.py",
+    "tests/himpc/test_himpc_tasks.py",
+    "tests/himpc/test_himpc_cascade.py",
+    "tests/himpc/test_htmpc_active_set.py",
+    "tests/himpc/test_htmpc_equations.py",
+    "tests/lessons/test_lessons_entries.py",
+    "tests/lessons/test_lessons_run_spec.py",
+    "tests/lessons/test_lessons_settings.py",
+    "tests/lessons/test_lessons_stack.py",
+)
+"""Files of the mark `quick`."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     def rank(item: pytest.Item) -> int:
         return next((k for k, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG))
 
     items.sort(key=rank)
+    for item in items:
+        if item.nodeid.startswith(_QUICK):
+            item.add_marker(pytest.mark.quick)
 
 
 _ROOT = Path(__file__).parents[1]
@@ -80,13 +102,19 @@ _COLD = pytest.StashKey[tuple[str, str]]()
 def pytest_configure(config: pytest.Config) -> None:
     """What is compiled is compiled before the tests: it takes a minute, for which none of them waits. In a
     fresh clone the first run does it, and is kept for the test that compares it with the second."""
-    if hasattr(config, "workerinput"):
+    if hasattr(config, "workerinput") or _few_files(config):
         return
     if not any(_ROOT.glob("himpc/**/__pycache__/compiled/*.code")) and "NUMBA_CACHE_DIR" not in os.environ:
         file = Path(mkdtemp(), "first.npz")
         config.add_cleanup(lambda: rmtree(file.parent))
         config.stash[_COLD] = str(file), _run(file)
     subprocess.run([sys.executable, "-c", _COMPILE], cwd=_ROOT, check=True, capture_output=True)
+
+
+def _few_files(config: pytest.Config) -> bool:
+    """Whether only files were named, no folder: each then compiles what it needs."""
+    named = [Path(str(config.rootpath), each.split("::")[0]) for each in config.args]
+    return len(named) <= 3 and all(each.is_file() for each in named)
 
 
 def pytest_configure_node(node: Any) -> None:
