@@ -8,7 +8,7 @@ from typing import Any
 
 
 @cache
-def fast_message(kind: type[Any]) -> type[Any]:
+def fast(kind: type[Any]) -> type[Any]:
     """The same kind of message, all of whose fields are Python's own numbers, words and tuples of them. A
     robot that moves sends some hundred in a second. viser names a message by its class."""
     names = tuple(field.name for field in fields(kind))

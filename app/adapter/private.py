@@ -21,7 +21,7 @@ import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
-from app.adapter.fast_messages import fast_message
+from app.adapter.fast_messages import fast
 from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.removed_handle_errors import call
 from app.adapter.thread_safe_event import ThreadSafeEvent
@@ -291,14 +291,10 @@ def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> No
 def shift(node: viser.SceneNodeHandle, at: np.ndarray) -> None:
     """Moves a node, (3,) m; assigning compares at length with what was."""
     node._impl.position[:] = at
-    node._impl.api._queue_scene_message(
-        fast_message(_messages.SetPositionMessage)(node.name, tuple(at.tolist()))
-    )
+    node._impl.api._queue_scene_message(fast(_messages.SetPositionMessage)(node.name, tuple(at.tolist())))
 
 
 def turn(node: viser.FrameHandle, to: np.ndarray) -> None:
     """Turns a node, wxyz."""
     node._impl.wxyz[:] = to
-    node._impl.api._queue_scene_message(
-        fast_message(_messages.SetOrientationMessage)(node.name, tuple(to.tolist()))
-    )
+    node._impl.api._queue_scene_message(fast(_messages.SetOrientationMessage)(node.name, tuple(to.tolist())))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from viser import _messages
 
-from app.adapter.fast_messages import fast_message
+from app.adapter.fast_messages import fast
 
 SENT = (
     (_messages.SetPositionMessage, ("/robot/1", (0.1, -0.2, 0.3))),
@@ -17,7 +17,7 @@ SENT = (
 
 @pytest.mark.parametrize(("kind", "fields"), SENT)
 def test_a_plain_message_is_visers_own(kind: type[Any], fields: tuple[object, ...]) -> None:
-    ours, own = fast_message(kind)(*fields), kind(*fields)
+    ours, own = fast(kind)(*fields), kind(*fields)
     assert isinstance(ours, kind) and type(ours).as_serializable_dict is not kind.as_serializable_dict
     assert ours.as_serializable_dict([]) == own.as_serializable_dict([])
     assert ours.redundancy_key() == own.redundancy_key()

@@ -104,14 +104,19 @@ decades = st.floats(-15, -12.001) | st.floats(-7.999, -2) | st.none()
 @given(seeds, st.integers(2, 8), st.integers(1, 6), decades)
 @settings(max_examples=120)
 def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade: float | None) -> None:
-    """A level that repeats another, exactly or nearly, keeps both routes equal away from the tolerance."""
+    """A level that repeats another, exactly or nearly, keeps both routes equal away from the tolerance.
+
+    A direction of relative size s is known to rounding over s only, and so is what lower levels may use: with
+    s = 1.3e-8 the explicit route was 2.8e-6 N·m and the compiled one 8e-8 N·m from the optimum by 300 bits.
+    """
     size = 0.0 if decade is None else 10**decade
     assert size < 0.01 * RANK_TOLERANCE or size > 100 * RANK_TOLERANCE
     hierarchy = singular_hierarchy(seed, n, N, size)
     compiled, explicit = hierarchy.solve("compiled"), hierarchy.solve("explicit")
     assert_sound(hierarchy, compiled)
     assert all(solution.fallback == "solve" for solution in explicit)
-    assert largest_difference(compiled, explicit) <= 1e-6
+    rounding = 1e3 * np.finfo(float).eps / size if size > RANK_TOLERANCE else 0.0
+    assert largest_difference(compiled, explicit) <= max(1e-6, rounding)
 
 
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-12, -8))
