@@ -2,7 +2,7 @@
 
 Each row quotes a sentence, names a run that shows the effect, what takes the cause away, and what is measured
 with it and without. The rows of the course are in `interventions_course`, those of the documents in
-`interventions_documents`.
+`interventions_documents`, those of sentences that a reader had refuted in `interventions_reader`.
 """
 
 from __future__ import annotations

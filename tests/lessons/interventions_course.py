@@ -42,7 +42,7 @@ COURSE_ROWS = (
     ),
     # ---------------------------------------- one-task
     Intervention(
-        "one-task/0", "because by then the torques had learned to push back",
+        "one-task/0", "because by then the torques had changed so as to push back",
         of("error/position", "mm", "mean", 0.35, 0.4, column=0), (-2, -0.3), ("controller=osf", *EXACT),
         (5, 90),
     ),
@@ -50,8 +50,8 @@ COURSE_ROWS = (
         "one-task/2", "with $\\bar M^{-1} = 30$ here", HAND, (3.6, 4.2), ("R_on=acceleration",), (10, 40),
     ),
     Intervention(
-        "one-task/3", "0.2 s later it does 70°/s the other way",
-        of("v", "deg/s", "mean", 0.45, 0.5, column=1), (65, 75), ("limits.velocity=false",), (-500, -200),
+        "one-task/3", "0.2 s later it does 80°/s the other way",
+        of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("limits.velocity=false",), (-500, -200),
         seconds=0.6,
     ),
     Intervention(
@@ -103,11 +103,11 @@ COURSE_ROWS = (
         HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
     ),
     Intervention(
-        "two-tasks/2", "Without level 2 it errs by 0.2 mm", HAND, (0.5, 1.2), ("levels.q1.enabled=false",),
-        (0.15, 0.25),
+        "two-tasks/2", "Without level 2 the hand errs by 0.2 mm", HAND, (0.5, 1.2),
+        ("levels.q1.enabled=false",), (0.15, 0.25),
     ),
     Intervention(
-        "two-tasks/2", "what joint 1 does the estimation has to follow",
+        "two-tasks/2", "time-delay estimation has to correct what that motion changes",
         HAND, (0.7, 1.0), ("M_bar_scale=2",), (0.3, 0.6),
     ),
     Intervention(
@@ -137,7 +137,7 @@ COURSE_ROWS = (
         of("torque share", "%"), (1e5, INF), ("controller=osf_damped",), (0, 2000),
     ),
     Intervention(
-        "when-tasks-fight/1", "The trouble is not what the model says, it is the inverse.",
+        "when-tasks-fight/1", "Damped, the inverse comes through.",
         of("torque share", "%"), (1e5, INF), ("controller=tdeosf_damped",), (0, 2000),
     ),
     Intervention(
@@ -264,7 +264,8 @@ COURSE_ROWS = (
         of=("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"),
     ),
     Intervention(
-        "stopping-takes-distance/0", "With three times the torque 0.2° is left",
+        "stopping-takes-distance/0",
+        "With three times the torque, in the bounds and in the motors, 0.2° is left",
         JOINT_2, (150.55, 150.75), ("limits.torque_scale=3", "plant.saturate=false"), (150.15, 150.25),
     ),
     Intervention(
@@ -288,7 +289,7 @@ COURSE_ROWS = (
         of("error/position", "mm", "rms"), (0.75, 1.0), ("M_bar_scale=2",), (0.3, 0.55),
     ),
     Intervention(
-        "how-far-ahead/1", "Now the first step alone cannot do it all",
+        "how-far-ahead/1", "so no step removes all of $e$",
         of("error/position", "mm", "rms"), (0.75, 1.1), ("R_on=acceleration",), (1.2, 9),
         of=("R_on=torque", "horizon=1"),
     ),
@@ -297,7 +298,7 @@ COURSE_ROWS = (
         "deadlines/0", "every single torque is one tick late", HAND, (3, 4), ("deadline_ms=0",), (1.2, 1.7),
     ),
     Intervention(
-        "deadlines/0", "it is a loop of half the rate",
+        "deadlines/0", "each sequence is a control loop of half the rate",
         HAND, (3, 4), ("T_s=0.002", "deadline_ms=2"), (3, 4), stays=True,
     ),
     Intervention(
@@ -351,7 +352,7 @@ COURSE_ROWS = (
         stays=True,
     ),
     Intervention(
-        "the-model-is-wrong/2", "a larger $\\bar M$ takes it back",
+        "the-model-is-wrong/2", "A larger $\\bar M$ makes the whole error as small as before",
         HAND, (0.047, 0.06), ("M_bar_scale=1.3",), (0.03, 0.044),
     ),
     Intervention(
@@ -407,12 +408,11 @@ COURSE_ROWS = (
     ),
     Intervention(
         "how-strict-is-strict/1",
-        "a tenth of a second later the next plan starts afresh, with level 1 solved again first, and takes "
-        "back what the one before had allowed itself further on",
+        "the errors that the old plan allowed at its later knots never happen",
         EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
     ),
     Intervention(
-        "how-strict-is-strict/2", "its gradient says nothing about which way is harmful",
+        "how-strict-is-strict/2", "its gradient says little about which way is harmful",
         of("step/base", "", "mean"), (0.015, 0.03), ("formulation=paper",), (0.045, 0.2),
     ),
     Intervention(
@@ -449,7 +449,7 @@ COURSE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[0.5,2]",), (0, 0.01),
     ),
     Intervention(
-        "seeing-ahead/2", "it is as quick as the limits let it be",
+        "seeing-ahead/2", "nearly as quick as the limits let it be",
         BASE_10, (0, 0.06), ("limits.velocity_scale=0.5",), (0.4, 0.6), of=("controller=htmpc_wpt",),
     ),
     Intervention(
@@ -469,7 +469,7 @@ COURSE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.15, 0.17), ("rho=1e-5",), (0.13, 0.14), on="seeing-ahead/2",
     ),
     Intervention(
-        "seeing-ahead/3", "the faster the base, the further the hand drifts",
+        "seeing-ahead/3", "the faster base and arm move, the further the hand drifts",
         EE, (15, 25), ("gains=[2,0.3]",), (0, 6),
     ),
     Intervention(

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from interventions_course import COURSE_ROWS
 from interventions_documents import DOCUMENT_ROWS
+from interventions_reader import READER_ROWS
 
 from lessons.course import COURSE, load_lesson
 from lessons.parallel import one_by_one
@@ -342,7 +343,7 @@ def course_runs() -> CourseRuns:
         for spec in specs(each):
             if spec is not None:
                 wanted.setdefault(spec, {})[each.measure.alone] = None
-    for row in (*COURSE_ROWS, *DOCUMENT_ROWS):
+    for row in (*COURSE_ROWS, *DOCUMENT_ROWS, *READER_ROWS):
         for spec in row.runs:
             wanted.setdefault(spec, {})[row.measure] = None
     values: dict[RunSpec, dict[Measure, float]] = {}
