@@ -144,12 +144,13 @@ SUM = Step(
     The looser rule makes the slower robot, since the line search cuts the step to a fortieth. At its
     best the hand's error is nearly zero, and there $\mathcal J_1$, a sum of squares, is nearly flat:
     its gradient says little about which way is harmful. The rows of (12) have the full Jacobian there.
-    Part of the reason is this: if level 1 pays for its effort its best leaves an error, the
-    gradient is larger, and so are the steps, about threefold. They stay far smaller than with (12), and
-    why we have not tested. The paper finds the same, (12) "permitting larger step
-    sizes", and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
-    (Under the formulation as printed, `formulation=paper`, the order hangs on a weight that the paper
-    does not print: with our $Q = 1$ the hand is worse off under (12), with $Q = 100$ better.)
+    That is part of the reason: if level 1 pays for its effort (`formulation=paper`), its best leaves an
+    error, so the gradient is larger, and the accepted steps are about three times as long. They are
+    still far shorter than with (12), and what makes the rest of the difference we have not tested. The
+    paper finds the same, (12) "permitting larger step sizes", and for the hand 3.07 and 3.42 mm at low
+    and high $\delta$ against 3.24 and 6.25 mm. (Under the formulation as printed, `formulation=paper`,
+    which of the two is better for the hand depends on a weight that the paper does not print: with our
+    $Q = 1$ the hand is worse off under (12), with $Q = 100$ better.)
     """,
     prediction=Choice(
         "(11) forbids less than (12). With it, the base's mean error over the 8 s is …",

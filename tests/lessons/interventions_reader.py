@@ -133,11 +133,12 @@ READER_ROWS = (
         EE, (0.4, 1.0), ("rate_hz=2.5",), (1.8, 2.0),
     ),
     Intervention(
-        "how-strict-is-strict/2", "the gradient is larger, and so are the steps, about threefold",
+        "how-strict-is-strict/2",
+        "so the gradient is larger, and the accepted steps are about three times as long",
         STEP, (0.02, 0.025), ("formulation=paper",), (0.06, 0.08),
     ),
     Intervention(
-        "how-strict-is-strict/2", "They stay far smaller than with (12)",
+        "how-strict-is-strict/2", "They are still far shorter than with (12)",
         STEP, (0.06, 0.08), ("lexicographic=per_coordinate", "formulation=proximal"), (0.3, 0.5),
         of=("formulation=paper",),
     ),
