@@ -59,8 +59,8 @@ FURTHER = Further(
             _late,
         ),
         Line(
-            r"This is a loop of half the rate. With $2 \bar M$ two ticks remove $2\mu$, and two ticks in "
-            r"time would have removed almost the same:",
+            r"This is a loop of half the rate. With $2 \bar M$ the share $1 - 2\mu$ of an error is left "
+            r"after two late ticks. With $\bar M$ two ticks in time leave $(1 - \mu)^2$, almost the same:",
             r"(1 - \mu)^2 - (1 - 2\mu) = \mu^2",
             _bought,
         ),

@@ -100,8 +100,8 @@ FURTHER = Further(
             "By the two first lines, how large can the factor $T_1/T_2$ be if nobody waits ($t_w = 0$)? "
             "Somebody reports more. What would you ask?",
             r"$(t_b + t_h)/\max(t_b, t_h)$ is at most 2, where both take equally long. The lines take $t_b$ "
-            r"and $t_h$ to be the same in both. So ask whether they were: a base that may pass by its place "
-            r"in one run and has to stop there in the other has two different $t_b$.",
+            r"and $t_h$ to be the same in both. So ask whether they were: a base that may pass far from its "
+            r"place in one run and has to go all the way to it in the other has two different $t_b$.",
         ),
         Question(
             "The base waits at the edge, $\\rho = 1.2$ m from the point below the hand, and the next "

@@ -1,4 +1,4 @@
-"""How far ahead: the stacked prediction, why it is deadbeat, and when a horizon is worth something."""
+"""How far ahead: the stacked prediction, why it is deadbeat, and what a horizon changes about the price."""
 
 from __future__ import annotations
 
@@ -114,9 +114,10 @@ FURTHER = Further(
             "at the first knot with $N = 1$, and which with $N = 20$? Why? And with $g = 18$, as for "
             "torques?",
             "⟨one⟩ % and ⟨twenty⟩ %. A change of acceleration stays in force at all later knots: with $N "
-            "= 20$ it is paid for once and helps twenty times, so more of it is worth its price. With $g "
-            "= 18$ there is ⟨tiny⟩ % left for either: where the price does not count, nothing is gained "
-            "by sharing it out.",
+            "= 20$ it is paid for once and helps twenty times, so more of it is worth its price. A "
+            "smaller $R$ has the same effect with $N = 1$. With $g "
+            "= 18$ there is ⟨tiny⟩ % left for either: where the price does not count, a longer horizon "
+            "does not lower it.",
             {
                 "one": (100 * first_left(1, 1, 1, 1), ".0f"),
                 "twenty": (100 * first_left(20, 1, 1, 1), ".0f"),

@@ -87,8 +87,8 @@ FURTHER = Further(
             {"left": (1.5 * math.exp(-0.3 * 8), ".2f")},
         ),
         Question(
-            "The base has a top speed of 1.1 m/s and brakes with 2.5 m/s². How long does it need to stop, "
-            "how far does it go, and how many knots of 0.1 s must a plan have to see that?",
+            "Along one axis the base has a top speed of 1.1 m/s and brakes with 2.5 m/s². How long does it "
+            "need to stop, how far does it go, and how many knots of 0.1 s must a plan have to see that?",
             "⟨t⟩ s and ⟨d⟩ m: ⟨N⟩ knots. A plan with $N = 2$ ends in the middle of the braking.",
             {
                 "t": (V / A, ".2f"),

@@ -22,6 +22,11 @@ def _inertia() -> float:
     return float(plant.mass_matrix()[0, 0])
 
 
+def _dry_friction() -> float:
+    """Of joint 1 of the planar arm, N·m."""
+    return float(np.broadcast_to(torque_scene("planar3-circle").settings.plant.friction, 3)[0])
+
+
 def _rows(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     n, N = 3, 5
     U, tau_0 = rng.normal(size=(N, n)), rng.normal(size=n)
@@ -97,14 +102,14 @@ FURTHER = Further(
             "which torque does it take for the inertia alone that the arm has about joint 1 where the "
             "circle begins?",
             r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With "
-            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m, before "
-            r"friction, the "
-            "circle and the other joints want anything. Three per cent of 4 N·m are ⟨three⟩.",
+            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m. The dry friction of joint 1 takes ⟨dry⟩ N·m, so most "
+            "of the ⟨three⟩ N·m, three per cent of 4 N·m, goes into friction and not into motion.",
             {
                 "half": (30 / 2, ".0f"),
                 "a": (PEAK, ".2f"),
                 "M": (_inertia(), ".2f"),
                 "tau": (_inertia() * PEAK, ".2f"),
+                "dry": (_dry_friction(), ".1f"),
                 "three": (0.03 * 4, ".2f"),
             },
         ),

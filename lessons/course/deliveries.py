@@ -42,11 +42,13 @@ OVERLAP = Step(
     """,
     do="Could the ghost keep up with a higher speed of the paths? What does its base do at each stop?",
     why=r"""
-    Less than two thirds of the time, and of the way. While the hand holds the ball out, the base sets
-    out for the next person as far as the arm allows: that alone would save 9 of the ghost's 31 seconds.
-    While the base drives, the hand already reaches: that alone would save 7. Both together save 11,
-    less than the two alone. The way is shorter because the base stays behind its hand: the ghost's only
-    task is the hand, so the base goes along with it up to every person and has to come back.
+    Less than two thirds of the time, and of the way. While the hand holds the ball out, the base
+    sets out for the next person as far as the arm allows: that alone would save 9 of the ghost's
+    31 seconds. While the base drives, the hand already reaches: that alone would save 7. (No setting
+    shows one half alone. We measured them with a second task that was taken away at times.) Both
+    together save 11, less than the sum: once the base has driven its way, no driving is left during
+    which the hand could reach. The way is shorter because the base stays behind its hand: the ghost's
+    only task is the hand, so the base goes along with it up to every person and has to come back.
     """,
     prediction=Choice(
         "The same places, the same speed of the paths. Two tasks at a time take …",
@@ -98,16 +100,17 @@ THERE = Step(
     of the place, at any speed. Now the base must come within 5 cm and to rest, and again the rule
     is the same for both robots. Which of the two loses more by it?
     """,
-    do="Set the distance to 25 cm and to 50 cm, without the rest. What becomes of the factor?",
+    do="Set the distance to 5, 25 and 50 cm, without the rest. What becomes of the factor?",
     why=r"""
-    The strict rule costs the ghost 11 seconds and the other one 14. Whoever may pass by its place
-    loses most where it has to stop there: its base now drives half as far again, the ghost's only a
-    tenth farther, because that one went up to the people anyhow. So the factor between two ways of
-    working hangs on the rule, 1.6 before and 1.2 now, and it says something only where the rule is
-    the same: two tasks at a time under the first rule are 2.1 times as fast as one at a time under
-    this one, and more than half of that is the rule. The paper measured a factor of 2.3 over four
-    rounds, against a robot whose base and arm take turns. When a base counts as there it does not
-    say.
+    The strict rule costs the ghost 11 seconds and the other one 14. The robot with two tasks could
+    pass 80 cm beside the place, and it loses more because it now has to go all the way to it: its base
+    drives half as far again. The ghost's base drives only a tenth farther, because it went up to the
+    people anyhow. Standing still there costs either of them less than 3 seconds. So the
+    factor between the two ways of working depends on the rule: it was 1.6 before and is 1.2 now. The
+    factor says something only where the rule is the same. Two tasks at a time under the first rule are
+    2.1 times as fast as one at a time under this one, but more than half of the time saved is due to
+    the rule. The paper measured a factor of 2.3 over four rounds, against a robot whose base and arm
+    take turns. It does not say when a base counts as there.
     """,
     prediction=Choice(
         "Both have to stop at every place. Two tasks at a time now take …",

@@ -144,8 +144,8 @@ BOUND = Step(
     the whole valley is outside for a while: then level 1 pays as well.
 
     A projection splits torques by priority; that a torque must also be *possible* is no part of it:
-    the triangle leaves the box, here by a third of the limit. A real motor would clip it joint by
-    joint, and what is clipped no longer lies on anybody's line.
+    the triangle leaves the box, here by a third of the limit. A real motor would clip its torque joint
+    by joint, and the clipped torques no longer lie on the orange line: they change what level 1 decided.
     """,
     prediction=Choice(
         "With all of the torque the wrist is never more than 1.1 mm off. With a quarter of it …",
@@ -201,11 +201,12 @@ SUM = Step(
     """,
     do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never gets there.",
     why=r"""
-    The diamond lies between the valley and the ring, where the two costs pull equally hard: the wrist
-    is left 5 cm short and the joints give 7 degrees, half of each. The disc 2 never leaves the line:
-    nothing leaks, up to rounding. It is the line of $\bar M$, though. With the true $M$ a leak remains,
-    the second meter: the arm is not made the way the controller thinks. Time-delay estimation notices
-    it at the next tick and corrects it over tens of ticks.
+    The diamond lies between the valley and the ring, where the slopes of the two costs cancel. In the
+    end the wrist is left 5 cm short of its 10 cm, and the joints give 7 degrees of the 14 that a strict
+    order costs them: half of each. The disc 2 never leaves the line, so nothing leaks, up to rounding.
+    It is the line of $\bar M$, though. With the true $M$ a leak remains, which the second meter shows:
+    $\bar M$ is not the arm's true inertia. Time-delay estimation notices it at the next tick and
+    corrects it over tens of ticks.
     """,
     prediction=Choice(
         "With the arm's true inertia instead of M̄, the leak of the same torques is …",

@@ -137,9 +137,9 @@ FURTHER = Step(
     """,
     do="Which of the two numbers changes its mind first on the way up from 1, norm or radius?",
     why=r"""
-    The error is less than a fifth, and nothing trembles. A norm below 1 is enough, it is not necessary: it
-    asks that *no* error grows even for a single step. In the long run the eigenvalues decide, and
-    the largest of them is 0.94.
+    The error is less than a fifth, and nothing trembles. A norm below 1 is sufficient, but it is not
+    necessary: it requires that *no* error grows, not even for a single step. In the long run the
+    eigenvalues decide, and the largest of them is 0.94.
     """,
     claims=(
         Claim(

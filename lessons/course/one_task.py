@@ -36,8 +36,9 @@ SPRING = Step(
     """,
     do="Push the arm yourself, wherever you like.",
     why=r"""
-    Twice it is thrown off: when the push begins, and, to the other side, when it ends, because by
-    then the torques had learned to push back. Half a second later it is home, and it has not swung:
+    The push throws the hand off twice. It does so when it begins. It does so again, to the other side,
+    when it ends, because by then the torques had changed so as to push back. Half a second later the
+    hand is back on its target, and it has not swung:
     with $K_V = 2\sqrt{K_P}$ the wish is critically damped. There is no spring in
     the arm. The controller looks for torques that make (4) true.
     """,
@@ -161,8 +162,8 @@ FREE = Step(
     why=r"""
     Nothing asks that direction to stop, so the elbow still moves when the hand has long been home.
     Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and the
-    torques change to hold it there. When the push ends nobody takes that change back, and it turns
-    joint 2 round: 0.2 s later it does 70°/s the other way. Without speed limits joint 2 goes on the
+    torques change to hold it there. When the push ends, the changed torques stay as they are, and they
+    turn joint 2 round: 0.2 s later it does 80°/s the other way. Without speed limits joint 2 goes on the
     way it was pushed, with more than 300°/s. A last level that wants $\ddot q + K_V \dot q = 0$
     brings it to rest; the hand hardly notices.
     """,

@@ -34,10 +34,10 @@ EARLY = Step(
     """,
     do="Let N grow from 1 to 20. When does the base set out?",
     why=r"""
-    More than half a metre of the way back is done when the clock strikes eight. Some error at the
-    end of Part 1 buys more at the beginning of Part 2: over the knots together that is the cheaper
-    plan. The mean error of Part 2 is about a quarter of the ghost's. The hand does not notice
-    either way: whatever level 2 foresees, (12) holds.
+    More than half a metre of the way back is done when the clock strikes eight. A base that leaves
+    early errs more at the end of Part 1 and less at the beginning of Part 2. Summed over all knots of
+    the plan, leaving early is cheaper. The mean error of Part 2 is about a quarter of the ghost's. The
+    hand does not notice either way: whatever level 2 foresees, (12) holds.
     """,
     prediction=Choice(
         "The jump comes at 8 s. How much of the way back is done before that?",
@@ -76,17 +76,19 @@ EARLY = Step(
 SHORT = Step(
     title="A fifth of a second",
     text=r"""
-    How far must one see? Now $N = 2$: the plan ends 0.2 s from now. The base still brakes with at
-    most 2.5 m/s², and its acceleration changes by at most 10 m/s³: from none to all of it takes
-    0.25 s. From its top speed of 1.1 m/s the base needs 0.44 s and more to stop.
+    How far must one see? Now $N = 2$: the plan ends 0.2 s from now. Along each of its two axes the
+    base still brakes with at most 2.5 m/s², and its acceleration changes by at most 10 m/s³: from none
+    to all of it takes 0.25 s. Along each axis its top speed is 1.1 m/s, from which it needs 0.44 s and
+    more to stop.
     """,
     do="From which N on is the hand within 1 mm? Count the seconds: what takes that long to stop?",
     why=r"""
-    The hand is first in the list and is off by 3 cm all the same. On its way home the base races at
-    its top speed, and that the hand needs it slower comes into sight when its acceleration can no
-    longer change in time. Without the bound on that change the same 0.2 s are enough for 6 mm, with
-    half the top speed for 4 mm; three times the acceleration hardly helps. A priority decides between
-    plans; it cannot choose a plan that nobody looked far enough to make.
+    The hand is first in the list and is off by 3 cm all the same. On its way home the base drives at
+    its top speed along both axes. The hand needs a slower base, but the plan shows that too late: by
+    then the acceleration of the base cannot change in time. Without the bound on that change the same
+    0.2 s are enough for 6 mm, with half the top speed for 4 mm; three times the acceleration hardly
+    helps. A priority decides between plans; it cannot choose a plan that nobody looked far enough to
+    make.
     """,
     prediction=Choice(
         "N = 2 instead of 10. The hand still ranks first. It is off by at most …",
@@ -132,10 +134,11 @@ NO_PLAN = Step(
     Both are surprised at 8 s, and still it is far behind, 16 cm from home at the end where the ghost
     has long arrived. A velocity in proportion to the error is slow at the end, and with 0.3 1/s it is
     slow for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of
-    2 1/s it arrives. A plan names no gain: it is as quick as the limits let it be, later with half the
-    speed or a third of the acceleration, where HTIDKC comes home as late as before.
-    The paper, which tuned both to do equally well in Part 1, counts 42 % less error in Part 2 for
-    HTMPC.
+    2 1/s it arrives. A plan has no gain; its weights take the place of one. With our $Q = 10$ it is
+    nearly as quick as the limits let it be: it comes home later with half the speed or a third of the
+    acceleration, where HTIDKC comes home as late as before. With $Q = 1$ and the same limits it is
+    still 22 cm away where it is home with $Q = 10$. The paper, which tuned both to do equally well in
+    Part 1, counts 42 % less error in Part 2 for HTMPC.
     """,
     prediction=Value(
         "Part 2, mean error of the base: that of HTIDKC is how many times the ghost's?",
@@ -178,11 +181,13 @@ GAINS = Step(
     do="Is there a pair of gains that is good to both, hand and base? Try [5, 2] and [20, 2].",
     why=r"""
     The base is quick now, and the hand pays with 2 cm although it ranks first. A velocity is held for
-    the 20 ms until the next one is asked for. Meanwhile base and arm move on, and what kept the hand in
-    place at the beginning no longer does: the faster the base, the further the hand drifts. Asked for a
-    hundred times a second it drifts half as far. What has drifted is brought back in proportion to $K$:
+    the 20 ms until the next one is asked for. Meanwhile base and arm move on, and velocities that kept
+    the hand in place at the beginning no longer do: the faster base and arm move, the further the hand
+    drifts. It drifts most at the edge of the arm's reach, where the arm's joints turn fastest although
+    the base has slowed down: with a peak that the arm can reach the hand is off by 6 mm. Asked for a
+    hundred times a second it drifts half as far. The hand's error is brought back in proportion to $K$:
     with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as before.
-    Limits are not to blame: without any the hand is off by more. A good pair exists, and has to be
+    Limits are not to blame: without any the hand is off by more. So a good pair exists, and has to be
     found. The paper says (given, not tried here) that HTIDKC would need its parameters scheduled, where
     one set of weights serves HTMPC in both parts.
     """,
@@ -211,7 +216,7 @@ GAINS = Step(
             "at least",
             10.0,
             fails_with=("gains=[0.5,0.3]",),
-            because="in 20 ms a slow base takes the hand less far",
+            because="in 20 ms a slow base and arm take the hand less far",
         ),
     ),
     set=("controller=htidkc", "gains=[2,2]"),

@@ -43,12 +43,12 @@ PRINTED = Step(
     """,
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
-    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². The motor can do less than
-    60, and the rows on speed let it change by even less, 41. More than twenty of the problems have no
-    solution, the torque hits its limit, and the joint overruns its range by 0.6°. With three times the
-    torque 0.2° is left; with the rows on speed off as well only 0.1° is left. (Whether what is applied
-    where there is none has a part in it was not tried.) The row is true to the letter and comes too
-    late.
+    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². With all its torque the
+    motor gets 35 to 38 rad/s². So the problem has no solution, a fallback takes over, the torque hits
+    its limit and the joint overruns its range by 0.6°. The rows on speed hold the joint back for the
+    first three ticks only: without them it still overruns by 0.57°. With three times the torque, in the
+    bounds and in the motors, 0.2° is left. Then the rows on speed matter: with the rows on speed off as
+    well only 0.1° is left. The row on the position is correct, but it comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -130,10 +130,10 @@ VIABLE = Step(
 
     From that speed, after a time $t$ in which nothing happens, $a = 20$ rad/s² stops the joint at
     $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model
-    $t = T_s$ and $q_s = q_{\max}$ would do. Ours is estimated and brakes tens of steps late, and a
-    speed may close in on its bound at 15 1/s of the distance only. So $t = T_s + 5/15$ s $= 0.33$ s,
-    and $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back at 5 1/s times the
-    excess. Again $N = 5$.
+    $t = T_s$ and $q_s = q_{\max}$ would do. Our model is estimated, so the joint brakes tens of steps
+    late. Besides, the rows on speed allow a change of speed of at most 15 1/s times the distance
+    between the speed and its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the
+    limit; beyond $q_s$ the joint must come back at 5 1/s times the excess. Again $N = 5$.
     """,
     do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""

@@ -31,8 +31,9 @@ INVERSE = Step(
     Sideways almost no torque would be enough. But a circle also bends: in the first instant this one
     asks for 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that
     many million times. Started gently, the circle asks for nothing along the arm at first, and for a
-    tenth of a second the demand is small. A damped inverse, `osf_damped`, asks for a fifth of the
-    limit. Motors clip the nonsense.
+    tenth of a second the demand is small. Then, at 0.13 s, it passes ten times the limit all the same,
+    for a tick or two. A damped inverse, `osf_damped`, asks for a fifth of the limit. Motors cannot
+    follow such demands: they clip them.
     """,
     prediction=Choice(
         "The hand should only move sideways. How much torque does OSF ask for, at most?",
@@ -118,7 +119,8 @@ BLAME = Step(
     do="Look at 8 s: straight again, and the circles change there.",
     why=r"""
     Nearly all of it was the jump: an arm cannot change its velocity in no time. In a singular pose
-    HIMPC follows what can be followed. An experiment that shows two causes at once shows neither.
+    HIMPC follows what can be followed. Where an experiment has two possible causes at once, it does not
+    show which one acts; so take one of them away.
     """,
     prediction=Choice(
         "Same singular pose, gentle start. The largest error becomes …",

@@ -18,6 +18,7 @@ HAND = Signal("error/position", "mm")
 Q1 = Signal("error/q1", "deg")
 TORQUE = Signal("torque share", "%")
 SCALE = Control("limits.torque_scale", "Torque limit, factor", 0.01, 1.0, log=True)
+FRICTION = Control("plant.friction", "Friction of the joints, N·m", 0.0, 0.3)
 SWING = "q1_amplitude_deg=-30"
 
 ENOUGH = Step(
@@ -32,8 +33,9 @@ ENOUGH = Step(
     """,
     do="Lower the limit until something changes. What is it that changes first?",
     why=r"""
-    A slow motion needs little: nine tenths of the 0.24 N·m. A bound that is not met does nothing:
-    with all the torque the errors are the same.
+    The run needs nine tenths of the 0.24 N·m, and most of that is friction: without any friction the
+    same motion needs a third of the 0.24 N·m. A bound that is not met does nothing: with all the torque
+    the errors are the same.
     """,
     prediction=Value(
         "Which share of the reduced limit does the motion need at most?",
@@ -49,7 +51,7 @@ ENOUGH = Step(
             "at most",
             0.5,
             fails_with=("limits.torque_scale=0.03",),
-            because="that is too little for level 1 alone",
+            because="that is too little for level 1 alone, with the dry friction of the joints",
         ),
         Claim(
             "Joint 1 stays within 0.1°.",
@@ -57,7 +59,7 @@ ENOUGH = Step(
             "at most",
             0.1,
             fails_with=("limits.torque_scale=0.04",),
-            because="there is not enough for both, and the hand chooses first",
+            because="there is not enough for both beside the friction, and the hand chooses first",
         ),
     ),
     set=(SWING, "limits.torque_scale=0.06"),
@@ -69,17 +71,18 @@ ENOUGH = Step(
 SHORT = Step(
     title="A third less",
     text=r"""
-    Four per cent of the torque are left, 0.16 N·m. It is not enough for both wishes any more. Every
-    level is solved under the same bounds, level 1 first; level 2 chooses among what leaves level 1
-    as it is (34).
+    Four per cent of the torque are left, 0.16 N·m. That is not enough any more for both wishes and the
+    dry friction of the joints, 0.05 to 0.1 N·m each. Every level is solved under the same bounds, level
+    1 first; level 2 chooses among what leaves level 1 as it is (34).
     """,
-    do="Open the list of active bounds: which level feels the torque limit?",
+    do="Open the list of active bounds: which level feels the torque limit? Then take the friction away.",
     why=r"""
     Level 2 goes without: joint 1 falls behind by half a degree while the hand does not notice. That is
     the order's doing. With joint 1 first it is the hand that goes without, by 1.6 mm, and joint 1 does
     not notice. An order helps where both need what is scarce. If joint 1 swings to the other side, by
     60°, its own motor is the one that is short, the hand can do without it, and the order makes no
-    difference.
+    difference. The torque is scarce because of the dry friction: without it both wishes together need
+    77 % of what there is, and joint 1 does not fall behind.
     """,
     prediction=Choice(
         "Both tasks together need more torque than there is. The hand's largest error …",
@@ -122,6 +125,7 @@ SHORT = Step(
         SCALE,
         Control("order", "Order", choices=("position,q1", "q1,position")),
         Control("q1_amplitude_deg", "Swing of joint 1, °", -30.0, 60.0),
+        FRICTION,
         Control("controller", "Controller", choices=("himpc", "tdeosf")),
     ),
     plots=(TORQUE, HAND, Q1),
@@ -130,16 +134,19 @@ SHORT = Step(
 LESS = Step(
     title="Not even enough for one",
     text=r"""
-    Three per cent, 0.12 N·m. Now the circle by itself is too much. Joint 1 swings to the other side,
-    by 60°. The ghost has the task of joint 1 switched off.
+    Three per cent, 0.12 N·m. Now even the circle by itself is too much for the motors, together with
+    the dry friction. Joint 1 swings to the other side, by 60°. The ghost has the task of joint 1
+    switched off.
     """,
-    do="Find the least torque with which the hand is still served.",
+    do="Find the least torque with which the hand is still served. How much is enough without friction?",
     why=r"""
-    The hand leaves its circle: bounds rank above level 1. But it leaves it no further than without any
-    level 2. This time that is not the order's doing, for with joint 1 first it is the same: whoever
-    asks, joint 1's motor is at its limit. Nor can an order promise it. It holds in every single tick,
-    and with a swing of −30° the hand gets further off than the ghost, 16 mm instead of 10, since
-    level 2 has moved joint 1 meanwhile.
+    The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself
+    would need 0.07 N·m, and the hand would stay on it. But the hand leaves its circle no further than
+    without any level 2. This time that is not the order's doing, for with joint 1 first it is the same:
+    whichever task comes first, joint 1's motor is at its limit. Nor can an order promise that the hand
+    stays as near as without a level 2. An order is kept in every single tick, not over the run: with a
+    swing of −30° the hand gets further off than the ghost, 16 mm instead of 10, since level 2 has moved
+    joint 1 meanwhile.
     """,
     prediction=Choice(
         "Compared with the ghost, which has no second task: how much larger is the hand's error?",
@@ -176,6 +183,7 @@ LESS = Step(
         SCALE,
         Control("levels.q1.enabled", "Joint 1's task on", choices=(False, True)),
         Control("q1_amplitude_deg", "Swing of joint 1, °", -30.0, 60.0),
+        FRICTION,
     ),
     plots=(TORQUE, HAND, Q1),
 )

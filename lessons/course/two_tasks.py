@@ -132,8 +132,8 @@ STRICT = Step(
     do="Set Q of level 2 to 1000. Does the hand notice? And with the weighted controller?",
     why=r"""
     Joint 1 pays: it goes no further than the circle lets it. The hand keeps its circle to a
-    millimetre, and no weight of level 2 can change that. Without level 2 it errs by 0.2 mm: what joint 1
-    does the estimation has to follow.
+    millimetre, and no weight of level 2 can change that. Without level 2 the hand errs by 0.2 mm only.
+    With it joint 1 moves more, and time-delay estimation has to correct what that motion changes.
     """,
     prediction=Choice(
         "With strict priorities: who pays for the conflict?",

@@ -2,7 +2,8 @@
 
 Each row quotes a sentence, names a run that shows the effect, what takes the cause away, and what is measured
 with it and without. `interventions_all` has all of them: the course's are in `interventions_tasks`,
-`interventions_limits` and `interventions_mobile`, the documents' in `interventions_documents`.
+`interventions_limits` and `interventions_mobile`, the documents' in `interventions_documents`,
+those of sentences that a reader had refuted in `interventions_reader`.
 """
 
 from __future__ import annotations

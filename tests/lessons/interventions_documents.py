@@ -26,7 +26,7 @@ LIGHT = ("plant.mass_scale=[1,1,1,1,0.3,0.3,0.3]", "plant.inertia_scale=[1,1,1,1
 DOCUMENT_ROWS = (
     # ---------------------------------------- glossary
     Intervention(
-        "glossary", "what the true inertia makes of it is the leak",
+        "glossary", "With the true inertia it changes that a little, and this change is the leak.",
         of("dynamic_leak", "m/s²"), (1e-3, 1e3), ("controller=osf", "nominal.armature=[0.05,0.05,0.03]"),
         (0, 1e-4),
         on="inside-the-qp/3",
@@ -52,7 +52,7 @@ DOCUMENT_ROWS = (
         of("v", "deg/s", "largest", 2.0, column=2), (80, 100), ("limits.velocity=false",), (130, 250),
     ),
     RT2(
-        "disagreements", "Friction makes no difference.",
+        "disagreements", "Our friction is not the cause: without it level 1 errs as much.",
         HAND_RMS, (0.25, 0.5), ("plant.friction=0", "plant.damping=0"), (0.25, 0.5), stays=True,
     ),
     RT2(
@@ -79,7 +79,7 @@ DOCUMENT_ROWS = (
         of=("plant.friction=0.4",),
     ),
     RT1(
-        "disagreements", "with none ours are less than a third of what they are",
+        "disagreements", "Without dry friction our errors are less than a third of what they are with ours",
         HAND_RMS, (0.02, 0.045), ("plant.friction=0",), (0.003, 0.0125), seconds=4.0,
     ),
     RT1(
@@ -92,7 +92,8 @@ DOCUMENT_ROWS = (
     ),
     # ---------------------------------------- a disturbed inertia
     RT4(
-        "disagreements", "with M̄ altered by the same factors most of what changed in orientation goes",
+        "disagreements",
+        "If M̄ is altered by the same factors as diag M(q), most of the change in orientation goes",
         O_Z, (1.0, 1.2), ("M_bar=[0.08,0.168,0.0396,0.0504,0.0008,0.0012,0.00036]",), (1.35, 1.55),
         of=(DIAGONAL,), seconds=1.0,
     ),

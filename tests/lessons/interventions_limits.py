@@ -56,7 +56,8 @@ LIMIT_ROWS = (
         of=("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"),
     ),
     Intervention(
-        "stopping-takes-distance/0", "With three times the torque 0.2° is left",
+        "stopping-takes-distance/0",
+        "With three times the torque, in the bounds and in the motors, 0.2° is left",
         JOINT_2, (150.55, 150.75), ("limits.torque_scale=3", "plant.saturate=false"), (150.15, 150.25),
     ),
     Intervention(
@@ -84,7 +85,7 @@ LIMIT_ROWS = (
         of("error/position", "mm", "rms"), (0.75, 1.0), ("M_bar_scale=2",), (0.3, 0.55),
     ),
     Intervention(
-        "how-far-ahead/1", "Now the first step alone cannot do it all",
+        "how-far-ahead/1", "so no step removes all of $e$",
         of("error/position", "mm", "rms"), (0.75, 1.1), ("R_on=acceleration",), (1.2, 9),
         of=("R_on=torque", "horizon=1"),
     ),
@@ -93,7 +94,7 @@ LIMIT_ROWS = (
         "deadlines/0", "every single torque is one tick late", HAND, (3, 4), ("deadline_ms=0",), (1.2, 1.7),
     ),
     Intervention(
-        "deadlines/0", "it is a loop of half the rate",
+        "deadlines/0", "each sequence is a control loop of half the rate",
         HAND, (3, 4), ("T_s=0.002", "deadline_ms=2"), (3, 4), stays=True,
     ),
     Intervention(
@@ -147,7 +148,7 @@ LIMIT_ROWS = (
         seconds=0.75, stays=True,
     ),
     Intervention(
-        "the-model-is-wrong/2", "a larger $\\bar M$ takes it back",
+        "the-model-is-wrong/2", "A larger $\\bar M$ makes the whole error as small as before",
         HAND, (0.047, 0.06), ("M_bar_scale=1.3",), (0.03, 0.044),
     ),
     Intervention(

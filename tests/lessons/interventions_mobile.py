@@ -32,12 +32,11 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "how-strict-is-strict/1",
-        "a tenth of a second later the next plan starts afresh, with level 1 solved again first, and takes "
-        "back what the one before had allowed itself further on",
+        "the errors that the old plan allowed at its later knots never happen",
         EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
     ),
     Intervention(
-        "how-strict-is-strict/2", "its gradient says nothing about which way is harmful",
+        "how-strict-is-strict/2", "its gradient says little about which way is harmful",
         of("step/base", "", "mean"), (0.015, 0.03), ("formulation=paper",), (0.045, 0.2),
     ),
     Intervention(
@@ -74,7 +73,7 @@ MOBILE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[2,2]",), (0, 0.01),
     ),
     Intervention(
-        "seeing-ahead/2", "it is as quick as the limits let it be",
+        "seeing-ahead/2", "nearly as quick as the limits let it be",
         BASE_10, (0, 0.06), ("limits.velocity_scale=0.5",), (0.4, 0.6), of=("controller=htmpc_wpt",),
     ),
     Intervention(
@@ -94,7 +93,7 @@ MOBILE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.15, 0.17), ("rho=1e-5",), (0.13, 0.14), on="seeing-ahead/2",
     ),
     Intervention(
-        "seeing-ahead/3", "the faster the base, the further the hand drifts",
+        "seeing-ahead/3", "the faster base and arm move, the further the hand drifts",
         EE, (15, 25), ("gains=[2,0.3]",), (0, 6), seconds=4.0,
     ),
     Intervention(

@@ -41,7 +41,7 @@ TASK_ROWS = (
     ),
     # ---------------------------------------- one-task
     Intervention(
-        "one-task/0", "because by then the torques had learned to push back",
+        "one-task/0", "because by then the torques had changed so as to push back",
         of("error/position", "mm", "mean", 0.35, 0.4, column=0), (-2, -0.3), ("controller=osf", *EXACT),
         (5, 90), seconds=0.45,
     ),
@@ -49,8 +49,8 @@ TASK_ROWS = (
         "one-task/2", "with $\\bar M^{-1} = 30$ here", HAND, (3.6, 4.2), ("R_on=acceleration",), (10, 40),
     ),
     Intervention(
-        "one-task/3", "0.2 s later it does 70°/s the other way",
-        of("v", "deg/s", "mean", 0.45, 0.5, column=1), (65, 75), ("limits.velocity=false",), (-500, -200),
+        "one-task/3", "0.2 s later it does 80°/s the other way",
+        of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("limits.velocity=false",), (-500, -200),
         seconds=0.6,
     ),
     Intervention(
@@ -102,11 +102,11 @@ TASK_ROWS = (
         HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
     ),
     Intervention(
-        "two-tasks/2", "Without level 2 it errs by 0.2 mm", HAND, (0.5, 1.2), ("levels.q1.enabled=false",),
-        (0.15, 0.25),
+        "two-tasks/2", "Without level 2 the hand errs by 0.2 mm", HAND, (0.5, 1.2),
+        ("levels.q1.enabled=false",), (0.15, 0.25),
     ),
     Intervention(
-        "two-tasks/2", "what joint 1 does the estimation has to follow",
+        "two-tasks/2", "time-delay estimation has to correct what that motion changes",
         HAND, (0.7, 1.0), ("M_bar_scale=2",), (0.3, 0.6),
     ),
     Intervention(
@@ -136,7 +136,7 @@ TASK_ROWS = (
         of("torque share", "%"), (1e5, INF), ("controller=osf_damped",), (0, 2000),
     ),
     Intervention(
-        "when-tasks-fight/1", "The trouble is not what the model says, it is the inverse.",
+        "when-tasks-fight/1", "Damped, the inverse comes through.",
         of("torque share", "%"), (1e5, INF), ("controller=tdeosf_damped",), (0, 2000),
     ),
     Intervention(

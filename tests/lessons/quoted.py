@@ -66,7 +66,11 @@ def _ratio(signal: Signal, statistic: Statistic = "largest", after: float = 0.0)
 QUOTED = (
     Quoted("a-redundant-arm/1", "turns by almost 30°", _of(Signal("q", "deg", column=2), "range"), 28, 30),
     Quoted(
-        "one-task/0", "Half a second later it is home, and it has not swung", _of(HAND, after=0.8), 0.0, 0.5
+        "one-task/0",
+        "Half a second later the hand is back on its target, and it has not swung",
+        _of(HAND, after=0.8),
+        0.0,
+        0.5,
     ),
     Quoted("one-task/2", "Almost nothing happens", _ratio(HAND), 0.98, 1.05),
     Quoted("no-model-needed/0", "dips by a few millimetres", _of(HAND), 1.5, 5.0),

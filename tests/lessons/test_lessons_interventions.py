@@ -106,9 +106,9 @@ def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
     assert "by twice the bound's multiplier, per N·m" in told("inside-the-qp/2")
 
 
-def test_what_is_clipped_lies_on_nobodys_line() -> None:
+def test_clipped_torques_do_not_lie_on_the_line() -> None:
     """*Inside the QP*: OSF's torque, clipped joint by joint, accelerates level 1 otherwise."""
-    assert "what is clipped no longer lies on anybody's line" in told("inside-the-qp/2")
+    assert "the clipped torques no longer lie on the orange line" in told("inside-the-qp/2")
     scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).but("controller=osf").prepared()
     found = run(scene)
     tau, limit = found["tau_demand"], 0.25 * np.array(scene.robot.tau_limit)

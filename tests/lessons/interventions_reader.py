@@ -1,0 +1,191 @@
+"""Sentences that stand where an independent reader had refuted another one by an experiment."""
+
+from __future__ import annotations
+
+from interventions import Intervention, of
+
+HAND, HAND_RMS = of("error/position", "mm"), of("error/position", "mm", "rms")
+X = of("error/position", "mm", "rms", column=0)
+ROUGH = of("delta_tau", "N·m", "rms")
+JOINT_2 = of("q", "deg", column=1)
+TORQUE = of("torque share", "%")
+SWING = of("v", "deg/s", "largest", 2.0, column=2)
+EE = of("error/ee", "mm")
+WORK = of("time at work", "s")
+NO_FRICTION = ("plant.friction=0", "plant.damping=0")
+OLD_LINKS = ("plant.mass_scale=1", "plant.inertia_scale=1")
+LONG = ("horizon=5", "horizon=30")
+PASSES = ("base_tolerance=0.8", "base_at_rest=false")
+MOVES = (*PASSES, "base_tolerance=0.05")
+STEP = of("step/base", "", "mean")
+INF = float("inf")
+
+# fmt: off
+READER_ROWS = (
+    # ---------------------------------------- one-task
+    Intervention(
+        "one-task/3", "the changed torques stay as they are, and they turn joint 2 round",
+        of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("damping=true",), (-10, 10),
+        seconds=0.6,
+    ),
+    # ---------------------------------------- when-tasks-fight
+    Intervention(
+        "when-tasks-fight/1", "The inverse asks for more than the arm can do and knows no bound",
+        of("speed share", "%"), (2000, INF), ("controller=tdeosf_damped",), (0, 500),
+    ),
+    Intervention(
+        "when-tasks-fight/1", "A controller without any inverse is lost as well if nothing bounds it",
+        of("v", "deg/s"), (2000, INF),
+        ("limits.torque_scale=1", "plant.saturate=true", "limits.velocity=true", "limits.position=viability"),
+        (50, 150),
+        of=("controller=himpc", "limits.torque_scale=1000", "plant.saturate=false", "limits.velocity=false",
+            "limits.position=off"),
+    ),
+    Intervention(
+        "when-tasks-fight/2",
+        "in a weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s",
+        SWING, (72, 73.4), ("q1_amplitude_deg=20",), (0, 50), of=("controller=weighted", "levels.q1.Q=0.01"),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "the strict one slows down to 58°/s", SWING, (93, 95), ("levels.q1.R=1e5",),
+        (57, 58.4),
+    ),
+    # ---------------------------------------- stretched-out
+    Intervention(
+        "stretched-out/0", "Then, at 0.13 s, it passes ten times the limit all the same",
+        of("torque share", "%", "largest", 0.12, 0.14), (1e3, INF), ("controller=osf_damped",), (0, 5),
+        of=("smooth=true",),
+    ),
+    # ---------------------------------------- torque-has-a-limit
+    Intervention(
+        "torque-has-a-limit/0", "without any friction the same motion needs a third of the 0.24 N·m",
+        TORQUE, (85, 92), NO_FRICTION, (32, 36),
+    ),
+    Intervention(
+        "torque-has-a-limit/0", "that is too little for level 1 alone, with the dry friction of the joints",
+        HAND, (0.5, 30), ("plant.friction=0",), (0, 0.1), of=("limits.torque_scale=0.03",),
+    ),
+    Intervention(
+        "torque-has-a-limit/1", "The torque is scarce because of the dry friction",
+        of("error/q1", "deg"), (0.45, 0.65), ("plant.friction=0",), (0, 0.05),
+    ),
+    Intervention(
+        "torque-has-a-limit/1", "without it both wishes together need 77 % of what there is",
+        TORQUE, (99, 101), ("plant.friction=0",), (76, 77.4),
+    ),
+    Intervention(
+        "torque-has-a-limit/2", "Without dry friction the circle by itself would need 0.07 N·m",
+        TORQUE, (99, 101), ("plant.friction=0",), (55, 62),  # of 0.12 N·m
+        of=("levels.q1.enabled=false",),
+    ),
+    Intervention(
+        "torque-has-a-limit/2", "and the hand would stay on it", HAND, (8, 12), ("plant.friction=0",),
+        (0, 0.1),
+    ),
+    # ---------------------------------------- stopping-takes-distance
+    Intervention(
+        "stopping-takes-distance/0", "without them it still overruns by 0.57°",
+        JOINT_2, (150.6, 150.7), ("limits.velocity=false",), (150.565, 150.58),
+    ),
+    # ---------------------------------------- how-far-ahead
+    Intervention(
+        "how-far-ahead/0", "$N = 1$ errs less in x than $N = 30$ even over the 4 s",
+        X, (0.528, 0.538), ("horizon=1",), (0.47, 0.476), of=LONG, on="iiwa14-circle-paper", seconds=4.0,
+    ),
+    Intervention(
+        "how-far-ahead/0", "1600 of its QPs have no solution",
+        of("unsolved", "", "sum"), (0, 50), ("horizon=1",), (1550, 1700), of=LONG, on="iiwa14-circle-paper",
+        seconds=4.0,
+    ),
+    Intervention(
+        "how-far-ahead/1", "it is paid for once and counted twenty times, so $R$ weighs less",
+        HAND_RMS, (1.35, 1.6), ("horizon=1",), (2.4, 3.0),
+    ),
+    Intervention(
+        "how-far-ahead/1", "At $R = 0.1$ the two horizons err alike",
+        HAND_RMS, (0.93, 1.07), ("horizon=1",), (0.93, 1.07), of=("R=0.1",), stays=True,
+    ),
+    Intervention(
+        "how-far-ahead/1", "one step ahead errs less than twenty steps with $R = 10$",
+        HAND_RMS, (1.35, 1.6), ("horizon=1", "R=0.1"), (0.93, 1.07),
+    ),
+    Intervention(
+        "how-far-ahead/1", "and its torque is as smooth",
+        ROUGH, (0.064, 0.071), ("horizon=1", "R=0.1"), (0.064, 0.071), stays=True,
+    ),
+    # ---------------------------------------- the-model-is-wrong
+    Intervention(
+        "the-model-is-wrong/2", "The part of the error that comes of inertia grows by half, as the mass does",
+        HAND, (0.0158, 0.0172), OLD_LINKS, (0.0105, 0.0114), of=NO_FRICTION,
+    ),
+    Intervention(
+        "the-model-is-wrong/2",
+        "three quarters of the error are friction's, which does not grow with the mass",
+        HAND, (0.041, 0.047), NO_FRICTION, (0.0105, 0.0114), of=OLD_LINKS,
+    ),
+    # ---------------------------------------- how-strict-is-strict
+    Intervention(
+        "how-strict-is-strict/1", "with a new plan only every 0.2 s the hand is off by 2.2 mm",
+        EE, (0.4, 1.0), ("rate_hz=5",), (2.15, 2.3),
+    ),
+    Intervention(
+        "how-strict-is-strict/1", "with a new plan only every 0.4 s it is off by 1.9 mm, still a fifth of",
+        EE, (0.4, 1.0), ("rate_hz=2.5",), (1.8, 2.0),
+    ),
+    Intervention(
+        "how-strict-is-strict/2",
+        "so the gradient is larger, and the accepted steps are about three times as long",
+        STEP, (0.02, 0.025), ("formulation=paper",), (0.06, 0.08),
+    ),
+    Intervention(
+        "how-strict-is-strict/2", "They are still far shorter than with (12)",
+        STEP, (0.06, 0.08), ("lexicographic=per_coordinate", "formulation=proximal"), (0.3, 0.5),
+        of=("formulation=paper",),
+    ),
+    # ---------------------------------------- seeing-ahead
+    Intervention(
+        "seeing-ahead/1", "On its way home the base drives at its top speed along both axes",
+        of("v", column=0), (1.095, 1.105), ("limits.velocity_scale=0.5",), (0.54, 0.56),
+    ),
+    Intervention(
+        "seeing-ahead/1", "On its way home the base drives at its top speed along both axes",
+        of("v", column=1), (1.095, 1.105), ("limits.velocity_scale=0.5",), (0.54, 0.56),
+    ),
+    Intervention(
+        "seeing-ahead/2", "With $Q = 1$ and the same limits it is still 22 cm away",
+        of("error/base", "m", "mean", 10.0, 10.2), (0, 0.05), ("Q=1",), (0.215, 0.23),
+        of=("controller=htmpc_wpt",),
+    ),
+    Intervention(
+        "seeing-ahead/3", "the faster base and arm move, the further the hand drifts",
+        EE, (15, 25), ("limits.velocity_scale=0.5",), (6, 9),
+    ),
+    Intervention(
+        "seeing-ahead/3", "with a peak that the arm can reach the hand is off by 6 mm",
+        EE, (15, 25), ("peak=[0.2,-0.9]",), (5.5, 6.4),
+    ),
+    # ---------------------------------------- deliveries
+    Intervention(
+        "deliveries/1", "it loses more because it now has to go all the way to it",
+        WORK, (18.8, 19.8), ("base_tolerance=0.05",), (30.5, 31.3), of=PASSES,
+    ),
+    Intervention(
+        "deliveries/1", "Standing still there costs either of them less than 3 seconds",
+        WORK, (33.0, 33.8), MOVES, (30.5, 31.3),
+    ),
+    Intervention(
+        "deliveries/1", "Standing still there costs either of them less than 3 seconds",
+        WORK, (40.7, 41.4), MOVES, (38.0, 38.8), of=("architecture=single_task",),
+    ),
+    # ---------------------------------------- documents
+    Intervention(
+        "disagreements", "with 0.4 N·m at every joint it is about half as large again",
+        of("error/position", "mm", "rms", 1.0), (0.33, 0.38), ("plant.friction=0.4",), (0.5, 0.6),
+        on="planar3-conflict", seconds=4.0,
+    ),
+    Intervention(
+        "disagreements", "Against N = 1 our N = 30 errs more in x over the whole run",
+        X, (0.528, 0.538), ("horizon=1",), (0.47, 0.476), of=LONG, on="iiwa14-circle-paper", seconds=4.0,
+    ),
+)
+# fmt: on
