@@ -103,7 +103,7 @@ FURTHER = Further(
             r"at once, and 10 ms later?",
             r"The force jumps by twice 0.05 N·m: ⟨jump⟩ rad/s². Each step leaves $1 - \bar M/M$, ⟨left⟩; "
             r"after ten ⟨later⟩ rad/s². "
-            "A force that does not change causes no error.",
+            "A force that does not change leaves no error.",
             {
                 "jump": (2 * 0.05 / 0.1, ".0f"),
                 "left": (LEFT, ".2f"),

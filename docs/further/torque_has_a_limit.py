@@ -102,8 +102,8 @@ FURTHER = Further(
             "which torque does it take for the inertia alone that the arm has about joint 1 where the "
             "circle begins?",
             r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With "
-            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m. The dry friction of joint 1 takes ⟨dry⟩ N·m, so most "
-            "of the ⟨three⟩ N·m, three per cent of 4 N·m, goes into friction and not into motion.",
+            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m. The dry friction of joint 1 takes ⟨dry⟩ N·m. That is "
+            "most of the ⟨three⟩ N·m, three per cent of 4 N·m.",
             {
                 "half": (30 / 2, ".0f"),
                 "a": (PEAK, ".2f"),

@@ -58,7 +58,7 @@ def _jerked(velocity: Array, acceleration: Array, wish: Array, caps: list[float]
     """How the acceleration changes in one period towards the one wished for, within the jerk cap.
 
     Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
-    half of what a straight line would allow, since in a curve speed also grows by itself. If it is above
+    half of what a straight line would allow: in a curve speed also grows by itself. If it is above
     already, coming down has the first claim on the jerk.
     """
     most_speed, _, most_jerk = caps

@@ -84,11 +84,11 @@ REASON = Step(
     do="Compare N = 1 with N = 20 for both meanings of R. Then set N = 1 and make R smaller, down to 0.1.",
     why=r"""
     Twenty steps make about half the error of one step, with smoother torques, which is the paper's
-    trend. But the reason is the price of torque, not foresight. A change of torque stays in force at
+    trend. But the price of torque has changed, not foresight. A change of torque stays in force at
     all later knots. With $N = 20$ it is paid for once and counted twenty times, so $R$ weighs less.
     A smaller $R$ does the same: with a hundredth of it, $R = 0.1$, one step ahead errs less than
     twenty steps with $R = 10$, and its torque is as smooth. At $R = 0.1$ the two horizons err alike.
-    So even here the longer horizon gives nothing that another weight does not give.
+    Even here the longer horizon gives nothing that another weight does not give.
     """,
     prediction=Value(
         "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",

@@ -90,9 +90,9 @@ LITTLE = Step(
     a new plan is made. Level 1 is solved again first, and the errors that the old plan allowed at its
     later knots never happen: with a new plan only every 0.2 s the hand is off by 2.2 mm. That is not
     the only reason, for with a new plan only every 0.4 s it is off by 1.9 mm, still a fifth of
-    $\delta$. In a footnote the paper warns of the opposite: since $\delta$ bounds plans, what the robot
-    does may also exceed it. The paper's own low $\delta$ was exceeded: the hand was off by 3 mm
-    instead of 1 mm (Table I).
+    $\delta$. In a footnote the paper warns of the opposite (given, not tried here): since $\delta$
+    bounds plans, what the robot does may also exceed it. The paper's own low $\delta$ was exceeded: the
+    hand was off by 3 mm instead of 1 mm (Table I).
     """,
     prediction=Choice(
         "The hand may be off by 1 cm. How far is it off at most?",
@@ -141,7 +141,7 @@ SUM = Step(
     """,
     do="Give (11) more δ until the base is as fast as the ghost. What does the hand say?",
     why=r"""
-    The looser rule makes the slower robot, since the line search cuts the step to a fortieth. At its
+    The looser rule makes the slower robot: the line search cuts the step to a fortieth. At its
     best the hand's error is nearly zero, and there $\mathcal J_1$, a sum of squares, is nearly flat:
     its gradient says little about which way is harmful. The rows of (12) have the full Jacobian there.
     That is part of the reason: if level 1 pays for its effort (`formulation=paper`), its best leaves an

@@ -203,7 +203,7 @@ SUM = Step(
     why=r"""
     The diamond lies between the valley and the ring, where the slopes of the two costs cancel. In the
     end the wrist is left 5 cm short of its 10 cm, and the joints give 7 degrees of the 14 that a strict
-    order costs them: half of each. The disc 2 never leaves the line, so nothing leaks, up to rounding.
+    order costs them: half of each. The disc 2 never leaves the line: nothing leaks, up to rounding.
     It is the line of $\bar M$, though. With the true $M$ a leak remains, which the second meter shows:
     $\bar M$ is not the arm's true inertia. Time-delay estimation notices it at the next tick and
     corrects it over tens of ticks.

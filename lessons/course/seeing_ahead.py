@@ -187,7 +187,7 @@ GAINS = Step(
     the base has slowed down: with a peak that the arm can reach the hand is off by 6 mm. Asked for a
     hundred times a second it drifts half as far. The hand's error is brought back in proportion to $K$:
     with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as before.
-    Limits are not to blame: without any the hand is off by more. So a good pair exists, and has to be
+    Limits are not to blame: without any the hand is off by more. A good pair exists, and has to be
     found. The paper says (given, not tried here) that HTIDKC would need its parameters scheduled, where
     one set of weights serves HTMPC in both parts.
     """,

@@ -129,8 +129,8 @@ VIABLE = Step(
     $$\dot q \le a\left(-t + \sqrt{t^2 + 2\,(q_s - q)/a}\right)$$
 
     From that speed, after a time $t$ in which nothing happens, $a = 20$ rad/s² stops the joint at
-    $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model
-    $t = T_s$ and $q_s = q_{\max}$ would do. Our model is estimated, so the joint brakes tens of steps
+    $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model $t
+    = T_s$ and $q_s = q_{\max}$ would do. Our model is estimated, and the joint brakes tens of steps
     late. Besides, the rows on speed allow a change of speed of at most 15 1/s times the distance
     between the speed and its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the
     limit; beyond $q_s$ the joint must come back at 5 1/s times the excess. Again $N = 5$.

@@ -88,10 +88,10 @@ BETTER_MODEL = Step(
     """,
     do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
     why=r"""
-    It knows the arm better and fails at the same place, and so does OSF with an exact model. So the
-    model is not the trouble. The inverse asks for more than the arm can do and knows no bound. Damped,
-    the inverse comes through. A controller without any inverse is lost as well if nothing bounds it:
-    HIMPC is, with all its bounds off.
+    It knows the arm better and fails at the same place, and so does OSF with an exact model. The model
+    is not the trouble. The inverse asks for more than the arm can do and knows no bound. Damped, the
+    inverse comes through. A controller without any inverse is lost as well if nothing bounds it: HIMPC
+    is, with all its bounds off.
     """,
     prediction=Choice(
         "Estimated dynamics instead of a wrong model. At the conflict the arm …",
@@ -136,16 +136,16 @@ EQUALITY = Step(
     """,
     do="Watch joint 1 at 1.4 s and again where it comes back.",
     why=r"""
-    Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links
-    2 and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge,
-    to and fro with 94°/s, a little more than once a second, until joint 1 is called back. A strict
-    order does not make the arm calm. Nor is the strict order what makes it swing: in a weighted sum
-    with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s, and with $R_2 = 10^5$ the strict one
-    slows down to 58°/s. Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it
-    swings as before. What does, we did not find. But torque and speed stay within their bounds, and the hand stays on its circle.
-    The equality (34g) does not do that alone, the bounds are needed as well: without those on speed and
-    position every motor comes to its limit and the hand is off by 11 mm, and without any bound the arm
-    is lost as with a projection.
+    Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links 2
+    and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge, to
+    and fro with 94°/s, a little more than once a second, until joint 1 is called back. A strict order
+    does not make the arm calm. Nor is the strict order what makes it swing: in a weighted sum with $Q_2
+    = 0.01$ joint 3 swings as well, with up to 73°/s, and with $R_2 = 10^5$ the strict one slows down to
+    58°/s. Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it swings as
+    before. What does, we did not find. But torque and speed stay within their bounds, and the hand
+    stays on its circle. The equality (34g) does not do that alone, the bounds are needed as well:
+    without those on speed and position every motor comes to its limit and the hand is off by 11 mm, and
+    without any bound the arm is lost as with a projection.
     """,
     claims=(
         Claim(

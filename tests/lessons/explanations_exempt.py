@@ -42,7 +42,7 @@ TEXTS = (
     Exempt("instruction", "", (
         ("no-model-needed/3", "So start small, go up in small steps"),
         ("further/no-model-needed", "That is why $\\bar M$ is raised in small steps"),
-        ("stretched-out/2", "An experiment that shows two causes"),
+        ("stretched-out/2", "Where an experiment has two possible causes"),
         ("deadlines/2", "So let $\\bar M$ be twice as large."),
         ("inside-the-qp/1", "It wants *two* numbers, so look"),
         ("further/deliveries", "So ask whether they were"),
@@ -123,10 +123,11 @@ TEXTS = (
         LESSONS + "architectures.py::test_a_base_that_stays_behind_the_hand_drives_no_farther"
     ), (
         ("deliveries/0", "The way is shorter because the base stays behind its hand"),
-        ("deliveries/1", "Whoever may pass by its place loses most"),
+        ("deliveries/1", "The ghost's base drives only a tenth farther"),
     )),
     Exempt("measured", LESSONS + "architectures.py::test_the_factor_hangs_on_the_rule", (
-        ("deliveries/1", "So the factor between two ways of working hangs on the rule"),
+        ("deliveries/1", "So the factor between the two ways of working depends on the rule"),
+        ("deliveries/1", "Two tasks at a time under the first rule are 2.1 times as fast"),
     )),
     # ---------------------------------------- what the program does
     Exempt("software", LESSONS + "grade_attacks.py::test_a_table_of_grades_is_no_program_of_a_spreadsheet", (

@@ -10,9 +10,6 @@ ROBOTS, HTMPC = "tests/robots/test_robots_", "tests/himpc/test_htmpc_"
 REFERENCE = (
     # ---------------------------------------- nothing that could be wrong
     Exempt("definition", "", (
-        ("himpc/cascade/compiled.py", "What is on disk is current as long as"),
-        ("himpc/cascade/compiling.py", "Functions of a module with a decorator"),
-        ("himpc/cascade/loading.py", "How a compiled function comes from disk"),
         ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
         ("himpc/cascade/polish.py", "From the rows that a solver's point says bind"),
         ("himpc/controllers/nhimpc.py", "J_i(q_{k+j|k}) in place of"),
@@ -33,8 +30,7 @@ REFERENCE = (
         ("robots/capsules.py", "Caps and mantle with vertices of their own"),
         ("robots/catalog.py", "Angles in degrees here"),
         ("robots/reach.py", "placo's solver for one robot"),
-        ("himpc/cascade/compiling.py", "Everything that is compiled, in one place"),
-        ("himpc/controllers/forms.py", "All active levels, their rows stacked"),
+        ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much early"),
         ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
@@ -64,7 +60,7 @@ REFERENCE = (
     Exempt("mathematics", HIMPC + (
         "adaptation.py::test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one"
     ), (
-        ("himpc/adaptation.py", "By construction M̄ ⪯ M̂, so"),
+        ("himpc/controllers/adaptation.py", "By construction M̄ ⪯ M̂, so"),
     )),
     Exempt("mathematics", HIMPC + "oracle.py::test_where_nothing_binds_it_is_the_closed_form", (
         ("himpc/cascade/white.py", "An orthonormal basis of √R ∘ span Z"),
@@ -132,10 +128,7 @@ REFERENCE = (
     Exempt("software", HIMPC + "braking.py::test_braking_meets_all_rows_whenever_any_increments_do", (
         ("himpc/cascade/cascade.py", "So the increments meet all rows"),
     )),
-    Exempt("software", HIMPC + "compiling.py::test_who_has_it_compiled_runs_what_is_on_disk", (
-        ("himpc/cascade/compiler.py", "A process of its own that compiles"),
-    )),
-    Exempt("software", HIMPC + "ladder.py::test_least_slack_makes_any_rows_feasible", (
+    Exempt("software", HIMPC + "fallbacks.py::test_least_slack_makes_any_rows_feasible", (
         ("himpc/cascade/last_resort.py", "N·m added to the least slack"),
     )),
     Exempt("software", HIMPC + "cascade.py::test_routes_agree_on_rank_deficient_stacks", (
@@ -145,7 +138,7 @@ REFERENCE = (
         ("himpc/cascade/polish.py", "A row that blocks the way depends on none of those held"),
     )),
     Exempt("software", HIMPC + "controller.py::test_the_controller_sees_no_mass", (
-        ("himpc/configuration.py", "Only geometry is read, no inertia or gravity"),
+        ("himpc/kinematics/configuration.py", "Only geometry is read, no inertia or gravity"),
     )),
     Exempt("software", HTMPC + "active_set.py::test_rows_that_contradict_each_other_are_found_out", (
         ("himpc/htmpc/active_set.py", "The rows held are kept as combinations"),

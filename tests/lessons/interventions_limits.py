@@ -148,6 +148,10 @@ LIMIT_ROWS = (
         seconds=0.75, stays=True,
     ),
     Intervention(
+        "the-model-is-wrong/2", "Heavier links make $M^{-1}\\bar M$ smaller, so corrections are slower",
+        HAND, (0.047, 0.06), ("M_bar_scale=1.3",), (0.03, 0.044),
+    ),
+    Intervention(
         "the-model-is-wrong/2", "A larger $\\bar M$ makes the whole error as small as before",
         HAND, (0.047, 0.06), ("M_bar_scale=1.3",), (0.03, 0.044),
     ),

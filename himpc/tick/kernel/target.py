@@ -49,7 +49,7 @@ def jerked(
     """How the acceleration changes in one period towards the one wanted, within the jerk cap.
 
     Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
-    half of what a straight line would allow, since in a curve speed also grows by itself. If it is above
+    half of what a straight line would allow: in a curve speed also grows by itself. If it is above
     already, coming down has the first claim on the jerk.
     """
     budget = caps[2] * T_s
