@@ -7,7 +7,6 @@ from typing import Any, get_args
 
 from lessons.events import Event
 from lessons.scenes.scene import Scene
-from lessons.session.start import begin
 from robots import InputError
 from robots.errors import shortened
 
@@ -15,6 +14,8 @@ from robots.errors import shortened
 def check_scene(scene: Scene) -> None:
     """Raises InputError for a scene that cannot begin, or one of whose events cannot happen; or whatever its
     own code raises."""
+    from lessons.session.start import begin  # a page looks scenes up by name without loading any controller
+
     check_duration(scene.duration)
     for each in scene.events:
         if not (isinstance(each, tuple) and len(each) == 2 and isinstance(each[1], get_args(Event))):

@@ -14,7 +14,7 @@ from app.server.malloc_tuning import ARENAS
 ROOT = Path(__file__).parents[2]
 COUNT = """
 import ctypes, sys, threading
-from app.server.arenas import few_arenas
+from app.server.malloc_tuning import few_arenas
 
 if {few} and not few_arenas():
     sys.exit(3)
@@ -61,7 +61,7 @@ HOLES = """
 import sys
 import numpy as np
 import psutil
-from app.server.arenas import few_arenas, large_arrays_apart
+from app.server.malloc_tuning import few_arenas, large_arrays_apart
 
 few_arenas()
 large_arrays_apart()
