@@ -20,7 +20,7 @@ from app.link.ring import Block
 from app.link.spares import Spares
 
 if TYPE_CHECKING:
-    from lessons.settings.settings import Settings
+    from lessons.settings.settings import SceneSettings
 
 T = TypeVar("T")
 _COMPLAIN = 2.0  # s between two notices that commands are lost
@@ -36,7 +36,7 @@ class Simulation(ABC):
     def __init__(self, spares: Spares) -> None:
         self.ready: Ready | None = None
         self.status: Status | None = None
-        self.settings: Settings | None = None
+        self.settings: SceneSettings | None = None
         self.failure: str | None = None
         self.changed = 0
         self.tape = PoseHistory()
@@ -144,7 +144,7 @@ class Simulation(ABC):
             notices, self._notices = self._notices, []
             return refusals, notices
 
-    def settings_of(self, ready: Ready) -> Settings:
+    def settings_of(self, ready: Ready) -> SceneSettings:
         """The settings of a scene that came in: the newest ones, unless another scene came in since."""
         with self._lock:
             return ready.settings if self.settings is None or self.ready is not ready else self.settings

@@ -17,7 +17,7 @@ from app.link.wire import Handle
 if TYPE_CHECKING:
     from himpc.telemetry import Layout
     from lessons.events import Event
-    from lessons.settings.settings import Settings
+    from lessons.settings.settings import SceneSettings
     from robots import Robot
 
 # ------------------------------------------------------------------ page → simulation
@@ -83,7 +83,7 @@ class Begin:
     """Where a ghost begins: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
-    settings: Settings
+    settings: SceneSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ class Ready:
     block: Handle  # of the shared memory
     robot: Robot
     layout: Layout
-    settings: Settings
+    settings: SceneSettings
     tasks: tuple[TaskView, ...]
     room: np.ndarray
     again: bool = False
@@ -206,7 +206,7 @@ class Status:
     path: np.ndarray
     binding: tuple[BindingRow, ...]
     notices: tuple[str, ...] = ()
-    settings: Settings | None = field(default=None)
+    settings: SceneSettings | None = field(default=None)
     gauge: tuple[float, float] | None = None
     mission: MissionView | None = None
     lecture: Lecture | None = None
@@ -264,7 +264,7 @@ class Told:
     """
 
     choice: SceneChoice
-    settings: Settings
+    settings: SceneSettings
     log: tuple[tuple[float, Event], ...]
     t: float
 

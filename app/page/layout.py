@@ -41,7 +41,7 @@ from app.view.ghost import GhostView
 from app.view.robot import RobotView
 from lessons.events import Event
 from lessons.own.folder import Folder
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -156,7 +156,7 @@ class Stage:
 
     # ---------------------------------------------------------------- events out
 
-    def _settings(self) -> Settings:
+    def _settings(self) -> SceneSettings:
         return self._learner.settings_of(self._ready)
 
     def _post(self, event: Event) -> None:

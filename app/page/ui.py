@@ -7,13 +7,13 @@ from collections.abc import Callable
 from app.page.scene_ui import Context, Face
 from app.page.torque_ui import TorqueFace
 from app.page.velocity_ui import VelocityFace
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings
 
 __all__ = ["Context", "Face", "face_for"]
 
-_FACES: dict[type[Settings], Callable[[Context], Face]] = {
+_FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
     TorqueSettings: TorqueFace,
     VelocitySettings: VelocityFace,
 }

@@ -21,7 +21,7 @@ from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
 if TYPE_CHECKING:
-    from lessons.settings.settings import Settings
+    from lessons.settings.settings import SceneSettings
     from lessons.teaching import lesson
 
 STEERING = "The instructor steers: this page only watches."
@@ -49,7 +49,7 @@ class Watcher:
         return self._shown.status
 
     @property
-    def settings(self) -> Settings | None:
+    def settings(self) -> SceneSettings | None:
         return self._shown.settings
 
     @property
@@ -95,7 +95,7 @@ class Watcher:
     def trouble(self) -> Trouble | None:
         return self._shown.trouble()
 
-    def settings_of(self, ready: Ready) -> Settings:
+    def settings_of(self, ready: Ready) -> SceneSettings:
         return self._shown.settings_of(ready)
 
     def choice_of(self, ready: Ready) -> SceneChoice:

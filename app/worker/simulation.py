@@ -37,7 +37,7 @@ from app.worker.reports.start import start
 from lessons.events import Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from robots import InputError
 
 
@@ -72,7 +72,7 @@ class SimulationRunner:
     def _fresh_start(self) -> None:
         self.ticks = self.over_budget = self.late = self._steps = 0
         self.resets += 1
-        self._sent: Settings | None = None
+        self._sent: SceneSettings | None = None
         if self.leader.on:
             self.leader.begin(self.choice, self.session)
 

@@ -13,7 +13,7 @@ from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
-from himpc.controllers.period import Found, Tick
+from himpc.controllers.period import PeriodResult, PeriodState
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
@@ -128,7 +128,7 @@ class HIMPC(TorqueController):
                 here = Configuration(self.robot, self._data, q, v, previews=previews)
                 measure(self._off, here, previews, values, errors)
             rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, self._limits, N, T_s)
-            found = self._search(Tick(state, memory, previews, rows, values, errors))
+            found = self._search(PeriodState(state, memory, previews, rows, values, errors))
         if found is None:
             return self._hold(q, started)
         solutions, predicted_q = found.solutions, found.predicted_q
@@ -177,12 +177,12 @@ class HIMPC(TorqueController):
         if self.kernel is not None:
             self.kernel.take_M_bar(self._M_bar)
 
-    def _search(self, tick: Tick) -> Found | None:
+    def _search(self, tick: PeriodState) -> PeriodResult | None:
         """The plan along the previous prediction (30); None if the state's consequences are not finite."""
         state, settings = tick.state, self._settings
         return self._solve(tick, tick.memory.knots(state.q, state.v, settings.horizon, settings.T_s))
 
-    def _solve(self, tick: Tick, knots: Array) -> Found | None:
+    def _solve(self, tick: PeriodState, knots: Array) -> PeriodResult | None:
         """The cascade with the Jacobians taken at q_k and at `knots`, (N−1, n)."""
         state, memory, settings = tick.state, tick.memory, self._settings
         configuration = Configuration(self.robot, self._data, state.q, state.v, knots, tick.previews)
@@ -193,13 +193,15 @@ class HIMPC(TorqueController):
             return None
         if self._idle:
             # With no level on and damping off nothing is asked for: the torque stays.
-            return Found([], x_dot, predict_positions(state, self._still, self._M_bar, settings.T_s))
+            return PeriodResult([], x_dot, predict_positions(state, self._still, self._M_bar, settings.T_s))
 
         self._asked = problems
         solutions = self._cascade(problems, tick)
-        return Found(solutions, x_dot, predict_positions(state, solutions[-1].U, self._M_bar, settings.T_s))
+        return PeriodResult(
+            solutions, x_dot, predict_positions(state, solutions[-1].U, self._M_bar, settings.T_s)
+        )
 
-    def _cascade(self, problems: list[LevelProblem], tick: Tick) -> list[LevelSolution]:
+    def _cascade(self, problems: list[LevelProblem], tick: PeriodState) -> list[LevelSolution]:
         """Problem 1 to Problem r."""
         return solve_cascade(problems, tick.rows, tick.memory.solutions, self._settings.solver)
 

@@ -26,7 +26,7 @@ _REST = 5.0
 """1/s: K_v of the last rung, q̈ = −K_v q̇ within the torque bounds, if the first QP has no verified point."""
 
 
-class Found(NamedTuple):
+class VerifiedOptimum(NamedTuple):
     """A level's y with what was verified about it."""
 
     y: Array
@@ -70,12 +70,16 @@ class HQP(OneStepController):
             if self._by_acceleration:
                 R = (inverse * demand.form.level.R) @ inverse
             fallback: Fallback = "solve"
-            found = self._optimum(demand, B, R, y, free, rows) if free.shape[1] else Found(y, status="empty")
+            found = (
+                self._optimum(demand, B, R, y, free, rows)
+                if free.shape[1]
+                else VerifiedOptimum(y, status="empty")
+            )
             if not found.usable:
                 # Staying where the levels above are keeps every priority; below nothing, come to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
                 fallback = "inherit" if i else "brake"
-                found = Found(y if i else braking, status=found.status, qp_us=found.qp_us)
+                found = VerifiedOptimum(y if i else braking, status=found.status, qp_us=found.qp_us)
             y = found.y
             if i + 1 < len(demands):
                 free = free @ split(B @ free, float(np.linalg.norm(B)))[3]
@@ -98,7 +102,9 @@ class HQP(OneStepController):
             )
         return Law(bias, levels)
 
-    def _optimum(self, demand: Demand, B: Array, R: Array, y: Array, free: Array, rows: Rows) -> Found:
+    def _optimum(
+        self, demand: Demand, B: Array, R: Array, y: Array, free: Array, rows: Rows
+    ) -> VerifiedOptimum:
         """The level's QP over w in y_i = y_{i−1} + Z w, Z = `free`: the priorities hold exactly."""
         weighted = demand.form.root_Q[:, None] * B
         H = free.T @ (weighted.T @ weighted + R) @ free
@@ -107,10 +113,10 @@ class HQP(OneStepController):
         lower, upper = np.minimum(rows.lower[0] - y, 0.0), np.maximum(rows.upper[0] - y, 0.0)
         solution = solve_qp(H, f, free, lower, upper, self._settings.solver)
         if not solution.solved:
-            return Found(y, status=solution.status, qp_us=solution.time_us, usable=False)
+            return VerifiedOptimum(y, status=solution.status, qp_us=solution.time_us, usable=False)
         step = free @ solution.x
         active = _binding(solution.multipliers, step, lower, upper)
-        return Found(y + step, active, solution.kkt_residual, solution.status, solution.time_us)
+        return VerifiedOptimum(y + step, active, solution.kkt_residual, solution.status, solution.time_us)
 
 
 def _binding(multipliers: Array, step: Array, lower: Array, upper: Array) -> ActiveRows:

@@ -6,7 +6,7 @@ import numpy as np
 
 from himpc.cascade.level import LevelSolution
 from himpc.controllers.himpc import HIMPC
-from himpc.controllers.period import Found, Tick
+from himpc.controllers.period import PeriodResult, PeriodState
 from himpc.formulation.settings import Settings
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
@@ -53,7 +53,7 @@ class NHIMPC(HIMPC):
         most = self.max_iterations if levels else 1
         return CompiledTick(self.robot, self._settings, self._form, self._off, levels, self.tolerance, most)
 
-    def _search(self, tick: Tick) -> Found | None:
+    def _search(self, tick: PeriodState) -> PeriodResult | None:
         fading = dict(self._weight)
         found = super()._search(tick)
         iterations = 1
@@ -70,7 +70,7 @@ class NHIMPC(HIMPC):
         return None if found is None else found._replace(iterations=iterations)
 
 
-def _solved(found: Found) -> bool:
+def _solved(found: PeriodResult) -> bool:
     """Whether every level is at its optimum; what is none leads to none by being solved again."""
     return bool(found.solutions) and all(solution.fallback == "solve" for solution in found.solutions)
 

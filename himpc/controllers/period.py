@@ -17,7 +17,7 @@ from himpc.references import Preview
 Array = NDArray[np.float64]
 
 
-class Tick(NamedTuple):
+class PeriodState(NamedTuple):
     """What one control period starts from; `values` and `errors` are filled while it is solved."""
 
     state: JointState
@@ -28,7 +28,7 @@ class Tick(NamedTuple):
     errors: dict[str, Array]
 
 
-class Found(NamedTuple):
+class PeriodResult(NamedTuple):
     """What one control period found: levels, ẋ_k of all rows, q at knots 0 … N, how many cascades it took."""
 
     solutions: list[LevelSolution]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.controllers.himpc import HIMPC
-from himpc.controllers.period import Tick
+from himpc.controllers.period import PeriodState
 from himpc.formulation.forms import LevelForm
 from himpc.limits import Rows
 from himpc.plan import Plan
@@ -63,7 +63,7 @@ class Weighted(HIMPC):
         compiled = self.kernel is not None and level.name == DAMPING_LEVEL.name
         return math.sqrt(DAMPING_SHARE) * share if compiled else share
 
-    def _cascade(self, problems: list[LevelProblem], tick: Tick) -> list[LevelSolution]:
+    def _cascade(self, problems: list[LevelProblem], tick: PeriodState) -> list[LevelSolution]:
         problems = _calmed(problems)
 
         def solve(count: int) -> LevelSolution:

@@ -9,7 +9,14 @@ if TYPE_CHECKING:
     from himpc.htmpc.htidkc import HTIDKC
     from himpc.htmpc.htmpc import HTMPC
     from himpc.htmpc.plan import LevelEvidence, VelocityPlan
-    from himpc.htmpc.settings import FORMULATIONS, LEXICOGRAPHIC, Bounds, HTMPCSettings, MotionLimits, bounds
+    from himpc.htmpc.settings import (
+        FORMULATIONS,
+        LEXICOGRAPHIC,
+        HTMPCSettings,
+        MotionBounds,
+        MotionLimits,
+        bounds,
+    )
     from himpc.htmpc.stmpc import HTMPC_WPT, STMPC
 
 __all__ = [
@@ -19,10 +26,10 @@ __all__ = [
     "HTMPC_WPT",
     "LEXICOGRAPHIC",
     "STMPC",
-    "Bounds",
     "G",
     "HTMPCSettings",
     "LevelEvidence",
+    "MotionBounds",
     "MotionLimits",
     "VelocityPlan",
     "base_joints",
@@ -38,7 +45,7 @@ __getattr__ = lazily(
         "HTMPC_WPT": "stmpc",
         "LEXICOGRAPHIC": "settings",
         "STMPC": "stmpc",
-        "Bounds": "settings",
+        "MotionBounds": "settings",
         "G": "base",
         "HTMPCSettings": "settings",
         "LevelEvidence": "plan",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.active_set import SCRATCH, factor, solve
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.rows import ConstraintRows
 from himpc.qp import QPSolution
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ CONTRADICTION = "contradiction"
 _STATUS = ("optimal", CONTRADICTION, "limit")
 
 
-class ActiveSet:
+class ActiveSetSolver:
     """One Hessian and the rows held at the last solution, from which the next QP begins."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class ActiveSet:
         self._H, self._count = H, 0
         return factor(H, self._L)
 
-    def solve(self, g: Array, rows: Rows, same: int) -> QPSolution:
+    def solve(self, g: Array, rows: ConstraintRows, same: int) -> QPSolution:
         """min ½xᵀHx + gᵀx under the rows; lower = upper is an equality.
 
         Args:

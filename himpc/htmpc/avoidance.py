@@ -11,7 +11,7 @@ from himpc.htmpc.clearance import Clearances, CollisionModel
 from himpc.htmpc.geometry import Placed
 from himpc.htmpc.kernel.kinds import COLLISION
 from himpc.htmpc.prediction import integrator
-from himpc.htmpc.rows import Rows, Table
+from himpc.htmpc.rows import ConstraintRows, ConstraintTable
 
 Array = NDArray[np.float64]
 
@@ -37,14 +37,18 @@ class Avoidance:
         """Pairs near enough to matter at some configurations."""
         return self.model.between(joints, self.margin + _LOOK, gradients)
 
-    def rows(self, near: Clearances, N: int, dt: float, table: Table | None = None, place: int = 0) -> Rows:
+    def rows(
+        self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, place: int = 0
+    ) -> ConstraintRows:
         """The linearised constraint on the change d of the inputs, one row per pair and knot; from a place
         in a table on."""
-        table = Table(N * near.gradient.shape[1]) if table is None else table
+        table = ConstraintTable(N * near.gradient.shape[1]) if table is None else table
         A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance
         free = np.full(len(room), np.inf)
-        return Rows(A, room, free, np.full(len(room), COLLISION), near.knot + 1, np.arange(len(room)))
+        return ConstraintRows(
+            A, room, free, np.full(len(room), COLLISION), near.knot + 1, np.arange(len(room))
+        )
 
     def depths(self, near: Clearances, N: int) -> Array:
         """By how much each knot is inside the margin at worst, (N,) m, ≥ 0."""

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.motion import brake
 from himpc.htmpc.prediction import Motion, Start, velocities
-from himpc.htmpc.settings import Bounds
+from himpc.htmpc.settings import MotionBounds
 
 Array = NDArray[np.float64]
 
 
-def braking(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> Array:
+def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds) -> Array:
     """Inputs (N, n) that bring every joint to rest as fast as its bounds allow, and back inside its range.
 
     A joint beyond a position bound is sent back at up to a fifth of its speed limit. When input and jerk
@@ -25,7 +25,7 @@ def braking(start: Start, N: int, dt: float, period: float, bounds: Bounds) -> A
     return U
 
 
-def shifted(before: Motion, s: float, N: int, dt: float, bounds: Bounds) -> Array:
+def shifted(before: Motion, s: float, N: int, dt: float, bounds: MotionBounds) -> Array:
     """The inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N times dt.
 
     Each is the mean of the old input over the new interval, so the velocities at the new knots are the old

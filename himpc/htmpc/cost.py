@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.cost import model
 from himpc.htmpc.prediction import Start, integrator
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.rows import ConstraintRows
 from himpc.htmpc.settings import Efforts
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ class Effort:
         return 0.5 * float(gap @ slope), slope
 
 
-def barrier(rows: Rows, u: Array) -> tuple[float, Array, Array]:
+def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
     """The relaxed log barrier of all bounds: value, gradient (k,), Hessian (k, k) with respect to u.
 
     B(h) = −μ ln h for h ≥ ζ, and the parabola that continues it twice differentiably below.
@@ -100,7 +100,7 @@ def barrier(rows: Rows, u: Array) -> tuple[float, Array, Array]:
     return MU * float(B.sum()), MU * (A.T @ first), MU * (A.T @ (second[:, None] * A))
 
 
-def barrier_value(rows: Rows, u: Array) -> float:
+def barrier_value(rows: ConstraintRows, u: Array) -> float:
     """The value of `barrier` alone."""
     value = rows.A @ u
     h = np.concatenate([rows.upper - value, value - rows.lower])

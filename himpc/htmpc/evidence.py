@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.plan import Felt, LevelEvidence
 from himpc.htmpc.problem import Iterate
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.rows import ConstraintRows
 from himpc.htmpc.sqp import Solved
 from himpc.htmpc.tracking import Tracking
 
@@ -36,7 +36,7 @@ def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
     )
 
 
-def _felt(rows: Rows, multipliers: Array) -> Felt:
+def _felt(rows: ConstraintRows, multipliers: Array) -> Felt:
     """Of slacks, whose multipliers come last, nobody is told."""
     multipliers = multipliers[: len(rows.kind)]
     some = np.flatnonzero(np.abs(multipliers) > _FELT)

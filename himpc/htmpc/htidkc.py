@@ -13,7 +13,7 @@ from himpc.htmpc.kernel.kinds import VELOCITY
 from himpc.htmpc.plan import Felt, LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start
 from himpc.htmpc.safety import commandable, plausible
-from himpc.htmpc.settings import Bounds, HTMPCSettings, bounds
+from himpc.htmpc.settings import HTMPCSettings, MotionBounds, bounds
 from himpc.htmpc.tracking import check_dimensions
 from himpc.kinematics.configuration import Configuration
 from himpc.qp import QPSolution, solve_qp
@@ -164,7 +164,7 @@ class HTIDKC:
         )
 
 
-def _approach(room: Array, limits: Bounds, T: float) -> Array:
+def _approach(room: Array, limits: MotionBounds, T: float) -> Array:
     """The velocity from which a joint can still stop within `room`, decided every T seconds; past a bound
     a return at up to a fifth of the speed limit."""
     braking = np.where(np.isfinite(limits.a), limits.a, 1e9)

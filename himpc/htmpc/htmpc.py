@@ -9,7 +9,7 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.active_set import ActiveSet
+from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.avoidance import Avoidance, clearance
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.continuing import braking, shifted
@@ -18,8 +18,8 @@ from himpc.htmpc.evidence import evidence
 from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start, positions, underway, velocities
-from himpc.htmpc.problem import Problem, Tick
-from himpc.htmpc.rows import Table, held, limit_rows
+from himpc.htmpc.problem import Problem, SharedStep
+from himpc.htmpc.rows import ConstraintTable, held, limit_rows
 from himpc.htmpc.safety import commandable, permitted, plausible
 from himpc.htmpc.settings import HTMPCSettings, bounds, efforts
 from himpc.htmpc.sqp import Solved, solve_level
@@ -46,7 +46,7 @@ class HTMPC:
         """Raises InputError if the settings do not fit the robot."""
         self.robot = robot
         self._data = robot.model.createData()
-        self._method = ActiveSet()
+        self._method = ActiveSetSolver()
         self.configure(settings)
         self.reset()
 
@@ -76,7 +76,7 @@ class HTMPC:
         self._hold = self._held(active, settings)
         self._levels = tuple(form for level, form in every if level in active)
         self._bounds = limits
-        self._table = Table(settings.horizon * robot.n)
+        self._table = ConstraintTable(settings.horizon * robot.n)
         self._effort = Effort(weights, settings.horizon, settings.dt)
         self._avoidance = None if collision.empty else Avoidance(collision, settings.margin_m)
         self._tasks = tasks
@@ -134,7 +134,7 @@ class HTMPC:
         # What has been commanded but has not acted yet will happen whatever is decided now.
         return Start(q + underway(past, period, delay), last, acted)
 
-    def _tick(self, start: Start, previews: Mapping[str, Preview]) -> Tick:
+    def _tick(self, start: Start, previews: Mapping[str, Preview]) -> SharedStep:
         settings, limits = self._settings, self._bounds
         N, dt, period = settings.horizon, settings.dt, settings.period
         past, hold = self._past, self._hold
@@ -146,7 +146,7 @@ class HTMPC:
             brake = braking(start, N, dt, period, limits)
             plan[:, hold] = brake[:, hold]
             rows = held(rows, brake, hold, self._table)
-        return Tick(
+        return SharedStep(
             robot=self.robot,
             data=self._data,
             settings=settings,
@@ -161,7 +161,7 @@ class HTMPC:
             table=self._table,
         )
 
-    def _solve(self, tick: Tick) -> list[Solved]:
+    def _solve(self, tick: SharedStep) -> list[Solved]:
         """Algorithm 2."""
         at = tick.iterate(tick.plan)
         solved: list[Solved] = []
@@ -176,7 +176,7 @@ class HTMPC:
         return solved
 
     def _decided(
-        self, tick: Tick, motion: Motion, levels: tuple[LevelEvidence, ...], ahead: float, started: int
+        self, tick: SharedStep, motion: Motion, levels: tuple[LevelEvidence, ...], ahead: float, started: int
     ) -> VelocityPlan:
         settings, start, U = self._settings, tick.start, motion.U
         q = np.vstack([start.q, positions(start, U, settings.dt)])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinds import KINDS, LEXICOGRAPHIC
 from himpc.htmpc.prediction import Motion
-from himpc.htmpc.settings import Bounds
+from himpc.htmpc.settings import MotionBounds
 from himpc.plan import Binding
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ class VelocityPlan(NamedTuple):
     levels: tuple[LevelEvidence, ...]
     errors: dict[str, Array]
     values: dict[str, Array]
-    bounds: Bounds
+    bounds: MotionBounds
     clearance: float
     step_us: float
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from himpc.htmpc.active_set import ActiveSet
+from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.avoidance import PENALTY, Avoidance
 from himpc.htmpc.clearance import Clearances
 from himpc.htmpc.continuing import braking
@@ -18,8 +18,8 @@ from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC
 from himpc.htmpc.kernel.rows import guard
 from himpc.htmpc.kinematics import Desired, Knots
 from himpc.htmpc.prediction import Start, coasting, integrator
-from himpc.htmpc.rows import Rows, Table
-from himpc.htmpc.settings import Bounds, HTMPCSettings
+from himpc.htmpc.rows import ConstraintRows, ConstraintTable
+from himpc.htmpc.settings import HTMPCSettings, MotionBounds
 from himpc.htmpc.tracking import Guard, Tracking
 from robots import Robot
 
@@ -33,7 +33,7 @@ _RIDGE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Tick:
+class SharedStep:
     """What all levels of one step share.
 
     Attributes:
@@ -56,12 +56,12 @@ class Tick:
     start: Start
     desired: dict[str, Desired]
     effort: Effort
-    rows: Rows
-    bounds: Bounds
+    rows: ConstraintRows
+    bounds: MotionBounds
     plan: Array
     avoidance: Avoidance | None
-    method: ActiveSet
-    table: Table
+    method: ActiveSetSolver
+    table: ConstraintTable
 
     @cached_property
     def brake(self) -> Array:
@@ -92,7 +92,7 @@ class Tick:
 class Iterate:
     """Inputs with the kinematics and distances that follow, each computed once and only when needed."""
 
-    def __init__(self, tick: Tick, U: Array) -> None:
+    def __init__(self, tick: SharedStep, U: Array) -> None:
         self.tick = tick
         self.U = U
         self.q = tick.coasting + tick.T_q @ U
@@ -161,7 +161,7 @@ class Problem:
         absolute: whether the effort is (10) itself, or its proximal form.
     """
 
-    tick: Tick
+    tick: SharedStep
     level: Tracking
     guards: tuple[Guard, ...]
     absolute: bool
@@ -202,7 +202,7 @@ class Problem:
             H, g = H + curvature, g + slope
         return H, g
 
-    def rows(self, at: Iterate, slopes: Iterate | None = None) -> Rows:
+    def rows(self, at: Iterate, slopes: Iterate | None = None) -> ConstraintRows:
         """The QP's rows for the change d of the inputs, without those that are softened, or may be by slacks.
 
         With `slopes` they lead back: the guards' rows are strict, and have the Jacobians of that iterate.
@@ -236,7 +236,7 @@ class Problem:
         table.labels[:, place] = LEXICOGRAPHIC, tick.settings.horizon, 0
         return place + 1
 
-    def with_slack(self, at: Iterate, rows: Rows) -> tuple[Rows, int]:
+    def with_slack(self, at: Iterate, rows: ConstraintRows) -> tuple[ConstraintRows, int]:
         """`rows` of an iterate, followed by (7c) where slacks may buy it: on the first level; and how many
         rows that are."""
         if not self.forced or at.near is None or not len(at.near.knot):
@@ -261,19 +261,19 @@ class Problem:
             above.excess(at.errors(above.tracking), per_coordinate, delta) <= 0.0 for above in self.guards
         )
 
-    def _avoidance_rows(self, at: Iterate, place: int) -> Rows:
+    def _avoidance_rows(self, at: Iterate, place: int) -> ConstraintRows:
         avoidance, tick = self.tick.avoidance, self.tick
         assert avoidance is not None
         assert at.near is not None
         return avoidance.rows(at.near, len(at.U), tick.settings.dt, tick.table, place)
 
-    def _soft_rows(self, at: Iterate) -> Rows:
+    def _soft_rows(self, at: Iterate) -> ConstraintRows:
         """(7d) and (7c) on the inputs."""
         hard = self.tick.rows
         if at.near is None or not len(at.near.knot):
             return hard
         near = self._avoidance_rows(at, len(hard.A))
-        return Rows(
+        return ConstraintRows(
             self.tick.table.A[: len(hard.A) + len(near.A)],
             np.concatenate([hard.lower, near.lower + near.A @ at.U.ravel()]),
             np.concatenate([hard.upper, near.upper]),

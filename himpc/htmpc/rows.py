@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from himpc.htmpc.kernel.kinds import ACCELERATION
 from himpc.htmpc.kernel.rows import RAMP_STEPS, STOP_STEPS, about, limits, spread
 from himpc.htmpc.prediction import Start, integrator
-from himpc.htmpc.settings import Bounds
+from himpc.htmpc.settings import MotionBounds
 
 Array = NDArray[np.float64]
 
 
-class Rows(NamedTuple):
+class ConstraintRows(NamedTuple):
     """Rows with labels.
 
     Attributes:
@@ -35,12 +35,14 @@ class Rows(NamedTuple):
     knot: NDArray[np.int64]
     part: NDArray[np.int64]
 
-    def take(self, chosen: NDArray[np.bool_]) -> Rows:
+    def take(self, chosen: NDArray[np.bool_]) -> ConstraintRows:
         """The chosen rows."""
         A, lower, upper, kind, knot, part = self
-        return Rows(A[chosen], lower[chosen], upper[chosen], kind[chosen], knot[chosen], part[chosen])
+        return ConstraintRows(
+            A[chosen], lower[chosen], upper[chosen], kind[chosen], knot[chosen], part[chosen]
+        )
 
-    def widened(self, u: Array, last: int = 0) -> Rows:
+    def widened(self, u: Array, last: int = 0) -> ConstraintRows:
         """Bounds moved out just far enough to contain u, but for so many rows at the end."""
         value = self.A @ u
         lower, upper = np.minimum(self.lower, value), np.maximum(self.upper, value)
@@ -49,7 +51,7 @@ class Rows(NamedTuple):
         return self._replace(lower=lower, upper=upper)
 
 
-class Table:
+class ConstraintTable:
     """Room for all rows of a controller, filled anew at every step: those of (7d) first, then those of a QP.
 
     Attributes:
@@ -75,13 +77,13 @@ class Table:
                 for each in (self.bounds, self.room, self.labels)
             )
 
-    def absolute(self, count: int) -> Rows:
+    def absolute(self, count: int) -> ConstraintRows:
         """The first rows, on u: views."""
-        return Rows(self.A[:count], *self.bounds[:, :count], *self.labels[:, :count])
+        return ConstraintRows(self.A[:count], *self.bounds[:, :count], *self.labels[:, :count])
 
-    def changes(self, first: int, end: int) -> Rows:
+    def changes(self, first: int, end: int) -> ConstraintRows:
         """Rows on d from one place to another: views, but for the labels."""
-        return Rows(self.A[first:end], *self.room[:, first:end], *self.labels[:, first:end].copy())
+        return ConstraintRows(self.A[first:end], *self.room[:, first:end], *self.labels[:, first:end].copy())
 
     def about(self, u: Array, count: int) -> None:
         """Makes the room of the first rows that around u."""
@@ -92,7 +94,7 @@ class Table:
         lower, upper = self.room[:, :count]
         return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
 
-    def put(self, place: int, rows: Rows) -> int:
+    def put(self, place: int, rows: ConstraintRows) -> int:
         """Bounds and labels of rows on d whose A is there already; returns where they end."""
         end = place + len(rows.A)
         self.room[:, place:end] = rows.lower, rows.upper
@@ -107,14 +109,14 @@ class Table:
 
 
 def limit_rows(
-    start: Start, N: int, dt: float, period: float, bounds: Bounds, table: Table | None = None
-) -> Rows:
+    start: Start, N: int, dt: float, period: float, bounds: MotionBounds, table: ConstraintTable | None = None
+) -> ConstraintRows:
     """All rows that bounds of this tick can make binding, in a table, from its beginning on.
 
     A row is left out when no inputs inside the input bounds can reach its bound.
     """
     n = len(start.v)
-    table = Table(N * n) if table is None else table
+    table = ConstraintTable(N * n) if table is None else table
     table.reserve((4 * N + RAMP_STEPS + STOP_STEPS) * n)
     matrices = integrator(N, dt)
     count = limits(
@@ -125,7 +127,9 @@ def limit_rows(
     return table.absolute(count)
 
 
-def held(rows: Rows, brake: Array, joints: NDArray[np.int64], table: Table) -> Rows:
+def held(
+    rows: ConstraintRows, brake: Array, joints: NDArray[np.int64], table: ConstraintTable
+) -> ConstraintRows:
     """Rows that keep some joints on their way to rest: their inputs are those of `brake` (N, n). They take
     the place of the given ones at the beginning of the table."""
     N, n = brake.shape

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.prediction import Start
-from himpc.htmpc.settings import Bounds
+from himpc.htmpc.settings import MotionBounds
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ def _believable(robot: Robot) -> tuple[Array, Array, Array]:
     return lower, upper, np.where(np.isfinite(robot.v_limit), _FASTEST * robot.v_limit, _FARTHEST)
 
 
-def commandable(v: Array, last: Array | None, bounds: Bounds) -> Array:
+def commandable(v: Array, last: Array | None, bounds: MotionBounds) -> Array:
     """The measured velocity, cut to what may be commanded, (n,).
 
     The commands of a plan begin there: a robot pushed beyond its limit must not be told to go on like that.
@@ -56,7 +56,7 @@ def commandable(v: Array, last: Array | None, bounds: Bounds) -> Array:
     return np.minimum(np.maximum(v, -most), most)
 
 
-def permitted(start: Start, U: Array, bounds: Bounds, period: float) -> Array:
+def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Array:
     """The inputs (N, n), the first one such that the commands of this period keep their bounds.
 
     They do already when the QP's rows were hard and could be met. From a speed above its bound (which was

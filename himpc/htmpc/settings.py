@@ -130,7 +130,7 @@ class Efforts:
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class MotionBounds:
     """The bounds in force, (n,) each; infinite where nothing is imposed."""
 
     q_lower: Array
@@ -150,11 +150,11 @@ def efforts(robot: Robot, settings: HTMPCSettings) -> Efforts:
     )
 
 
-def bounds(robot: Robot, limits: MotionLimits) -> Bounds:
+def bounds(robot: Robot, limits: MotionLimits) -> MotionBounds:
     """The robot's limits with switches and scales applied. Raises InputError for a wrong jerk list."""
     free = np.full(robot.n, np.inf)
     jerk = _weights(robot, "limits.jerk_limit", limits.jerk_limit, base_joints(robot), 10.0, 80.0)
-    return Bounds(
+    return MotionBounds(
         q_lower=robot.q_lower if limits.position else -free,
         q_upper=robot.q_upper if limits.position else free,
         v=robot.v_limit * limits.velocity_scale if limits.velocity else free,

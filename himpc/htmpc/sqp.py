@@ -12,7 +12,7 @@ from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.avoidance import PENALTY
 from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC
 from himpc.htmpc.problem import Iterate, Problem
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.rows import ConstraintRows
 from himpc.htmpc.working_set import solve_by_working_set
 from himpc.qp import QPSolution
 
@@ -49,7 +49,7 @@ class Solved(NamedTuple):
     steps: tuple[float, ...]
     unsolved: int
     time_us: float
-    rows: Rows
+    rows: ConstraintRows
     multipliers: Array
 
 
@@ -59,7 +59,7 @@ class _Direction(NamedTuple):
     slope: float
     """Derivative of the merit along d."""
     solution: QPSolution
-    rows: Rows
+    rows: ConstraintRows
     fallback: str
     H: Array
     g: Array
@@ -124,7 +124,7 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     return _Direction(solution.x[:size].reshape(at.U.shape), slope, solution, rows, fallback, H, g, own)
 
 
-def _solve(problem: Problem, H: Array, g: Array, rows: Rows, bought: int, own: bool) -> QPSolution:
+def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: int, own: bool) -> QPSolution:
     """min ½dᵀHd + gᵀd under the rows, plus the price of one slack per knot that may move the last ones out.
 
     Args:
@@ -160,7 +160,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: Rows, bought: int, own: b
     return solve_by_working_set(extended, price, A, lower, upper, first, solver)
 
 
-def _price(solution: QPSolution, rows: Rows, bought: int) -> float:
+def _price(solution: QPSolution, rows: ConstraintRows, bought: int) -> float:
     """What one metre would be worth at the dearest knot."""
     paid = np.bincount(rows.knot[-bought:], np.abs(solution.multipliers[-bought:]))
     return float(paid.max())

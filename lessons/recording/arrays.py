@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from himpc.telemetry import Layout
 from lessons.events import Event, as_data
 from lessons.recording.constants import constants
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.values import finite
 from robots import Robot
 
@@ -37,7 +37,7 @@ def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:
 
 def named(
     robot: Robot,
-    settings: Settings,
+    settings: SceneSettings,
     layout: Layout,
     rows: Array,
     how: dict[str, Any],

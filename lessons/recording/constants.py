@@ -10,13 +10,13 @@ import numpy as np
 from himpc.constants import RETURN_RATE
 from himpc.htmpc.settings import bounds
 from himpc.limits import POSITION_MARGIN, reaction
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings
 from robots import Robot
 
 
-def constants(robot: Robot, settings: Settings) -> dict[str, Any]:
+def constants(robot: Robot, settings: SceneSettings) -> dict[str, Any]:
     """a_max (n,) rad/s² (m/s²), and what the bound on the way to a joint's limit counts with: margin (rad),
     reaction (s) and return rate (1/s); NaN where that bound is not in force, as it never is at velocity
     level."""
@@ -35,7 +35,7 @@ def _velocity(robot: Robot, settings: VelocitySettings) -> tuple[Any, ...]:
     return bounds(robot, settings.htmpc.limits).a, np.nan, np.nan, np.nan
 
 
-_OF: Mapping[type[Settings], Callable[[Robot, Any], tuple[Any, ...]]] = {
+_OF: Mapping[type[SceneSettings], Callable[[Robot, Any], tuple[Any, ...]]] = {
     TorqueSettings: _torque,
     VelocitySettings: _velocity,
 }

@@ -12,7 +12,7 @@ from lessons.events import Event, Reset
 from lessons.own.files import is_file
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import differences, parse_assignment
-from lessons.settings.settings import Settings, settings_after
+from lessons.settings.settings import SceneSettings, settings_after
 
 Log = Sequence[tuple[float, Event]]
 
@@ -95,7 +95,7 @@ def _arguments(run: RunSpec) -> tuple[str | None, ...]:
     return (run.scene,) if run.urdf is None else (run.scene, run.urdf)
 
 
-def _measures_time(settings: Settings, events: Log) -> bool:
+def _measures_time(settings: SceneSettings, events: Log) -> bool:
     """Whether the clock on the wall ever decided anything."""
     for event in (None, *(event for _, event in events)):
         settings = settings if event is None else settings_after(settings, (event,))

@@ -16,7 +16,7 @@ from lessons.own.files import fingerprint, is_file
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import assignment, differences, parse_assignment
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from robots import CATALOG, InputError
 from robots.errors import unknown_name
 
@@ -50,7 +50,7 @@ class State:
 
 
 def state_of(
-    run: RunSpec, settings: Settings, *, lesson: str | None = None, step: int | None = None
+    run: RunSpec, settings: SceneSettings, *, lesson: str | None = None, step: int | None = None
 ) -> State:
     """The state of a scene under settings reached from its own.
 

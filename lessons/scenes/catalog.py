@@ -20,13 +20,13 @@ from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.scenes.two_arms import baxter_conflict, baxter_hold, baxter_tray
 from lessons.settings.assignments import with_assignments
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
 from robots.errors import unknown_name
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
-AnySettings = TypeVar("AnySettings", bound=Settings)
+AnySettings = TypeVar("AnySettings", bound=SceneSettings)
 
 
 _MAKERS: dict[str, Callable[[], TorqueScene]] = {

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lessons.events import Event
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Scene(ABC):
     name: str
     title: str
     robot: Robot
-    settings: Settings
+    settings: SceneSettings
     q_0: Array
     duration: float = 4.0
     events: tuple[tuple[float, Event], ...] = ()

@@ -11,14 +11,14 @@ from lessons.scenes.catalog import prepared
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
 from lessons.settings.assignments import assignment, parse_assignment
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from robots import InputError
 
 _SAME = 1e-6
 """s: times closer than this are the same moment; ticks are further apart."""
 
 
-def ghost_scene(scene: Scene, leader: Settings, own: Sequence[str]) -> Scene:
+def ghost_scene(scene: Scene, leader: SceneSettings, own: Sequence[str]) -> Scene:
     """The scene that a ghost runs.
 
     Args:
@@ -44,7 +44,7 @@ class GhostDriver:
     A reset is taken as soon as it is heard of, even if the follower had not yet come to where the leader was.
     """
 
-    def __init__(self, session: Session, leader: Settings, own: Sequence[str]) -> None:
+    def __init__(self, session: Session, leader: SceneSettings, own: Sequence[str]) -> None:
         """session: of `ghost_scene`, fresh; leader: the leader's settings at the last reset, where both
         begin; own: assignments."""
         self.session = session
@@ -99,7 +99,7 @@ class GhostDriver:
             self.session.notices.append(str(error))
 
 
-def swapped(settings: Settings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
+def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
     """What leader and ghost get when they change sides.
 
     Args:
@@ -123,5 +123,5 @@ def swapped(settings: Settings, own: Sequence[str]) -> tuple[tuple[str, ...], tu
     return kept, tuple(Set(path, value) for path, value in given)
 
 
-def _with(scene: Scene, settings: Settings, own: Sequence[str]) -> Scene:
+def _with(scene: Scene, settings: SceneSettings, own: Sequence[str]) -> Scene:
     return prepared(replace(scene, settings=settings), None, own)

@@ -13,7 +13,7 @@ from himpc.plan import Binding
 from himpc.telemetry import Layout
 from lessons.events import Event, Reset, Set
 from lessons.scenes.scene import Scene
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from robots import InputError, Robot
 
 Array = NDArray[np.float64]
@@ -142,7 +142,7 @@ class Session(ABC):
     # ---------------------------------------------------------------- what is there to see
 
     @property
-    def settings_now(self) -> Settings:
+    def settings_now(self) -> SceneSettings:
         """The settings in force, and what else of the run a scene can begin with."""
         return self.settings
 

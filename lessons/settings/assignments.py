@@ -6,10 +6,10 @@ import json
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from robots import InputError
 
-S = TypeVar("S", bound=Settings)
+S = TypeVar("S", bound=SceneSettings)
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
@@ -72,7 +72,7 @@ def _parsed(text: str) -> Any:
         return None
 
 
-def differences(own: Settings, settings: Settings) -> tuple[str, ...]:
+def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
     """The assignments that turn a scene's own settings into others of the same scene.
 
     The controller comes first, so that what else it brings (its rate) is told only where it differs.

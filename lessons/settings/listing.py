@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lessons.settings.assignments import assignment
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 _BY_PLACE = re.compile(r"levels\.\d+\.\w+")
 
@@ -31,7 +31,7 @@ class SettingLine:
     help: str
 
 
-def lines(settings: Settings) -> list[SettingLine]:
+def lines(settings: SceneSettings) -> list[SettingLine]:
     """Every setting of a scene in the order of the page. Levels, which are also known by their place, come by
     their names."""
     paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
@@ -41,7 +41,7 @@ def lines(settings: Settings) -> list[SettingLine]:
     return [_line(settings, path, path) for path in paths]
 
 
-def reference(scenes: Sequence[Settings]) -> list[SettingLine]:
+def reference(scenes: Sequence[SceneSettings]) -> list[SettingLine]:
     """Every setting that any of some scenes of a kind has, names written as "*"; `now` is the first one's."""
     found: dict[str, SettingLine] = {}
     for settings in scenes:
@@ -53,11 +53,11 @@ def reference(scenes: Sequence[Settings]) -> list[SettingLine]:
     return sorted(found.values(), key=lambda line: order.index(line.path))
 
 
-def _pattern(settings: Settings, path: str) -> str:
+def _pattern(settings: SceneSettings, path: str) -> str:
     return next((entry.path for entry in settings.entries if entry.at(path)), path)
 
 
-def _line(settings: Settings, path: str, shown: str) -> SettingLine:
+def _line(settings: SceneSettings, path: str, shown: str) -> SettingLine:
     entry, place = settings.entry(path), settings.place(path)
     now = assignment(path, place.read(settings)).partition("=")[2]
     words = entry.label if not entry.help else entry.help

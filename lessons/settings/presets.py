@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from lessons.settings.entry import Entry
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 
-def usual_settings(settings: Settings) -> tuple[Entry, ...]:
+def usual_settings(settings: SceneSettings) -> tuple[Entry, ...]:
     """What can usually be compared in a scene, in the order of the page; the controllers are apart."""
     paths = [path for path, place in settings.places().items() if not place.shorthand]
     found = (entry.at(path) for entry in settings.entries if entry.tries for path in paths)

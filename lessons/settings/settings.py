@@ -16,7 +16,7 @@ from robots import InputError
 from robots.errors import unknown_name
 from robots.ranges import field_types
 
-S = TypeVar("S", bound="Settings")
+S = TypeVar("S", bound="SceneSettings")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Place:
         )
 
 
-class Settings(ABC):
+class SceneSettings(ABC):
     """Everything a learner can change of a scene; subclasses are frozen trees of frozen data."""
 
     entries: ClassVar[tuple[Entry, ...]]

@@ -23,7 +23,7 @@ from lessons.settings.levels import moved, ordered
 from lessons.settings.settings import (
     LevelKey,
     Place,
-    Settings,
+    SceneSettings,
     every_level,
     field_places,
     level_key,
@@ -54,7 +54,7 @@ Milliseconds = Annotated[float, Range(0.0, 1e3)]
 
 
 @dataclass(frozen=True)
-class TorqueSettings(Settings):
+class TorqueSettings(SceneSettings):
     """Settings of a run; see `himpc.controllers.Settings` for the controller's own.
 
     Attributes:

@@ -13,7 +13,7 @@ from lessons.events import Appear, Event
 from lessons.settings.entry import Entry
 from lessons.settings.levels import ordered
 from lessons.settings.missions import MissionOptions, Stay
-from lessons.settings.settings import Place, Settings, every_level, field_places, level_key, level_places
+from lessons.settings.settings import Place, SceneSettings, every_level, field_places, level_key, level_places
 from lessons.settings.values import NUMBER, WORD, Form
 from lessons.settings.velocity_entries import VELOCITY_ENTRIES
 from robots import InputError, VelocityPlantSettings
@@ -28,7 +28,7 @@ _RATE_HZ = {"htidkc": 50.0}
 
 
 @dataclass(frozen=True)
-class VelocitySettings(Settings):
+class VelocitySettings(SceneSettings):
     """Settings of a velocity-level run.
 
     Attributes:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lessons.events import Event
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 Script = tuple[tuple[float, Event], ...]
 """(time in s, event) in order; a torque-level scene takes those of `lessons.events` only."""
@@ -44,13 +44,13 @@ class Control:
         return isinstance(value, (int, float)) and self.low <= value <= self.high
 
 
-def chosen(settings: Settings, control: Control) -> Any:
+def chosen(settings: SceneSettings, control: Control) -> Any:
     """Which of a control's choices the settings have: the one that would change nothing; None if none is."""
     fitting = (each for each in control.choices if settings.changed(control.path, each) == settings)
     return next(fitting, None)
 
 
-def within(settings: Settings, control: Control) -> bool:
+def within(settings: SceneSettings, control: Control) -> bool:
     """Whether a setting stands where its control could have put it."""
     if control.choices:
         return chosen(settings, control) is not None

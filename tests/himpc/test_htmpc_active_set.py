@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from himpc.htmpc.active_set import CONTRADICTION, ActiveSet
-from himpc.htmpc.rows import Rows
+from himpc.htmpc.active_set import CONTRADICTION, ActiveSetSolver
+from himpc.htmpc.rows import ConstraintRows
 from himpc.qp import kkt_residual, solve_qp
 
 Array = np.ndarray
 
 
-def rows_of(A: Array, lower: Array, upper: Array) -> Rows:
+def rows_of(A: Array, lower: Array, upper: Array) -> ConstraintRows:
     nothing = np.zeros(len(A), np.int64)
-    return Rows(A, lower, upper, nothing, nothing, nothing)
+    return ConstraintRows(A, lower, upper, nothing, nothing, nothing)
 
 
 def problem(
@@ -39,7 +39,7 @@ def problem(
 @given(seed=st.integers(0, 10**6), n=st.integers(3, 25), count=st.integers(4, 60), equal=st.integers(1, 2))
 def test_points_and_residuals_are_those_of_a_solver(seed: int, n: int, count: int, equal: int) -> None:
     H, g, A, lower, upper = problem(np.random.default_rng(seed), n, count, equal)
-    method = ActiveSet()
+    method = ActiveSetSolver()
     assert method.begin(H)
     found = method.solve(g, rows_of(A, lower, upper), 0)
     assert found.solved
@@ -57,7 +57,7 @@ def test_a_warm_start_ends_where_a_cold_one_does(seed: int) -> None:
     """The same rows with other bounds, another gradient, and other rows at the end."""
     rng = np.random.default_rng(seed)
     H, g, A, lower, upper = problem(rng, 12, 40, 1)
-    warm, cold = ActiveSet(), ActiveSet()
+    warm, cold = ActiveSetSolver(), ActiveSetSolver()
     assert warm.begin(H)
     warm.solve(g, rows_of(A, lower, upper), 0)
     for _ in range(3):
@@ -80,7 +80,7 @@ def test_rows_that_contradict_each_other_are_found_out() -> None:
     H, g, A, lower, upper = problem(rng, 10, 30, 1)
     A[1], A[2] = A[0], 2.0 * A[0]
     lower[0], upper[0], lower[2], upper[2] = 1.0, 2.0, -np.inf, 1.0
-    method = ActiveSet()
+    method = ActiveSetSolver()
     assert method.begin(H)
     found = method.solve(g, rows_of(A, lower, upper), 0)
     assert found.status == CONTRADICTION
@@ -89,7 +89,7 @@ def test_rows_that_contradict_each_other_are_found_out() -> None:
 
 def test_numbers_that_are_none_are_not_solved() -> None:
     H, g, A, lower, upper = problem(np.random.default_rng(2), 6, 20, 1)
-    method = ActiveSet()
+    method = ActiveSetSolver()
     assert not method.begin(-H)
     for broken in (np.nan, np.inf):
         assert method.begin(H)

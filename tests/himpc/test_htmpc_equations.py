@@ -10,7 +10,7 @@ from htmpc_problems import FREE, at_home, mobile_settings, mobile_stack, point, 
 
 from himpc import FrameOrientation, FramePosition, Level
 from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
-from himpc.htmpc.active_set import ActiveSet
+from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.avoidance import Avoidance
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.continuing import braking, shifted
@@ -25,9 +25,9 @@ from himpc.htmpc.prediction import (
     underway,
     velocities,
 )
-from himpc.htmpc.problem import Iterate, Problem, Tick
-from himpc.htmpc.rows import Rows, Table, limit_rows
-from himpc.htmpc.settings import Bounds, efforts
+from himpc.htmpc.problem import Iterate, Problem, SharedStep
+from himpc.htmpc.rows import ConstraintRows, ConstraintTable, limit_rows
+from himpc.htmpc.settings import MotionBounds, efforts
 from himpc.htmpc.tracking import Guard, Tracking, tracking
 from himpc.references import Hold, Preview
 from himpc.rotation import exp3, log3
@@ -52,15 +52,15 @@ def start_of(robot: Robot, seed: int) -> Start:
     return Start(robot.home + rng.normal(0, 0.1, n), rng.normal(0, 0.3, n), rng.normal(0, 0.3, n))
 
 
-def tick_of(robot: Robot, **changes: object) -> Tick:
+def tick_of(robot: Robot, **changes: object) -> SharedStep:
     settings = mobile_settings(**({"horizon": 4} | changes))
     start = start_of(robot, 0)
     limits = bounds(robot, settings.limits)
     tasks = tuple(task for level in settings.stack for task in level.tasks)
     goals = previews(at_home(robot, np.array([0.4, -0.2])), 0.0, settings)
     collision = CollisionModel(robot, settings.obstacles)
-    table = Table(settings.horizon * robot.n)
-    return Tick(
+    table = ConstraintTable(settings.horizon * robot.n)
+    return SharedStep(
         robot=robot,
         data=robot.model.createData(),
         settings=settings,
@@ -71,7 +71,7 @@ def tick_of(robot: Robot, **changes: object) -> Tick:
         bounds=limits,
         plan=np.random.default_rng(9).normal(0, 0.5, (settings.horizon, robot.n)),
         avoidance=None if collision.empty else Avoidance(collision, settings.margin_m),
-        method=ActiveSet(),
+        method=ActiveSetSolver(),
         table=table,
     )
 
@@ -188,7 +188,7 @@ def test_effort_is_the_sum_it_is_written_as(robot: Robot) -> None:
 def test_relaxed_barrier_is_the_logarithm_inside_and_a_parabola_outside() -> None:
     label = np.zeros(1, np.int64)
     for upper in (1.0, 2e-3, -0.5):
-        rows = Rows(np.eye(1), np.array([-np.inf]), np.array([upper]), label, label, label)
+        rows = ConstraintRows(np.eye(1), np.array([-np.inf]), np.array([upper]), label, label, label)
         value, slope, curvature = barrier(rows, np.zeros(1))
         assert value == pytest.approx(barrier_value(rows, np.zeros(1)))
         numerical = numerical_gradient(lambda x, rows=rows: barrier_value(rows, x), np.zeros(1), 1e-7)
@@ -199,7 +199,9 @@ def test_relaxed_barrier_is_the_logarithm_inside_and_a_parabola_outside() -> Non
         if upper == 1.0:
             assert value == pytest.approx(-MU * np.log(upper))
     edge = [
-        barrier(Rows(np.eye(1), np.array([-np.inf]), np.array([h]), label, label, label), np.zeros(1))
+        barrier(
+            ConstraintRows(np.eye(1), np.array([-np.inf]), np.array([h]), label, label, label), np.zeros(1)
+        )
         for h in (ZETA * (1 - 1e-9), ZETA * (1 + 1e-9))
     ]
     for below, above in zip(*edge, strict=True):
@@ -268,7 +270,7 @@ def test_previews_of_positions_and_rotations_become_goals() -> None:
 # ------------------------------------------------------------------ rows
 
 
-def excess(start: Start, U: Array, dt: float, limits: Bounds) -> dict[str, float]:
+def excess(start: Start, U: Array, dt: float, limits: MotionBounds) -> dict[str, float]:
     """By how much inputs leave each kind of bound, worst joint and knot; measured on the motion itself."""
     q, v = positions(start, U, dt), velocities(start, U, dt)
     change = np.diff(np.vstack([start.u, U]), axis=0)
@@ -280,7 +282,7 @@ def excess(start: Start, U: Array, dt: float, limits: Bounds) -> dict[str, float
     }
 
 
-def violation(rows: Rows, u: Array) -> float:
+def violation(rows: ConstraintRows, u: Array) -> float:
     """By how much u leaves the bounds, largest row."""
     value = rows.A @ u
     return max(0.0, float(np.maximum(rows.lower - value, value - rows.upper).max(initial=0.0)))
@@ -334,7 +336,7 @@ def test_widened_rows_contain_what_they_were_widened_for(robot: Robot) -> None:
     u = braking(start, 5, 0.1, 0.1, limits).ravel()
     assert violation(rows, u) > 0.1
     assert violation(rows.widened(u), u) == 0.0
-    table = Table(45)
+    table = ConstraintTable(45)
     rows = limit_rows(start, 5, 0.1, 0.1, limits, table)
     table.about(u, len(rows.A))
     assert table.outside(len(rows.A)) == pytest.approx(violation(rows, u))

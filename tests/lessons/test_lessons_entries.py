@@ -13,7 +13,7 @@ from lessons.scenes.names import ALL_SCENES
 from lessons.settings.assignments import parse_assignment
 from lessons.settings.listing import lines
 from lessons.settings.presets import usual_settings
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.settings.values import NUMBER, WHOLE
 from lessons.settings.velocity_entries import VELOCITY_ENTRIES
@@ -21,7 +21,7 @@ from robots import InputError
 
 
 @cache
-def settings_of(scene: str) -> Settings:
+def settings_of(scene: str) -> SceneSettings:
     return load_scene(scene, "planar3" if scene == "hold" else None).settings
 
 

@@ -15,7 +15,7 @@ from app.panels.lesson.cards import add_cards, add_invitation
 from app.panels.lesson.exercise_cards import exercise_cards
 from app.panels.lesson.step import LessonPanel
 from app.panels.widgets.window import PopupWindow
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 
 class Course:
@@ -28,7 +28,7 @@ class Course:
         exercise: LessonPlace | None,
         notebook: Notebook,
         choose: Callable[[SceneChoice], None],
-        settings: Callable[[], Settings],
+        settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
         """exercise: the one that is on, if any."""
@@ -77,7 +77,7 @@ class Course:
         self._list.close()
         self._choose(choice)
 
-    def follow(self, lecture: Lecture | None, settings: Settings) -> None:
+    def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
         """Shows how far the lesson is."""
         if self._panel is not None:
             self._panel.follow(lecture, settings)

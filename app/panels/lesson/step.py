@@ -21,7 +21,7 @@ from app.panels.widgets.command import add_command
 from app.panels.widgets.controls import add_control
 from app.panels.widgets.mirror import Bindings
 from lessons.events import Event
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Step
 
@@ -42,7 +42,7 @@ class LessonPanel:
         choose: Callable[[SceneChoice], None],
         all_lessons: Callable[[], None],
         notebook: Notebook,
-        settings: Callable[[], Settings],
+        settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
         """pictures: where the curves of the run are drawn."""
@@ -69,7 +69,7 @@ class LessonPanel:
         last = exercise.place + 1 >= len(parts_of(exercise.whole))
         self._exercises = belonging_to(exercise.lesson) if last else ""
         self._shown: dict[str, str] = {}
-        self._bindings: Bindings[Settings] = Bindings(self._post, self._loop)
+        self._bindings: Bindings[SceneSettings] = Bindings(self._post, self._loop)
         with self._tab:
             self._all = self._gui.add_folder(None)
         with self._all:
@@ -183,7 +183,7 @@ class LessonPanel:
 
     # ---------------------------------------------------------------- showing
 
-    def follow(self, lecture: Lecture | None, settings: Settings) -> None:
+    def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
         """Shows how far the exercise is."""
         if lecture is None:
             return

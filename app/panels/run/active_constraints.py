@@ -7,7 +7,7 @@ import viser
 from app.html.palette import RGB
 from app.html.text import block, esc, swatch
 from app.panels.widgets.snapshot import SessionSnapshot
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 _HEAD = '<tr style="text-align:left">{}</tr>'
 
@@ -27,7 +27,7 @@ class BindingPanel:
         with gui.add_folder("Time at bounds since the reset"):
             self._times = gui.add_html("")
 
-    def update(self, now: SessionSnapshot[Settings]) -> None:
+    def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         rows = "".join(
             f"<tr><td>{swatch(self._colours.get(row.level, (139, 149, 161)))}{esc(row.level)}</td>"
             f"<td>{esc(row.joint)}</td><td>{esc(row.kind)} {esc(row.side)}</td>"

@@ -15,7 +15,7 @@ from app.link.messages import Post
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.session.ghost import swapped
 from lessons.settings.presets import usual_settings
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.teaching.lesson import Ghost
 from robots import InputError
 
@@ -32,7 +32,7 @@ class ComparePanel:
         self,
         gui: viser.GuiApi,
         learner: SimulationClient,
-        settings: Settings,
+        settings: SceneSettings,
         colours: dict[str, RGB],
     ) -> None:
         self._learner, self._colours = learner, colours
@@ -114,7 +114,7 @@ class ComparePanel:
             learner.send(Post(event))
         learner.start_ghost(Ghost(", ".join(own), own))
 
-    def update(self, now: SessionSnapshot[Settings]) -> None:
+    def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         """Shows what is."""
         ghost = self._learner.ghost
         on = ghost is not None
@@ -130,7 +130,7 @@ class ComparePanel:
             return
         self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
 
-    def _results(self, now: SessionSnapshot[Settings], mine: RunFigures, its: RunFigures) -> str:
+    def _results(self, now: SessionSnapshot[SceneSettings], mine: RunFigures, its: RunFigures) -> str:
         places = {level.name: place for place, level in enumerate(now.settings.levels, start=1)}
         tasks = sorted(now.ready.layout.tasks, key=lambda task: places.get(task.level, 99))
         rows = [
@@ -162,7 +162,7 @@ class ComparePanel:
         )
 
 
-def _legend(words: str, now: SessionSnapshot[Settings]) -> str:
+def _legend(words: str, now: SessionSnapshot[SceneSettings]) -> str:
     slow = ""
     if now.status.capped:
         slow = (

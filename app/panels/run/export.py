@@ -16,7 +16,7 @@ from app.html.text import block
 from lessons.plots.recorded import Recorded, run_picture
 from lessons.recording.arrays import named
 from lessons.recording.table import as_csv, as_npz
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 
@@ -25,7 +25,7 @@ class ExportPanel:
     """Files are made on viser's threads, from what the learner has recorded; the simulation is not asked."""
 
     def __init__(
-        self, gui: viser.GuiApi, learner: SimulationClient, settings: Callable[[], Settings]
+        self, gui: viser.GuiApi, learner: SimulationClient, settings: Callable[[], SceneSettings]
     ) -> None:
         self._learner, self._settings = learner, settings
         gui.add_html(_INTRO)

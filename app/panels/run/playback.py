@@ -20,7 +20,7 @@ from app.panels.widgets.command import add_command
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Reset
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 
@@ -108,7 +108,7 @@ class PlaybackPanel:
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 
-    def update(self, now: SessionSnapshot[Settings]) -> None:
+    def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         status = now.status
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:

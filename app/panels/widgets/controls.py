@@ -14,11 +14,11 @@ from app.panels.widgets.logarithmic import STEPS, only_track, place_of, value_at
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
 from lessons.settings.entry import Entry
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.values import SWITCH, WHOLE, WORD
 from lessons.teaching.control import Control, chosen
 
-S = TypeVar("S", bound=Settings)
+S = TypeVar("S", bound=SceneSettings)
 
 
 class Controls(Generic[S]):
@@ -146,7 +146,7 @@ class Controls(Generic[S]):
 
 
 def add_control(
-    gui: viser.GuiApi, bindings: Bindings[Settings], control: Control, settings: Settings
+    gui: viser.GuiApi, bindings: Bindings[SceneSettings], control: Control, settings: SceneSettings
 ) -> None:
     """A lesson's control: in the lesson's words, and within its range even where the setting is not."""
     if control.choices and control.choices != (False, True):
@@ -155,18 +155,18 @@ def add_control(
     entry = Entry(control.path, control.words, low=control.low, high=control.high, log=control.log)
     read = settings.place(control.path).read
 
-    def inside(settings: Settings) -> float:
+    def inside(settings: SceneSettings) -> float:
         return min(max(scalar(read(settings)), control.low), control.high)
 
     Controls(gui, bindings, settings).add_as(entry, read if control.choices or control.log else inside)
 
 
 def _add_choices(
-    gui: viser.GuiApi, bindings: Bindings[Settings], control: Control, settings: Settings
+    gui: viser.GuiApi, bindings: Bindings[SceneSettings], control: Control, settings: SceneSettings
 ) -> None:
     of = {_words(choice): choice for choice in control.choices}
 
-    def shown(settings: Settings, otherwise: str) -> str:
+    def shown(settings: SceneSettings, otherwise: str) -> str:
         found = chosen(settings, control)
         return otherwise if found is None else _words(found)
 

@@ -8,9 +8,9 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from app.link.messages import Ready, Status
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 
-S_co = TypeVar("S_co", bound=Settings, covariant=True)
+S_co = TypeVar("S_co", bound=SceneSettings, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)

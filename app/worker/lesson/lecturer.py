@@ -17,7 +17,7 @@ from app.worker.lesson.reference_run import ghost_of
 from app.worker.lesson.rows import LessonRows, thinned
 from lessons.events import Event
 from lessons.session.session import Session
-from lessons.settings.settings import Settings, settings_after
+from lessons.settings.settings import SceneSettings, settings_after
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.control import within
 from lessons.teaching.lesson import Step
@@ -92,7 +92,7 @@ class Lecturer:
             and self.answer is None
         )
 
-    def settings(self, own: bool) -> Settings:
+    def settings(self, own: bool) -> SceneSettings:
         """What a run begins with: the lesson's own settings, or those the learner made of them. What the
         script changed in the last run is undone either way."""
         if own and isinstance(self._part, Step):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arena import Array, Whole
-from himpc.tick.kernel.level import Level
+from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
 
@@ -52,7 +52,7 @@ class ActiveSet(NamedTuple):
 
 
 @inline_kernel
-def normal_of(level: Level, active: ActiveSet, index: int, L: Array, low: Array, high: Array) -> None:
+def normal_of(level: LevelQP, active: ActiveSet, index: int, L: Array, low: Array, high: Array) -> None:
     """Coefficients, scaled coefficients and target of row `index`."""
     r, a = active.row[index], active.joint[index]
     normal, scaled_normal = active.normal[index], active.scaled_normal[index]
@@ -128,7 +128,7 @@ def without(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> Non
 
 
 @inline_kernel
-def update_multipliers(level: Level, active: ActiveSet, k: int, ideal: Array) -> None:
+def update_multipliers(level: LevelQP, active: ActiveSet, k: int, ideal: Array) -> None:
     """Multipliers of k rows as equalities; `ideal` is the white point without any row."""
     d = level.offset[len(level.start)]
     for p in range(k):
@@ -138,7 +138,7 @@ def update_multipliers(level: Level, active: ActiveSet, k: int, ideal: Array) ->
 
 
 @inline_kernel
-def point_from_multipliers(level: Level, active: ActiveSet, k: int, ideal: Array) -> None:
+def point_from_multipliers(level: LevelQP, active: ActiveSet, k: int, ideal: Array) -> None:
     """The point that belongs to the multipliers of k rows."""
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
@@ -154,7 +154,7 @@ def point_from_multipliers(level: Level, active: ActiveSet, k: int, ideal: Array
 
 
 @inline_kernel
-def refine(level: Level, active: ActiveSet, k: int) -> float:
+def refine(level: LevelQP, active: ActiveSet, k: int) -> float:
     """The optimum with the first k rows as equalities, from a point and multipliers near it. Returns its KKT
     residual, −1 if there is none within reach.
 

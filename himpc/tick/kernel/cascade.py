@@ -8,7 +8,7 @@ from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.bases import no_directions, projected_rows, take_directions
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.goldfarb_idnani import FAILED, optimum
-from himpc.tick.kernel.level import Level, prepare
+from himpc.tick.kernel.level import LevelQP, prepare
 from himpc.tick.kernel.linear import copy_rows, dot
 
 FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
@@ -64,7 +64,7 @@ def own_directions(
 
 
 @inline_kernel
-def keep_above(level: Level, U_above: Array, knots: int) -> None:
+def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
     """What (33) fixes of U_{i−1}, (N, n): its part in the directions of the levels above; all of it beyond
     the level's own horizon (Remark 8)."""
     N, n = U_above.shape
@@ -97,7 +97,7 @@ def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Wh
 def solve_problem(
     index: int,
     levels: Whole,
-    level: Level,
+    level: LevelQP,
     active: ActiveSet,
     B: Array,
     free: Array,

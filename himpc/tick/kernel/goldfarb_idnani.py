@@ -23,7 +23,7 @@ from himpc.tick.kernel.active_set import (
 )
 from himpc.tick.kernel.arena import Array, Whole
 from himpc.tick.kernel.bounds import constraint_values
-from himpc.tick.kernel.level import Level, increments
+from himpc.tick.kernel.level import LevelQP, increments
 from himpc.tick.kernel.linear import backward
 from himpc.tick.kernel.violated import farthest, lengths, most_violated
 
@@ -48,7 +48,7 @@ FAILED = -1.0
 
 @inline_kernel
 def warm_start(
-    level: Level,
+    level: LevelQP,
     active: ActiveSet,
     count: int,
     row: Whole,
@@ -79,7 +79,7 @@ def warm_start(
 
 
 @inline_kernel
-def release(level: Level, active: ActiveSet, k: int, ideal: Array, budget: Array) -> int:
+def release(level: LevelQP, active: ActiveSet, k: int, ideal: Array, budget: Array) -> int:
     """Lets rows go until the multipliers of all that stay push the right way; returns how many stay.
 
     Those that pull hardest go first: where a row goes, the multipliers of its neighbours often turn, and rows
@@ -104,7 +104,7 @@ def release(level: Level, active: ActiveSet, k: int, ideal: Array, budget: Array
 
 
 @inline_kernel
-def take(level: Level, active: ActiveSet, k: int, excess: float, budget: Array) -> tuple[bool, int]:
+def take(level: LevelQP, active: ActiveSet, k: int, excess: float, budget: Array) -> tuple[bool, int]:
     """Takes the row at place k, violated by `excess`, as an equality: the dual step. Returns whether a point
     meets this row and the others, within the budget, and how many rows are taken then."""
     D = level.rest[len(level.start)]
@@ -156,7 +156,7 @@ def take(level: Level, active: ActiveSet, k: int, excess: float, budget: Array) 
 
 @inline_kernel
 def optimum(
-    level: Level,
+    level: LevelQP,
     active: ActiveSet,
     count: int,
     row: Whole,

@@ -11,7 +11,7 @@ from himpc.tick.kernel.linear import dot, factorise, forward
 from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian
 
 
-class Level(NamedTuple):
+class LevelQP(NamedTuple):
     """min ½ρ‖x‖² + ½ρ‖x'‖² + ½‖e₀ + G x‖², where U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j).
 
     Coordinates of a knot stand in this order: those of the levels above, which (33) keeps; the level's own x,
@@ -63,7 +63,7 @@ class Level(NamedTuple):
 
 
 @inline_kernel
-def prepare(level: Level, B: Array, free: Array, root_Q: Array, ideal: Array) -> bool:
+def prepare(level: LevelQP, B: Array, free: Array, root_Q: Array, ideal: Array) -> bool:
     """e₀, the factor F and `ideal`, the optimum without any row in white coordinates Fᵀx. False if the
     Hessian is not positive: nothing is finite then."""
     first, last = level.first, level.last
@@ -92,7 +92,7 @@ def prepare(level: Level, B: Array, free: Array, root_Q: Array, ideal: Array) ->
 
 
 @inline_kernel
-def increments(level: Level, U: Array) -> None:
+def increments(level: LevelQP, U: Array) -> None:
     """U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j), (N, n) N·m."""
     N, n = U.shape
     for j in range(N):

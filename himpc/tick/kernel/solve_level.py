@@ -18,7 +18,7 @@ from himpc.tick.kernel.cascade import (
     solve_problem,
 )
 from himpc.tick.kernel.goldfarb_idnani import FAILED
-from himpc.tick.kernel.level import Level
+from himpc.tick.kernel.level import LevelQP
 
 _SHARE = 0.75
 """What one attempt at a level may take of what is left, so that levels below it get theirs; the last one may
@@ -84,7 +84,7 @@ def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: in
         own_directions(i, levels, B, metric[i], reflector, Q, projected_jacobian, count, start)
         left = count_coordinates(levels[i, KNOTS], n, count, start, offset, rest)
         whole[whole_where[WHOLE_AT.left] + i] = left
-    level = Level(
+    level = LevelQP(
         levels[i, FIRST],
         levels[i, LAST],
         data[where[AT.rho] + i],

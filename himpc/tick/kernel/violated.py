@@ -7,7 +7,7 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.active_set import ActiveSet
 from himpc.tick.kernel.arena import Array
-from himpc.tick.kernel.level import Level
+from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import dot, forward, subtract
 
 _SHORT = 1e-9
@@ -49,7 +49,7 @@ def farthest(
 
 
 @inline_kernel
-def lengths(level: Level, active: ActiveSet, k: int, length: Array, budget: Array) -> None:
+def lengths(level: LevelQP, active: ActiveSet, k: int, length: Array, budget: Array) -> None:
     """How long the white coefficients of all rows are, (b, n); behind `k` rows there is room to work."""
     N, n = level.fixed.shape
     d, D = level.offset[N], level.rest[N]

@@ -13,7 +13,7 @@ import numpy as np
 
 from lessons.own.files import fingerprint, is_file
 from lessons.scenes.run_spec import RunSpec
-from lessons.settings.settings import Settings
+from lessons.settings.settings import SceneSettings
 from lessons.settings.values import WHOLE
 from robots import InputError
 
@@ -91,7 +91,7 @@ def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
     return Sweep(base, axes)
 
 
-def _axis(text: str, settings: Settings) -> Axis:
+def _axis(text: str, settings: SceneSettings) -> Axis:
     path, equals, span = text.partition("=")
     parts = span.split(":")
     try:
