@@ -18,7 +18,7 @@ Whole = NDArray[np.int64]
 
 
 class Felt(NamedTuple):
-    """Rows with a multiplier: kind, knot and part as in `Rows`, and the multipliers, all (r,)."""
+    """Rows with a multiplier: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,)."""
 
     kind: Whole
     knot: Whole

@@ -28,7 +28,7 @@ class ActiveSet(NamedTuple):
 
     Attributes:
         row, joint, side: which they are, and whether the upper (1) or the lower bound (−1).
-        normal: their a, in the coordinates of `Level`.
+        normal: their a, in the coordinates of `LevelQP`.
         scaled_normal: the same where the Hessian is one: F⁻¹ a, a'/√ρ.
         orthonormal_basis, cholesky_factor: orthonormal rows, and the lower triangle of
             scaled_normal = cholesky_factor · orthonormal_basis.

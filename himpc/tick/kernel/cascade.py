@@ -82,7 +82,7 @@ def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
 
 @inline_kernel
 def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Whole, rest: Whole) -> int:
-    """Where own coordinates and those beyond stand, see `Level`; returns how many there are."""
+    """Where own coordinates and those beyond stand, see `LevelQP`; returns how many there are."""
     N = len(start)
     offset[0] = 0
     for j in range(N):
