@@ -1,4 +1,4 @@
-"""What the robot is: its description, its catalog, and the simulated plant."""
+"""The robot: its description, the catalog of robots, and the simulated plant."""
 
 from typing import TYPE_CHECKING
 

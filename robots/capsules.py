@@ -1,4 +1,5 @@
-"""A clean look for bodies without meshes: capsules from joint to joint, a drum where a joint turns."""
+"""Generates visual shapes for bodies without meshes: capsules from joint to joint, and a drum at each
+revolute joint."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ Colour = tuple[int, int, int]
 _BODY: Colour = (222, 226, 231)
 _DRUM: Colour = (74, 82, 94)
 _TIP: Colour = (236, 122, 44)
-_SHORTEST = 0.004  # m: nearer than this two joints share one drum
-_SLENDER = 0.05  # radius over the length of the whole chain
+_SHORTEST = 0.004  # m: two joints that are closer than this share one drum
+_SLENDER = 0.05  # capsule radius divided by the length of the whole chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,8 @@ class MeshPart:
 
 
 def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[MeshPart]:
-    """Pieces for every body of the model that is not in `drawn`. tip: frame index of the end-effector."""
+    """Generates the shapes of every body of the model that is not in `drawn`. tip: frame index of the
+    end-effector."""
     thickness = _SLENDER * max(_chain_length(model, tip), 0.05)
     for joint in range(model.njoints):
         if joint in drawn:
@@ -56,7 +58,7 @@ def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[MeshP
 
 
 def _farthest(model: pin.Model, joint: int) -> np.ndarray:
-    """Of the frames that a last body carries, in its joint's frame, m."""
+    """Position of the farthest frame that a last body carries, in its joint's frame, m."""
     own = [frame.placement.translation for frame in model.frames if frame.parentJoint == joint]
     return max(own, key=lambda at: float(np.linalg.norm(at)))
 
@@ -82,7 +84,7 @@ def _limb(joint: int, end: np.ndarray, radius: float, colour: Colour, k: int) ->
 
 
 def _pedestal(top: np.ndarray, radius: float) -> Iterator[MeshPart]:
-    """A column from the floor to the first joint, or a flat foot when that joint is on the floor."""
+    """Generates a column from the floor to the first joint, or a flat foot if that joint is on the floor."""
     height = max(float(np.linalg.norm(top)), 0.5 * radius)
     end = top if float(np.linalg.norm(top)) > 0.5 * radius else np.array([0.0, 0.0, -height])
     solid = trimesh.creation.cylinder(radius, height, sections=40)
@@ -120,7 +122,7 @@ def _hard_edged(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _radius(model: pin.Model, joint: int, thickness: float) -> float:
-    """Thinner towards the tip: a chain reads better when it tapers."""
+    """Radius of a capsule, m: it decreases towards the tip, which makes the chain easier to see."""
     depth = len(model.supports[joint]) - 1
     deepest = max(len(support) for support in model.supports) - 1
     return thickness * (1.0 - 0.4 * depth / max(deepest, 1))

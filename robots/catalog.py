@@ -1,4 +1,5 @@
-"""The robots that come with the project: a URDF of ours per folder, and what a URDF cannot say."""
+"""The catalog of robots that come with the project: one URDF per folder, and the data that a URDF cannot
+contain."""
 
 from __future__ import annotations
 
@@ -31,7 +32,7 @@ class CatalogEntry:
     @property
     def home(self) -> np.ndarray:
         """(n,) rad."""
-        import numpy as np  # not above: the catalog is read where no number is computed
+        import numpy as np  # imported here, which keeps NumPy out of programs that only list the catalog
 
         return np.radians(self.home_deg)
 
@@ -84,7 +85,7 @@ CATALOG: dict[str, CatalogEntry] = {
                 59.0,
                 29.0,
             ),
-            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # ours: what its torques are good for
+            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # our estimate of what its torques can produce
             M_bar=(0.046, 0.46, 0.0144, 0.0736, 0.0046, 0.0127, 0.0004) * 2,  # suggest_M_bar
         ),
         CatalogEntry(

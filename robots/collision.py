@@ -1,4 +1,4 @@
-"""What a robot must not touch, and the spheres that stand for it: geometry as arrays."""
+"""Geometry for collision avoidance as arrays: the obstacles, and the spheres that approximate the robot."""
 
 from __future__ import annotations
 
@@ -66,18 +66,19 @@ def _check(name: str, numbers: tuple[float, ...], *sizes: float) -> None:
 
 
 class Surroundings(NamedTuple):
-    """Spheres s of a robot, and shapes o near it.
+    """Arrays of the spheres s of a robot and of the shapes o that it must not touch.
 
     Attributes:
-        links: of the spheres, by name.
-        joint: (S,) that carries a sphere. centre: (S, 3) m in that joint's axes. radius: (S,) m.
-        names: of the shapes.
+        links: names of the links that carry the spheres.
+        joint: (S,) index of the joint that carries each sphere. centre: (S, 3) m in that joint's axes.
+            radius: (S,) m.
+        names: names of the shapes.
         kind: (O,) FLOOR, BALL or BOX.
-        carrier: (O,) joint that carries a shape, 0 for the world.
+        carrier: (O,) index of the joint that carries each shape, 0 for the world.
         turn: (O, 3, 3) and middle: (O, 3) m, the shape's axes and middle in its carrier's; for a floor a
             point of its surface.
         half: (O, 3) m, half the edges of a box; a ball's radius comes first.
-        meets: (O, S) whether a pair counts.
+        meets: (O, S) whether the distance of a pair is checked.
     """
 
     links: tuple[str, ...]
@@ -104,13 +105,14 @@ class _Shape(NamedTuple):
 
 
 def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: bool = False) -> Surroundings:
-    """The spheres of a robot and what they must not touch: obstacles, and for the arm its own base."""
+    """Collects the spheres of a robot and the shapes that they must not touch: obstacles, and for the arm its
+    own base."""
     spheres = covering_spheres(robot)
     frames = [robot.model.frames[robot.frame_id(sphere.link)] for sphere in spheres]
     joint = np.array([frame.parentJoint for frame in frames], np.intp)
     centre = [frame.placement.act(np.array(one.centre)) for frame, one in zip(frames, spheres, strict=True)]
     radius = np.array([sphere.radius for sphere in spheres])
-    # Spheres of a body that some unbounded joints carry over the floor: a mobile base.
+    # Spheres of a mobile base, a body that unbounded joints move over the floor.
     free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
     base = max((j for j in range(robot.n + 1) if j > 2 and free[:j].all()), default=0)
     shapes = [_shape(obstacle, joint, base) for obstacle in obstacles]

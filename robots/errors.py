@@ -1,20 +1,20 @@
-"""The one exception a user's mistake raises, and how a wrong name is answered."""
+"""`InputError`, which every invalid input raises, and the error message for an unknown name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-_LISTED = 600  # characters of choices in a message: all of the catalog, not all frames of a stranger
-_COMPARED = 100  # characters of a name that are compared: the time grows with their square
+_LISTED = 600  # largest number of characters that the list of choices takes: the whole catalog fits
+_COMPARED = 100  # number of characters of a name that are compared: the computing time grows with its square
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used; the message is one sentence that says what to do next."""
+    """An input cannot be used. The message is one sentence that says what to do next."""
 
 
 def shortened(text: str, most: int = 60) -> str:
-    """A name or path as a message quotes it: printable, its middle left out where it is too long."""
+    """Makes a name or path printable for a message and leaves out its middle if it is too long."""
     if len(text) > most:
         head = (most - 3) // 3
         text = text[:head] + "..." + text[len(text) - (most - 3 - head) :]
@@ -22,14 +22,15 @@ def shortened(text: str, most: int = 60) -> str:
 
 
 def nearest_name(name: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """The choice most like a name, if any is alike."""
+    """Returns the choice that is most similar to a name, or None if no choice is similar."""
     folded = {choice.casefold(): choice for choice in reversed(list(choices))}
     close = get_close_matches(name[:_COMPARED].casefold(), folded, n=1, cutoff=cutoff)
     return folded[close[0]] if close else None
 
 
 def unknown_name(what: str, name: str, choices: Iterable[str], hint: str = "") -> InputError:
-    """The error for a name that is not among `choices`: it names the nearest one and lists them all."""
+    """Builds the error for a name that is not among `choices`: the message names the nearest choice and lists
+    them all."""
     names = [str(choice) for choice in choices]
     close = nearest_name(str(name), names, cutoff=0.4)
     nearest = f"did you mean '{shortened(close)}'? " if close else ""

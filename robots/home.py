@@ -1,4 +1,5 @@
-"""For robots nobody described by hand: a tip, a home configuration, and accelerations to count on."""
+"""Estimates a tip frame, a home configuration and acceleration limits for robots that are not in the
+catalog."""
 
 from __future__ import annotations
 
@@ -15,11 +16,12 @@ _TIP_NAMES = re.compile(
 )
 _CANDIDATES = 300
 _STEPS = 60
-_PLAIN = 0.05  # score given up for a joint that rests at the middle of its range
+_PLAIN = 0.05  # loss of score that is accepted to put a joint at the middle of its range
 
 
 def choose_tip(model: pin.Model, frames: dict[str, int]) -> str:
-    """The frame at the end of the longest chain of joints, with a name such as `tool0` if one has it."""
+    """Returns the frame at the end of the longest chain of joints; a frame with a name such as `tool0` is
+    preferred."""
     depth = {name: len(model.supports[model.frames[i].parentJoint]) - 1 for name, i in frames.items()}
     deepest = max(depth.values())
     ends = [name for name in frames if depth[name] == deepest]
@@ -34,12 +36,12 @@ def choose_tip(model: pin.Model, frames: dict[str, int]) -> str:
 def find_home(
     model: pin.Model, frame: int, q_lower: np.ndarray, q_upper: np.ndarray, seed: int = 0
 ) -> np.ndarray:
-    """(n,) rad a configuration inside the limits, away from singularities and from the limits.
+    """Returns a configuration (n,), rad, inside the limits and away from singularities and from the limits.
 
     Maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖² over samples and then by coordinate
     steps, J with its linear part over the reach; deterministic. Joints that do not move the frame rest
     at the middle of their range (unbounded ones at 0). A chain that dips below
-    the floor (z = 0, or the first joint if lower) loses, an elbow above the tip wins.
+    the floor (z = 0, or the first joint if lower) gets a lower score, an elbow above the tip a higher one.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -54,7 +56,7 @@ def find_home(
     floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
 
     def score(q: np.ndarray) -> float:
-        # Of a single joint Pinocchio hands out the column without its second axis.
+        # For a single joint Pinocchio returns the Jacobian as a one-dimensional array.
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
         jacobian = J[:, moving]
         jacobian[:3] /= reach
@@ -98,7 +100,8 @@ def find_home(
 def sensible_a_max(
     model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray, tau_limit: np.ndarray
 ) -> np.ndarray:
-    """(n,) rad/s² half of what the torque left after gravity can do to each joint, within [1, 15].
+    """Returns half the acceleration (n,), rad/s², that each joint's torque allows after gravity, within [1,
+    15].
 
     a_i = ½ min over samples of (τ_i − |g_i|)/M_ii: the other half is for coupling and tracking.
     """

@@ -1,4 +1,5 @@
-"""A URDF document as a robot, with everything nobody described. In the calling process, without limits."""
+"""Builds a robot from a URDF document and estimates the data that the document lacks. It runs in the calling
+process, without limits on time or memory."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ _TRIAL = 5  # periods of 1 ms
 
 @dataclass(frozen=True)
 class Import:
-    """What became of a description: the report, and the robot unless something was refused."""
+    """Result of an import: the report, and the robot unless the description was refused."""
 
     report: ImportReport
     robot: Robot | None = None
@@ -43,17 +44,17 @@ def import_robot(
     tip: str | None = None,
     within: Path | None = None,
 ) -> Import:
-    """The robot of a URDF document, after a first few milliseconds in the plant.
+    """Builds the robot of a URDF document and tests it in the plant for a few milliseconds.
 
     Args:
         data: the document.
-        source: how messages name it.
-        folder: where its mesh paths start from; None: it may see the meshes of installed packages only.
-        tip: its default end-effector frame; None takes the end of the longest chain.
-        within: outside of which no other mesh is looked at; None: no such limit.
+        source: name of the document in messages.
+        folder: folder that its mesh paths are relative to; None: only meshes of installed packages are used.
+        tip: default end-effector frame; None: the end of the longest chain.
+        within: folder that must contain all other meshes; None: meshes may be anywhere.
 
     Raises:
-        InputError: the tip is no frame of it. What else is wrong is in the report.
+        InputError: the tip is not a frame of the robot. All other problems are in the report.
     """
     canonical, report = canonicalise(data, source, folder, within)
     if canonical is None:
@@ -73,7 +74,7 @@ def bounds(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
-    """None if the mass matrix is singular."""
+    """Builds the robot from a canonical description; None if the mass matrix is singular."""
     model = canonical.model
     lower, upper = bounds(model)
     frames = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
@@ -104,7 +105,7 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
 
 
 def _trial(robot: Robot) -> str | None:
-    """Why the robot cannot be simulated, or None."""
+    """Simulates the robot briefly and returns the problem that makes this impossible, or None."""
     try:
         plant = Plant(robot)
         for _ in range(_TRIAL):

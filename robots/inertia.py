@@ -1,4 +1,5 @@
-"""M̄ of time-delay estimation: a suggestion for any robot, and the gauge of its convergence."""
+"""M̄ of time-delay estimation: a suggested value for any robot, and a measure of convergence for a given
+M̄."""
 
 from __future__ import annotations
 
@@ -10,11 +11,12 @@ import pinocchio as pin
 LARGEST_EIGENVALUE = 1.5
 """λ_max(M⁻¹M̄) of a suggested M̄ over the sampled configurations; 2 is the edge of stability."""
 
-_WIDEST = 40.0  # rad or m: a joint allowed many turns is the same robot in each of them
+_WIDEST = 40.0  # rad or m: the widest range that is sampled; further turns repeat the same configurations
 
 
 def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Limits to sample in: ±π for an unbounded joint, one turn from the end of a one-sided one."""
+    """Returns the limits to sample within: ±π for an unbounded joint, and one turn from the finite limit of a
+    joint that is bounded on one side."""
     turn = 2.0 * np.pi
     from_above = np.where(np.isfinite(q_upper), q_upper - turn, -np.pi)
     from_below = np.where(np.isfinite(q_lower), q_lower + turn, np.pi)
@@ -27,7 +29,7 @@ def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, 
 def sample_configurations(
     q_lower: np.ndarray, q_upper: np.ndarray, samples: int, seed: int = 0
 ) -> np.ndarray:
-    """(samples, n) configurations, uniform inside the limits; unbounded joints within ±π."""
+    """Samples configurations (samples, n) uniformly inside the limits, and within ±π for unbounded joints."""
     lower, upper = finite_range(q_lower, q_upper)
     return np.random.default_rng(seed).uniform(lower, upper, size=(samples, len(lower)))
 
@@ -38,7 +40,7 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
 
 
 def _symmetric(M: np.ndarray) -> np.ndarray:
-    """The matrices (…, n, n) whose upper triangles these have."""
+    """Completes upper triangular matrices (…, n, n) to symmetric ones."""
     return np.where(np.tri(M.shape[-1], k=-1, dtype=bool), M.swapaxes(-1, -2), M)
 
 
@@ -78,7 +80,7 @@ def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
     inverse, root = np.linalg.inv(M), np.sqrt(diagonal)
     error = np.eye(len(diagonal)) - inverse * diagonal
     largest = float(np.abs(error).max()) or 1.0
-    error /= largest  # so that its squares stay finite
+    error /= largest  # scaled, which keeps its squares finite
     squares, values = np.linalg.eigvalsh(np.array((error.T @ error, root[:, None] * inverse * root)))
     return largest * math.sqrt(max(float(squares[-1]), 0.0)), float(np.abs(1.0 - values).max())
 

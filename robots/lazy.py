@@ -1,4 +1,4 @@
-"""Packages that show names without loading what stands behind them (PEP 562)."""
+"""Lazy packages: a public name is visible at once, and its module is imported on first use (PEP 562)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 
 def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package: a name's module is imported when the name is first asked for.
+    """Returns the `__getattr__` of a package that imports the module of a name on first use.
 
     Args:
-        package: its dotted name.
-        homes: per public name the module that defines it, dotted and below the package; a dot in front stands
-            for the package above.
+        package: dotted name of the package.
+        homes: for each public name the dotted path of its module, relative to the package; a leading dot
+            means the parent package.
     """
 
     def find(name: str) -> Any:

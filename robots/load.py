@@ -1,4 +1,5 @@
-"""`load_robot`: a robot by its catalog name or from a URDF file. Strangers' files are read in isolation."""
+"""`load_robot` returns a robot by its catalog name or from a URDF file. Files from other sources are read in
+a separate process."""
 
 from __future__ import annotations
 
@@ -17,11 +18,11 @@ from robots.urdf import canonicalise, load_bytes
 
 
 def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
-    """The robot with this catalog name, or the one described by a URDF file.
+    """Returns the robot with this catalog name, or the one that a URDF file describes.
 
     tip: its default end-effector frame; None takes the catalog's, or the end of the longest chain.
-    within: a folder, without symbolic links, outside of which neither a URDF file nor a mesh is looked at,
-    installed meshes excepted; None: they may lie anywhere.
+    within: a folder, without symbolic links, that must contain the URDF file and its meshes (installed meshes
+    excepted); None: they may be anywhere.
     Raises InputError, one sentence that says what to do, for an unknown name, a missing file, a
     description that cannot be used, or an unknown tip.
     """
@@ -38,16 +39,16 @@ def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | 
 
 
 def load_urdf_text(text: str, tip: str | None = None) -> Robot:
-    """The robot described by a URDF string: an upload, or a canonical text that was kept.
+    """Returns the robot that a URDF string describes: an upload, or a canonical text that was stored.
 
-    Of the files of this machine it sees the meshes of installed packages, by `package://`, and no others.
+    The only files that the description can use are the meshes of installed packages, by `package://`.
     Raises InputError like `load_robot`.
     """
     return _import(text.encode(errors="replace"), "the URDF text", None, tip).used()
 
 
 def check_urdf(path: str | Path) -> ImportReport:
-    """The import report of a URDF file: what would be repaired, filled, fixed or refused.
+    """Returns the import report of a URDF file: what the import repairs, fills, fixes or refuses.
 
     Never raises for bad content; raises InputError when there is no such file.
     """

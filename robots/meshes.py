@@ -1,4 +1,4 @@
-"""Where the meshes of a URDF are: beside it, in ROS-style package folders, or in installed mesh packages."""
+"""Finds the mesh files of a URDF: next to it, in ROS-style package folders, or in installed mesh packages."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ _RENAMED = {"kuka_lbr_iiwa_support": "kuka_description/kuka_lbr_iiwa"}
 
 
 def localise(root: Element, folder: Path | None, within: Path | None = None) -> Iterator[Finding]:
-    """Removes every shape whose mesh is not found; the link is then drawn as capsules. Yields a note on it.
+    """Removes every shape whose mesh is not found and yields a note about it; the link is then drawn as
+    capsules.
 
-    A mesh of an installed package keeps its `package://` name, any other gets its absolute path. within: a
-    folder outside of which no other mesh is looked at; None: they may lie anywhere.
+    A mesh of an installed package keeps its `package://` name, any other gets its absolute path. within:
+    folder that must contain all other meshes; None: they may be anywhere.
     """
     missing: dict[str, int] = {}
     for link in root.findall("link"):
@@ -49,7 +50,8 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
 
 
 def installed_mesh(uri: str) -> Path | None:
-    """The file of an installed package that a `package://` URI names, or None: all a stranger may name."""
+    """Returns the file of an installed package that a `package://` URI names, or None. Uploaded descriptions
+    can use no other files."""
     parts = _package_parts(uri)
     if parts is None:
         return None
@@ -57,7 +59,7 @@ def installed_mesh(uri: str) -> Path | None:
 
 
 def find_mesh(uri: str, folder: Path) -> Path | None:
-    """The file a mesh URI names in a URDF of the machine's owner, or None.
+    """Returns the file that a mesh URI names in a URDF of the machine's owner, or None.
 
     Plain paths and `file://` count from `folder`. `package://pkg/rest` is looked up in the ancestors of
     `folder`, the ROS package path and the installed packages; nothing is ever fetched.

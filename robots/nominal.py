@@ -1,4 +1,4 @@
-"""The dynamic model that model-based controllers believe in: the robot's, with stated errors."""
+"""The nominal dynamic model of model-based controllers: the robot's model with given modelling errors."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NominalSettings:
-    """What a model-based controller is told; the plant is described by `PlantSettings`, apart from this.
+    """Parameters of the nominal model of a model-based controller; `PlantSettings` describes the plant
+    separately.
 
-    payload_kg, damping, armature, mass_scale, inertia_scale, gravity: as in `PlantSettings`, but as the
-        controller believes them; by default the robot as its URDF describes it, without armature or friction.
+    payload_kg, damping, armature, mass_scale, inertia_scale, gravity: as in `PlantSettings`, for the nominal
+        model; the defaults are the robot as its URDF describes it, without armature or friction.
 
-    Raises InputError, naming the field, for values that cannot be.
+    Raises InputError, naming the field, for values that are not allowed.
     """
 
     payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
@@ -39,7 +40,7 @@ class NominalSettings:
         check_fields(self, "nominal.")
 
     def as_plant(self) -> PlantSettings:
-        """The same numbers as a plant would have them."""
+        """Returns plant settings with the same values."""
         return PlantSettings(
             payload_kg=self.payload_kg,
             damping=self.damping,
@@ -51,7 +52,7 @@ class NominalSettings:
 
 
 class NominalModel:
-    """M(q) and the bias torque C(q, q̇)q̇ + g(q) + D q̇ of (1), as believed.
+    """M(q) and the bias torque C(q, q̇)q̇ + g(q) + D q̇ of (1) in the nominal model.
 
     Raises InputError for a per-joint list of the wrong length.
     """

@@ -1,8 +1,8 @@
 """The plant: MuJoCo's simulation of a robot, built from its Pinocchio model. The only door to mujoco.
 
 Building it this way, not from the URDF, makes the joint order Pinocchio's and M, C·v + g, kinematics and
-accelerations equal to 1e-9. There are no geometries, no contacts and no joint stops: a joint pushed past
-its limit goes on, and the run shows it.
+accelerations equal to 1e-9. There are no geometries, no contacts and no joint stops: a joint that is pushed
+past its limit continues to move, and the run shows it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robots.signals import Encoders, Motors, PlantState, as_vector
 from robots.truth import encoder_resolution, inertial, joint_axis, pose, true_model
 
 _ZERO = (0.0, 0.0, 0.0)
-# MuJoCo's friction is a spring-damper in disguise. Its default lets a stuck light joint slide at tenths of
+# MuJoCo models friction as a spring-damper. Its default lets a stuck light joint slide at tenths of
 # rad/s; this is the stiffest setting RK4 still integrates quietly, and creep falls by four decades.
 _STICTION_SOLREF = (0.002, 1.0)
 _STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -33,15 +33,15 @@ mujoco.set_mju_user_warning(lambda _: None)
 
 class Plant:
     """A robot in MuJoCo under torque control, integrated with RK4. SI units, world axes, joints in
-    Pinocchio's order. Same calls, same numbers, to the bit.
+    Pinocchio's order. The same calls give bitwise the same numbers.
 
-    `broken` since the last reset: it got faster than numbers can follow, and was stopped where it was.
+    `broken`: since the last reset the simulation diverged, and the robot was stopped where it was.
     Queries (`mass_matrix`, `bias`, `jacobian`, `frame_pose`, `acceleration`, `holding_torque`) are about
     the plant as its settings make it, and never disturb the simulation.
     """
 
     def __init__(self, robot: Robot, settings: PlantSettings | None = None, timestep: float = 1e-3) -> None:
-        """timestep: s, the longest internal step. Raises InputError for settings or a step that cannot be."""
+        """timestep: s, the longest internal step. Raises InputError for an invalid setting or timestep."""
         if not (math.isfinite(timestep) and 0.0 < timestep <= 0.01):
             raise InputError(f"plant timestep is {timestep} s; give a value above 0 and at most 0.01.")
         self.robot = robot
@@ -221,7 +221,7 @@ class Plant:
             data.time += h
         else:
             mujoco.mj_step(self._model, data)
-        if not ((v := data.qvel).dot(v) < _BROKEN**2 or np.abs(v).max() < _BROKEN):  # NaN is not, either
+        if not ((v := data.qvel).dot(v) < _BROKEN**2 or np.abs(v).max() < _BROKEN):  # true for NaN, too
             data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = before, 0.0, 0.0
             self.broken = True
 

@@ -1,1 +1,1 @@
-"""Processes that we start: kept within limits, and ended with all that they started."""
+"""Child processes: their limits of time and memory, and how they and their descendants are ended."""

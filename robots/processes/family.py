@@ -1,4 +1,4 @@
-"""A process and all it started: ended as a whole, and how much memory they have together."""
+"""A process and its descendants: their common memory and computing time, and how they are ended together."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import psutil
 
 
 def family(pid: int) -> list[psutil.Process]:
-    """A process, its children and theirs, as far as they are there."""
+    """Returns a process and all its descendants that still exist."""
     try:
         eldest = psutil.Process(pid)
         return [eldest, *eldest.children(recursive=True)]
@@ -20,7 +20,7 @@ def family(pid: int) -> list[psutil.Process]:
 
 
 def has_ended(pid: int, within: float) -> bool:
-    """Whether a child that nobody waited for is over, or is so within some seconds."""
+    """Returns whether a child that has not been waited for ends within some seconds."""
     end = time.monotonic() + within
     while True:
         try:
@@ -34,8 +34,8 @@ def has_ended(pid: int, within: float) -> bool:
 
 
 def spent(pid: int) -> tuple[float, bool]:
-    """Seconds that a process computed until now, in all its threads, and whether it neither computes now nor
-    waits for a core to do so."""
+    """Returns the seconds of CPU time that a process has used in all its threads, and whether it is idle: it
+    neither computes nor waits for a core."""
     try:
         process = psutil.Process(pid)
         times = process.cpu_times()
@@ -45,7 +45,8 @@ def spent(pid: int) -> tuple[float, bool]:
 
 
 def memory_of(pid: int) -> int:
-    """Bytes that a process and all it started hold, pages they share counted once each time."""
+    """Returns the bytes that a process and its descendants use; pages that they share count once per
+    process."""
     found = 0
     for each in family(pid):
         with suppress(psutil.Error):
@@ -54,20 +55,20 @@ def memory_of(pid: int) -> int:
 
 
 def end_family(pid: int, mark: tuple[str, str] | None = None) -> bool:
-    """Ends a process, all it started, and its process group if it leads one.
+    """Ends a process, all its descendants, and its process group if it leads one.
 
     Args:
-        pid: of the process. It may be over, and must not have been waited for.
-        mark: a variable of its environment with a value that nothing else has: who still has it is ended too,
-            wherever it moved to.
+        pid: process id. The process may have ended, but it must not have been waited for.
+        mark: an environment variable of the process with a unique value: every process that has this value is
+            ended too, whatever its group or parent is.
 
     Returns:
-        whether there was anything beside the process itself.
+        whether there were other processes than the process itself.
     """
     found = family(pid)
     for each in found:
         with suppress(psutil.Error):
-            each.suspend()  # so that it starts nothing more
+            each.suspend()  # a stopped process cannot start further ones
     others = [each for each in {*found, *family(pid)} if each.pid != pid]
     for each in others:
         with suppress(psutil.Error):
@@ -91,7 +92,7 @@ def _alive(group: int) -> list[psutil.Process]:
 
 
 def _end_marked(mark: tuple[str, str] | None) -> bool:
-    """Ends who has a variable of that value, until nobody has."""
+    """Ends the processes that have an environment variable with this value until there are none left."""
     any_found = False
     for _ in range(100 if mark else 0):
         found = []
