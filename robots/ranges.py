@@ -1,4 +1,4 @@
-"""What a number in settings may be, said once: beside the field, as part of its type."""
+"""Allowed ranges of numbers in settings, written once: in the type annotation of the field."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from robots.errors import InputError, unknown_name
 
 @dataclass(frozen=True)
 class Range:
-    """Of every number of a field: `horizon: Annotated[int, Range(1, 60)]`. Numbers are finite in any case.
+    """The range of every number of a field: `horizon: Annotated[int, Range(1, 60)]`. Numbers must always be
+    finite.
 
     Attributes:
-        low, high: the least and the greatest allowed.
-        above: `low` itself is not allowed.
+        low, high: the least and the greatest allowed number.
+        above: whether `low` itself is excluded.
     """
 
     low: float = -math.inf
@@ -45,7 +46,7 @@ ANY = Range()
 
 
 def plain(hint: Any) -> tuple[Any, Range]:
-    """A type annotation without its range, and the range."""
+    """Splits a type annotation into the type without its range, and the range."""
     if get_origin(hint) is not Annotated:
         return hint, ANY
     inner, *extras = get_args(hint)
@@ -53,23 +54,23 @@ def plain(hint: Any) -> tuple[Any, Range]:
 
 
 def alternatives(hint: Any) -> tuple[Any, ...]:
-    """The members of a union; of anything else itself."""
+    """Returns the members of a union type; any other type is returned alone."""
     return get_args(hint) if get_origin(hint) in (UnionType, Union) else (hint,)
 
 
 @cache
 def field_types(owner: type) -> dict[str, Any]:
-    """The annotations of a dataclass by field, with their ranges."""
+    """Returns the type annotations of a dataclass by field, ranges included."""
     return get_type_hints(owner, include_extras=True)
 
 
 def check_fields(owner: Any, prefix: str = "") -> None:
     """Raises InputError, naming the field and what is allowed, if a number of a dataclass is outside its
-    range or a word is none of its Literal. Fields without either are not looked at.
+    range or a word is not in its Literal. Fields without range and Literal are not checked.
 
     Args:
         owner: the dataclass.
-        prefix: of the names in messages, "limits.".
+        prefix: prefix of the names in messages, such as "limits.".
     """
     for name, hint in field_types(type(owner)).items():
         inner, allowed = plain(hint)
@@ -82,7 +83,7 @@ def check_fields(owner: Any, prefix: str = "") -> None:
 
 
 def check_numbers(name: str, value: Any, allowed: Range, whole: bool = False) -> None:
-    """Raises InputError if a number, or one in a list of them, is outside its range or none at all."""
+    """Raises InputError if a value, or an element of a list, is not a number inside the range."""
     several = isinstance(value, (list, tuple, np.ndarray))
     for each in np.ravel(np.asarray(value, dtype=object)) if several else (value,):
         number = isinstance(each, (int, float, np.integer, np.floating)) and not isinstance(each, bool)

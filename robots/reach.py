@@ -1,4 +1,4 @@
-"""Which targets the robot can reach, judged by placo's inverse kinematics. The only door to placo."""
+"""Decides which targets the robot can reach, by placo's inverse kinematics. No other module imports placo."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ _STEP = 0.5  # rad: the most a joint moves per iteration, so that the linearisat
 
 @dataclass(frozen=True)
 class ReachResult:
-    """q (n,) rad inside the limits, the best found; position_error m; rotation_error rad (0 if none was
+    """q (n,) rad, the best configuration found inside the limits; position_error m; rotation_error rad (0 if
+    none was
     asked for); reachable: both within 2 mm and 1°.
     """
 
@@ -54,11 +55,12 @@ class ReachJudge:
         q_seed: np.ndarray | None = None,
         frame: str = "",
     ) -> ReachResult:
-        """A posture that brings `frame` (default: the tip) to a world position (3,), m, and, if given, to a
-        world rotation (3, 3).
+        """Finds a configuration that brings `frame` (default: the tip) to a world position (3,), m, and, if
+        given, to a world rotation (3, 3).
 
         Tasks are soft, so a target out of reach gives the nearest posture instead of an exception; the
-        residual decides. From `q_seed` (default: home) first, then from a few fixed other postures. Raises
+        residual decides. The search starts at `q_seed` (default: home), then at a few other fixed
+        configurations. Raises
         InputError for an unknown frame, ValueError for a target that is not finite.
         """
         name = frame or self.robot.tip

@@ -1,4 +1,5 @@
-"""What the import of a robot description found, as data: it can be printed, sent to a page or tested."""
+"""The import report: the findings of the import of a robot description, as data that can be printed, sent to
+a page or tested."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ Kind = Literal["repaired", "filled", "fixed", "refused", "note"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing the import did or refused.
+    """One finding of an import: something that it changed, noted or refused.
 
     kind: `repaired` (a value was wrong and was changed), `filled` (a value was missing), `fixed` (a joint
     was frozen), `refused` (the description cannot be used), `note` (worth knowing, nothing was changed).
@@ -41,9 +42,9 @@ class ImportReport:
         return not self.of_kind("refused")
 
     def of_kind(self, kind: Kind) -> tuple[Finding, ...]:
-        """The findings of one kind."""
+        """Returns the findings of one kind."""
         return tuple(finding for finding in self.findings if finding.kind == kind)
 
     def as_dict(self) -> dict[str, object]:
-        """The report as plain JSON types."""
+        """Returns the report as plain JSON types."""
         return {**asdict(self), "findings": [asdict(f) for f in self.findings], "usable": self.usable}

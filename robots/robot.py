@@ -1,4 +1,5 @@
-"""`Robot`: everything the rest of the project may know about a robot, and nothing about its control."""
+"""`Robot`: the description of a robot that the rest of the project uses. It contains nothing about
+control."""
 
 from __future__ import annotations
 
@@ -24,13 +25,13 @@ class Robot:
     name: str
     model: pin.Model
     joint_names: tuple[str, ...]
-    tip: str  # the frame a task means when it names none
+    tip: str  # the frame of tasks that name no frame
     home: np.ndarray  # (n,) rad, inside the limits
     q_lower: np.ndarray  # (n,) rad, −inf where unbounded
     q_upper: np.ndarray  # (n,) rad, +inf where unbounded
     v_limit: np.ndarray  # (n,) rad/s
     tau_limit: np.ndarray  # (n,) N·m
-    a_max: np.ndarray  # (n,) rad/s², deceleration the viability bound may count on
+    a_max: np.ndarray  # (n,) rad/s², deceleration that the viability bound assumes
     M_bar: np.ndarray  # (n,) kg·m², suggested diagonal of M̄
     urdf_text: str  # canonical URDF
     report: ImportReport
@@ -55,7 +56,7 @@ class Robot:
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """Names of the frames tasks and plants may use: the links of the URDF, root first."""
+        """Names of the frames that tasks and plants may use: the links of the URDF, root first."""
         return tuple(self._frame_ids)
 
     def frame_id(self, name: str) -> int:
@@ -86,7 +87,8 @@ class Robot:
         return joint
 
     def with_tip(self, tip: str) -> Robot:
-        """The same robot with another default end-effector frame. Raises InputError for an unknown one."""
+        """Returns the same robot with another default end-effector frame. Raises InputError for an unknown
+        frame."""
         self.frame_id(tip)
         return replace(self, tip=tip, report=replace(self.report, tip=tip))
 

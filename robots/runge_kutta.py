@@ -1,4 +1,5 @@
-"""The classical fourth-order Runge–Kutta step for q̈ = f(q, q̇), for mechanics MuJoCo cannot integrate."""
+"""The classical fourth-order Runge–Kutta step for q̈ = f(q, q̇), for mechanics that MuJoCo cannot
+integrate."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ Array = NDArray[np.float64]
 
 
 def rk4(q: Array, v: Array, h: float, acceleration: Callable[[Array, Array], Array]) -> tuple[Array, Array]:
-    """(q, q̇) after a step of h (s) from q (n,) and v (n,); `acceleration` gives q̈ (n,) for a q and a q̇.
+    """Returns (q, q̇) after a step of h (s) from q (n,) and v (n,). `acceleration` computes q̈ (n,) from q
+    and q̇.
 
     The same stages and weights as MuJoCo's RK4, for joints of one degree of freedom.
     """

@@ -1,4 +1,4 @@
-"""The plant as a velocity-controlled platform shows it: commands in rad/s (m/s), tracked by joint servos."""
+"""The plant of a velocity-controlled platform: joint servos track commands in rad/s (m/s)."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from robots.signals import Motors, PlantState, as_vector
 Mode = Literal["ideal", "servo"]
 MODES: tuple[Mode, ...] = ("ideal", "servo")
 
-_STEP = 1e-3  # s, at which servos work
+_STEP = 1e-3  # s, control period of the servos
 
 
 @dataclass(frozen=True)
 class VelocityPlantSettings:
-    """The truth about a velocity-controlled plant. All defaults: ideal kinematics, no noise.
+    """Parameters of a velocity-controlled plant. The defaults describe ideal kinematics without noise.
 
     Attributes:
         mode: "ideal": the velocity moves linearly from its present value to the command within each step, so
             a sampled double integrator is met exactly; "servo": MuJoCo's mechanics under velocity servos
             τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
-        bandwidth: 1/s, of the servos.
+        bandwidth: bandwidth of the servos, 1/s.
         lag_ms: time constant of a first-order lag between command and servo.
         delay_ms: the command acts this much later.
         position_noise: standard deviation of white Gaussian noise on the measured q, rad (m).
         velocity_noise: the same on the measured v, rad/s (m/s).
-        payload_kg: of the mechanics, "servo" only, as in `PlantSettings`.
+        payload_kg: payload of the mechanics as in `PlantSettings`, in "servo" mode only.
         friction: likewise; the servo does not know of it.
         damping: likewise.
         saturate: clip at the torque limits.
 
-    Raises InputError, naming the field, for values that cannot be.
+    Raises InputError, naming the field, for values that are not allowed.
     """
 
     mode: Mode = "ideal"
@@ -64,7 +64,8 @@ class VelocityPlantSettings:
 
     @property
     def latency_ms(self) -> float:
-        """By how much the motion follows a steadily changing command, ms: delay, lag and the servos' own."""
+        """Delay of the motion behind a steadily changing command, ms: the sum of delay, lag and the servos'
+        own delay."""
         own = 1e3 / self.bandwidth if self.mode == "servo" else 0.0
         return self.delay_ms + self.lag_ms + own
 
@@ -72,11 +73,11 @@ class VelocityPlantSettings:
 class VelocityPlant:
     """A robot that takes velocity commands. SI units, joints in Pinocchio's order.
 
-    Same settings, seed and calls: same numbers, to the bit.
+    The same settings, seed and calls give bitwise the same numbers.
     """
 
     def __init__(self, robot: Robot, settings: VelocityPlantSettings | None = None, seed: int = 0) -> None:
-        """seed: of the measurement noise. Raises InputError for per-joint lists of the wrong length."""
+        """seed: seed of the measurement noise. Raises InputError for per-joint lists of the wrong length."""
         self.robot = robot
         self.seed = seed
         self.settings = VelocityPlantSettings() if settings is None else settings

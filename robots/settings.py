@@ -1,4 +1,4 @@
-"""What the simulated plant may be beyond its nominal description: `PlantSettings`."""
+"""`PlantSettings`: how the simulated plant differs from its nominal description."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PerJoint = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """The truth about the plant, which no controller sees. All defaults: the nominal robot.
+    """Parameters of the plant, which no controller sees. The defaults describe the nominal robot.
 
     Attributes:
         payload_kg: kg, a point mass at the robot's tip frame.
@@ -26,18 +26,18 @@ class PlantSettings:
         damping: N·m·s/rad, viscous friction.
         armature: kg·m², reflected rotor inertia, added to M_ii.
         mass_scale: factor on the mass of the body each joint moves.
-        inertia_scale: factor on its rotational inertia about its centre of mass, which stays. Both by the
-            same factor: a body of another density. The payload is not scaled.
+        inertia_scale: factor on its rotational inertia about its centre of mass, whose position stays. The
+            same value for both factors describes a body of another density. The payload is not scaled.
         diagonal_scale: factor on the diagonal entries of M(q) in the dynamics, whatever q, off-diagonal
             entries, C and g left as they are: the literal reading of the HIMPC paper's Table V. No mechanism
             behaves like this: energy is not kept, and below 1 M(q) may lose definiteness (the run then flies
             apart).
         encoder_resolution_deg: degrees; with a value above 0 the measured position of revolute joints is
             rounded to multiples of it and the measured velocity is their backward difference.
-        torque_lag_ms: time constant of a first-order lag of the motors.
-        delay_ms: the command acts this much later (to the nearest internal step).
-        saturate: clip the command at the robot's torque limits.
-        gravity: switch it off for a weightless plant.
+        torque_lag_ms: ms, time constant of a first-order lag of the motors.
+        delay_ms: ms, delay of the command (rounded to the nearest internal step).
+        saturate: whether the command is clipped at the robot's torque limits.
+        gravity: whether gravity acts on the plant.
 
     Raises InputError, naming the field, for values that are not finite, negative or absurdly large.
     """
@@ -61,7 +61,7 @@ class PlantSettings:
         for name in ("saturate", "gravity"):
             if not isinstance(getattr(self, name), (bool, np.bool_)):
                 raise InputError(f"plant.{name} is {getattr(self, name)!r}; give true or false.")
-        # Arrays and NumPy's numbers as plain ones: settings are compared and written as text.
+        # NumPy arrays and numbers become plain Python ones: settings are compared and written as text.
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, (Sequence, np.ndarray)):
@@ -70,7 +70,8 @@ class PlantSettings:
             object.__setattr__(self, field.name, plain_value)
 
     def per_joint(self, name: str, n: int) -> np.ndarray:
-        """(n,) the values of a per-joint field, one number repeated. Raises InputError for a wrong length."""
+        """Returns the values (n,) of a per-joint field; a single number is repeated. Raises InputError for a
+        wrong length."""
         value = getattr(self, name)
         if isinstance(value, tuple):
             if len(value) != n:

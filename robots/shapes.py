@@ -1,4 +1,5 @@
-"""What a robot looks like: triangles per moving body, from the URDF's visuals or generated capsules."""
+"""The visual shapes of a robot: triangles per moving body, from the URDF's visuals or from generated
+capsules."""
 
 from __future__ import annotations
 
@@ -17,9 +18,9 @@ from robots.robot import Robot
 from robots.surfaces import Colour, Piece, joined, limited, mesh_pieces, split_creases
 
 MAX_TOTAL = 400_000  # faces of a robot
-_FARTHEST = 1e3  # m, from the joint to any point
-_COLOURS = 8  # of a link: each is an object of its own on the page
-_DEFAULT = (205, 209, 216)  # a mesh that names no colour
+_FARTHEST = 1e3  # m, largest distance of a point from its joint
+_COLOURS = 8  # largest number of shapes of a link: each is a separate object on the page
+_DEFAULT = (205, 209, 216)  # colour of a mesh that names none
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,9 @@ class Shape:
 
 @np.errstate(all="ignore")
 def link_shapes(robot: Robot) -> list[Shape]:
-    """The shapes of all links. A visual that cannot be drawn is left out, and so are those beyond MAX_TOTAL
-    faces; a body that then has no shape at all is drawn as capsules along its kinematics. Never raises for
-    what the description or a mesh file contains.
+    """Returns the shapes of all links. Visuals that cannot be drawn and visuals beyond MAX_TOTAL faces are
+    left out; a body that then has no shape is drawn as capsules along its kinematics. No content of the
+    description or of a mesh file raises an error.
     """
     root = etree.fromstring(robot.urdf_text.encode())
     palette = _materials(root)
@@ -55,7 +56,7 @@ def link_shapes(robot: Robot) -> list[Shape]:
         for visual in link.findall("visual"):
             for colour, vertices, faces in _visual(visual, palette, meshes):
                 placed = vertices @ frame.placement.rotation.T + frame.placement.translation
-                near = np.abs(placed).max(initial=0.0) < _FARTHEST  # not true of NaN
+                near = np.abs(placed).max(initial=0.0) < _FARTHEST  # this comparison is false for NaN
                 if not near or not 0 < len(faces) <= left:
                     continue
                 left -= len(faces)
@@ -77,7 +78,8 @@ def link_shapes(robot: Robot) -> list[Shape]:
 def _visual(
     visual: Element, palette: dict[str, Colour], meshes: Mapping[str, tuple[Piece, ...]]
 ) -> list[tuple[Colour, np.ndarray, np.ndarray]]:
-    """(colour, vertices in the link's frame, faces) of one <visual>; none if a number of it is none."""
+    """Yields (colour, vertices in the link's frame, faces) of one <visual>; nothing if one of its numbers is
+    invalid."""
     geometry = visual.find("geometry")
     if geometry is None or len(geometry) == 0:
         return []
@@ -119,7 +121,7 @@ def _numbers(element: Element, name: str, default: str = "") -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def _unit(kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """A box with edges 1, or a cylinder or sphere of radius 1, the cylinder's length 1."""
+    """Returns a box with edges of 1, a cylinder of radius 1 and length 1, or a sphere of radius 1."""
     if kind == "sphere":
         solid = trimesh.creation.icosphere(subdivisions=3)
         return np.asarray(solid.vertices), np.asarray(solid.faces)

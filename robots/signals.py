@@ -1,4 +1,5 @@
-"""Between controller and mechanics: motors that saturate, wait and lag, and encoders that round."""
+"""Signals between controller and mechanics: motors with saturation, delay and lag, and encoders with finite
+resolution."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ _SAMPLES_S = 0.3  # s of positions kept, more than any control period
 
 @dataclass(frozen=True)
 class PlantState:
-    """What the sensors say at time t: s; q (n,) rad; v (n,) rad/s."""
+    """The measured state at time t: t in s; q (n,) rad; v (n,) rad/s."""
 
     t: float
     q: np.ndarray
@@ -39,12 +40,12 @@ class Motors:
             commands.popleft()
 
     def limit(self, lower: np.ndarray, upper: np.ndarray) -> None:
-        """Clips what is still on its way, when the torque limits change."""
+        """Clips the delayed commands when the torque limits change."""
         self._commands = deque((t, np.clip(tau, lower, upper)) for t, tau in self._commands)
         self.torque = np.clip(self.torque, lower, upper)
 
     def advance(self, t: float, h: float, delay: float, lag: float) -> np.ndarray:
-        """(n,) the torque over the internal step from t to t + h (all times in s).
+        """Returns the torque (n,), N·m, over the internal step from t to t + h (all times in s).
 
         Lag: τ ← τ + (1 − e^(−h/lag))(command − τ), the exact response at the end of the step.
         """
@@ -62,7 +63,7 @@ class Motors:
 
 
 class Encoders:
-    """Positions over time, and what a sensor of finite resolution makes of them."""
+    """Encoders of finite resolution: they record true positions and return measured ones."""
 
     def __init__(self, q: np.ndarray, v: np.ndarray, t: float) -> None:
         self._start = (t, q.copy(), v.copy())

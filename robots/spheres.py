@@ -1,4 +1,4 @@
-"""Spheres that cover a robot, as collision avoidance sees it."""
+"""The spheres that approximate a robot for collision avoidance."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ _SLENDER = 0.05
 
 
 def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:
-    """The spheres of a robot: laid by hand for the mobile manipulator of the catalog, else along its links.
+    """Returns the spheres of a robot: placed by hand for the mobile manipulator of the catalog, and along the
+    links for other robots.
 
     The generated ones follow the straight lines from each joint to the next and to the tip, in steps of
     their radius, a twentieth of the chain's length.

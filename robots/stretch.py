@@ -1,4 +1,4 @@
-"""How far an arm reaches sideways."""
+"""The horizontal reach of an arm."""
 
 from __future__ import annotations
 

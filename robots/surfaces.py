@@ -1,4 +1,5 @@
-"""Triangles of mesh files, simplified. Files that came with no installed package are read in isolation."""
+"""Reads and simplifies the triangles of mesh files. Files outside installed packages are read in a separate
+process."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from robots.meshes import installed_mesh
 from robots.processes.isolation import DEADLINE, Fault, isolated
 from robots.simplify import simplify
 
-MAX_FACES = 12_000  # per mesh: what a browser on a laptop still turns smoothly with several robots
+MAX_FACES = 12_000  # faces per mesh: a browser on a laptop still rotates several robots smoothly
 MAX_BYTES = 100_000_000
 _FORMATS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
 _BRIGHTEST = 238  # pure white loses all shading under the page's lights
@@ -24,7 +25,8 @@ Piece = tuple[Colour | None, np.ndarray, np.ndarray]
 
 
 def mesh_pieces(uris: Iterable[str]) -> dict[str, tuple[Piece, ...]]:
-    """What the meshes of a canonical URDF look like, by their URI; one that cannot be read is left out."""
+    """Returns the surfaces of the meshes of a canonical URDF by their URI; a mesh that cannot be read is left
+    out."""
     found: dict[str, tuple[Piece, ...]] = {}
     others: list[str] = []
     for uri in dict.fromkeys(uris):
@@ -35,12 +37,12 @@ def mesh_pieces(uris: Iterable[str]) -> dict[str, tuple[Piece, ...]]:
         try:
             found[uri] = _installed_pieces(path)
         except Exception:
-            continue  # mesh readers raise whatever they like on a bad file
+            continue  # mesh readers raise many kinds of errors for a bad file
     return {**found, **_isolated_pieces(tuple(others))}
 
 
 def read_meshes(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
-    """The pieces of the files that can be read, in time for the deadline of isolated work."""
+    """Returns the pieces of the files that can be read before the deadline of isolated work."""
     end = time.monotonic() + 0.7 * DEADLINE
     found: dict[str, tuple[Piece, ...]] = {}
     for path in paths:
@@ -54,7 +56,7 @@ def read_meshes(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
 
 
 def read_mesh(path: Path) -> tuple[Piece, ...]:
-    """The pieces of a mesh file, one per colour. Raises anything for a bad file."""
+    """Returns the pieces of a mesh file, one per colour. May raise any exception for a bad file."""
     if path.suffix.lower() not in _FORMATS or path.stat().st_size > MAX_BYTES:
         raise ValueError(f"{path} is no mesh file of at most {MAX_BYTES} bytes")
     scene = trimesh.load_scene(str(path))
@@ -74,7 +76,7 @@ def read_mesh(path: Path) -> tuple[Piece, ...]:
 
 
 def joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """(vertices, faces) of several surfaces as one."""
+    """Joins several surfaces to one (vertices, faces)."""
     offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
     vertices = np.concatenate([vertices for vertices, _ in parts])
     return vertices, np.concatenate(
@@ -94,7 +96,7 @@ def split_creases(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
 
 
 def limited(colour: np.ndarray) -> Colour | None:
-    """A colour (3,), 0–255, as the page shows it."""
+    """Returns the colour (3,), 0–255, that the page shows for a given one."""
     if colour.shape != (3,) or not np.all(np.isfinite(colour)):
         return None
     red, green, blue = (int(c) for c in np.clip(np.round(colour), 0, _BRIGHTEST))

@@ -1,4 +1,4 @@
-"""The plant's own mechanics as a Pinocchio model: the robot's, changed as its settings say."""
+"""The plant's mechanics as a Pinocchio model: the robot's model, changed by the plant settings."""
 
 from __future__ import annotations
 

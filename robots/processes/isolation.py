@@ -1,4 +1,4 @@
-"""Work on files of strangers in a process of its own, with a deadline and a limit of memory."""
+"""Runs work on untrusted files in a separate process, with a deadline and a limit of memory."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class Allowance:
-    """What isolated work may cost.
+    """The time and memory that isolated work may use, and the words for its error message.
 
     Attributes:
-        seconds: until it is ended, the start of the process included; what it waits for a core on a busy
-            machine does not count, up to `PATIENCE` times as much in all.
+        seconds: time limit, the start of the process included. Waiting for a core on a busy machine does not
+            count, up to `PATIENCE` times this limit in all.
         memory: bytes of address space.
-        doing: begins the sentence about what went wrong.
-        ended: what became of the process, before "(why)".
-        hint: what to do about that.
+        doing: the beginning of the error message.
+        ended: the part of the error message that says how the process ended; "(why)" follows it.
+        hint: what the user can do about it.
     """
 
     seconds: float
@@ -55,7 +55,7 @@ class Allowance:
         return f"{self.doing} needs more than {self.memory / 1e9:.0f} GB of memory; give a smaller one"
 
     def end(self, code: int) -> str:
-        """What an exit code tells."""
+        """Returns the error message for an exit code."""
         if code == -getattr(signal, "SIGALRM", 0):
             return self.too_long
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
@@ -63,27 +63,27 @@ class Allowance:
 
 
 class Fault(Exception):
-    """Isolated work did not come to an end; says why, for the end of a sentence."""
+    """Isolated work did not finish. The message is the end of a sentence that says why."""
 
 
 def isolated(
     function: Callable[..., _T], *args: object, within: Allowance | None = None, copied: bool = False
 ) -> _T:
-    """function(*args), run in a process that starts empty and ends with this one.
+    """Returns function(*args), computed in a new process that ends with this one.
 
-    A process of its own, not a fork: it works from any thread, and from daemonic processes, which may
-    not have children of `multiprocessing`.
+    The process is not a fork. It can be started from any thread, and from daemonic processes, which may not
+    have children of `multiprocessing`.
 
     Args:
-        function: of a module; it, its arguments and its result must be picklable.
-        args: of the function.
-        within: what it may cost; DEADLINE and MEMORY by default.
-        copied: whether it may start as a copy of this process instead, where the system can make one: what
-            is imported here is there at once, and counts against the limit of memory.
+        function: a function of a module; the function, its arguments and its result must be picklable.
+        args: arguments of the function.
+        within: limits of time and memory; DEADLINE and MEMORY by default.
+        copied: whether the process may start as a copy of this one (a fork), where the system allows it:
+            modules imported here are then available at once, and count against the limit of memory.
 
     Raises:
-        InputError: the function raised it.
-        Fault: it crashed, took too long or needed too much memory.
+        InputError: raised by the function.
+        Fault: the process crashed, took too long or needed too much memory.
     """
     within = within or Allowance(DEADLINE)
     request = pickle.dumps((function, args))
@@ -106,18 +106,19 @@ def isolated(
 
 
 def _end_group(leader: int) -> None:
-    """Ends what a process left behind in the process group it led."""
+    """Ends the processes that remain in the process group that a process led."""
     with suppress(OSError, AttributeError):
         os.killpg(leader, signal.SIGKILL)
 
 
 def threads() -> int:
-    """Threads of this process (Linux)."""
+    """Returns the number of threads of this process (Linux)."""
     return len(os.listdir("/proc/self/task"))
 
 
 def _copies() -> bool:
-    """Other systems' libraries do not survive a fork; nor does it go on where another thread holds a lock."""
+    """Returns whether a fork is safe here. Libraries of other systems fail after a fork, and a forked process
+    blocks if another thread holds a lock."""
     return sys.platform == "linux" and hasattr(os, "pidfd_open") and threads() == 1
 
 
@@ -142,7 +143,7 @@ def _empty(within: Allowance) -> subprocess.Popen[bytes]:
 
 @final
 class _Copy:
-    """A fork of this process that answers one request; of a Popen's methods what is needed here."""
+    """A fork of this process that answers one request. It has the methods of Popen that are needed here."""
 
     def __init__(self, request: bytes, within: Allowance) -> None:
         self.returncode = 1
@@ -185,14 +186,14 @@ def _be_a_copy(request: bytes, within: Allowance, parent: int, out: int) -> NoRe
 
 
 def _let_go(out: int) -> None:
-    """Closes whatever the process that was copied has open but one; what is printed goes nowhere."""
+    """Closes all file descriptors of the copied process except one, and discards what is printed."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
         os.dup2(nowhere, number)
-    # Not all numbers up to the highest: in containers that may be a billion.
+    # Only open descriptors are closed: in containers the highest number may be a billion.
     for number in map(int, os.listdir("/proc/self/fd")):
         if number > 2 and number != out:
-            with suppress(OSError):  # that of the list itself is closed already
+            with suppress(OSError):  # the descriptor of the listing itself is closed already
                 os.close(number)
     sys.stdin = os.fdopen(0, closefd=False)
     sys.stdout = os.fdopen(1, "w", encoding="utf-8", errors="replace", closefd=False)
@@ -200,7 +201,7 @@ def _let_go(out: int) -> None:
 
 
 def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, seconds: float) -> bytes:
-    """What it prints. Raises TimeoutExpired after so many seconds of its own, see `Allowance`."""
+    """Returns what the process prints. Raises TimeoutExpired after the seconds that `Allowance` grants."""
     began, longest, more = time.monotonic(), PATIENCE * seconds, seconds
     while True:
         try:
@@ -214,7 +215,7 @@ def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, se
 
 
 def waited(pid: int) -> float:
-    """Seconds that a process was ready to run and had no core, as far as the system tells (Linux)."""
+    """Returns the seconds that a process was ready to run and had no core (Linux; 0 elsewhere)."""
     try:
         return int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) * 1e-9
     except (OSError, ValueError, IndexError):
@@ -222,7 +223,7 @@ def waited(pid: int) -> float:
 
 
 def is_stopped(pid: int) -> bool:
-    """Whether somebody has stopped a process (SIGSTOP, a debugger), as far as the system tells (Linux)."""
+    """Returns whether a process is stopped by SIGSTOP or a debugger (Linux; False elsewhere)."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][:1] in ("T", "t")
     except OSError:
@@ -230,10 +231,11 @@ def is_stopped(pid: int) -> bool:
 
 
 def serve() -> None:
-    """The child: one request from standard input, one answer to standard output."""
+    """Main function of the child: it reads one request from standard input and writes one answer to standard
+    output."""
     within = Allowance(float(sys.argv[2]), int(sys.argv[3]))
     _restrict(within, int(sys.argv[1]))
-    # Compiled libraries print what they like; nothing of it may get into the answer.
+    # Compiled libraries may print to standard output, and this must not get into the answer.
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         answer = _answer(sys.stdin.buffer.read(), within)
@@ -241,7 +243,8 @@ def serve() -> None:
 
 
 def _answer(request: bytes, within: Allowance) -> bytes:
-    """Pickled (result, fault, refusal), one of which is not None unless the result is."""
+    """Returns the pickled tuple (result, fault, refusal); fault and refusal are None if the work
+    succeeded."""
     try:
         function, args = pickle.loads(request)
         return pickle.dumps((function(*args), None, None))
@@ -257,9 +260,10 @@ def _answer(request: bytes, within: Allowance) -> bytes:
 
 
 def _restrict(within: Allowance, parent: int) -> None:
-    """Ends with the parent, at the deadline and at the limit of memory, as far as the system can do it."""
+    """Makes this process end with its parent, at the deadline and at the limit of memory, where the system
+    supports this."""
     if hasattr(signal, "alarm"):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears of it and ends this process
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.alarm(int(PATIENCE * within.seconds) + 1)
     if sys.platform == "linux":
@@ -269,7 +273,7 @@ def _restrict(within: Allowance, parent: int) -> None:
     if sys.platform != "win32":
         import resource
 
-        os.setsid()  # what it starts can be ended with it
+        os.setsid()  # its children can then be ended with it
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         most = within.memory if hard == resource.RLIM_INFINITY else min(within.memory, hard)

@@ -1,4 +1,4 @@
-"""A process that ends with the one that started it, whatever it is doing."""
+"""Makes a process end together with the process that started it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from multiprocessing.connection import wait
 
 
 def end_with(pipe: int, group: bool = False) -> None:
-    """Ends this process when the last writer of a pipe is gone, even while it is asleep, stopped or deep in a
-    library; with `group` all of its process group.
+    """Ends this process when the last writer of a pipe is closed, even while the process sleeps, is stopped
+    or runs in a library.
 
     Args:
-        pipe: the end to read from. Nothing may ever be written to it.
+        pipe: the end to read from. Nothing may be written to the other end.
         group: whether the rest of the process group ends too.
     """
     try:
@@ -25,16 +25,17 @@ def end_with(pipe: int, group: bool = False) -> None:
         fcntl.fcntl(pipe, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
     except (ImportError, AttributeError, OSError):
-        # Not Linux: the next best is a thread, which a long call of a library may keep from running.
+        # On other systems than Linux a thread watches the pipe; a long call of a library may delay it.
         threading.Thread(target=_wait, args=(pipe,), daemon=True).start()
         return
     with contextlib.suppress(OSError):
         if wait([pipe], timeout=0.0):
-            _end()  # it was gone before we asked
+            _end()  # the writer was closed before this call
 
 
 def end_with_parent() -> None:
-    """`end_with` the process that spawned this one through multiprocessing; nothing in any other."""
+    """Ends this process together with the one that spawned it through multiprocessing; does nothing in other
+    processes."""
     parent = mp.parent_process()
     if parent is not None:
         end_with(parent.sentinel)

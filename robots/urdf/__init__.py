@@ -1,4 +1,4 @@
-"""URDF import: a description read, checked, repaired and reported."""
+"""URDF import: it reads, checks and repairs a description and reports what it did."""
 
 from robots.urdf.canonical import Canonical, canonicalise
 from robots.urdf.joints import UNBOUNDED

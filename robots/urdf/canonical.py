@@ -1,4 +1,5 @@
-"""The one way a URDF enters the project: read, check, repair, report."""
+"""Converts a URDF to its canonical form: it is read, checked and repaired, and all changes are reported.
+Every URDF is imported this way."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ MAX_FINDINGS = 200
 
 @dataclass(frozen=True)
 class Canonical:
-    """A URDF that Pinocchio, MuJoCo, placo and the page all read the same way."""
+    """A URDF that Pinocchio, MuJoCo, placo and the page interpret in the same way."""
 
     name: str
     text: str
@@ -38,11 +39,11 @@ class Canonical:
 def canonicalise(
     data: bytes, source: str, folder: Path | None = None, within: Path | None = None
 ) -> tuple[Canonical | None, ImportReport]:
-    """The canonical form of a URDF document, None when it cannot be used, and the report of the import.
+    """Returns the canonical form of a URDF document (None if it cannot be used) and the report of the import.
 
-    source: how messages name it; folder: where relative and `package://` mesh paths start from, None for a
-    description that may see installed packages only; within: outside of which no mesh beside the installed
-    ones is looked at, None for no such limit.
+    source: name of the document in messages; folder: start of relative and `package://` mesh paths, None for
+    a description that may use installed packages only; within: folder that must contain all meshes except
+    installed ones, None for no such limit.
     """
     try:
         root = parse(data, source)
@@ -73,7 +74,7 @@ def canonicalise(
 
 
 def _report(source: str, findings: list[Finding]) -> ImportReport:
-    """What was refused comes first where not all findings fit."""
+    """Builds the report; refused findings come first if not all findings fit."""
     if len(findings) > MAX_FINDINGS:
         kept = sorted(findings, key=lambda finding: finding.kind != "refused")[:MAX_FINDINGS]
         more = f"{len(findings) - MAX_FINDINGS} more findings are not listed"
@@ -91,7 +92,7 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
 
 
 def _model(root: Element) -> pin.Model:
-    """The Pinocchio model of a repaired tree. Raises Refusal for what Pinocchio cannot take."""
+    """The Pinocchio model of a repaired tree. Raises Refusal for a tree that Pinocchio cannot build."""
     try:
         model = pin.buildModelFromXML(without_shapes(root))
     except (ValueError, RuntimeError) as error:

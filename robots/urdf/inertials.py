@@ -1,4 +1,5 @@
-"""Inertias of a URDF made physical: every moving body has positive mass and a possible inertia."""
+"""Makes the inertias of a URDF physical: every moving body gets a positive mass and a physically possible
+inertia."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from robots.urdf.structure import body_of, movable_joints
 
 _DENSITY = 1000.0  # kg/m³: the solid sphere that stands in for a missing inertia
 _LEAST_MASS = 1e-6  # kg
-_FILL_MASS = 0.1  # kg: a moving body that was given no mass
+_FILL_MASS = 0.1  # kg: mass for a moving body without one
 _MARGIN = 1e-9  # of the trace: how far inside the physical region an inertia is kept
 _KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -64,7 +65,7 @@ def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _repair_link(link: Element) -> Iterator[Finding]:
-    """A generator that returns the link's mass, kg."""
+    """Repairs one link: a generator of findings that returns the link's mass, kg."""
     inertial = child(link, "inertial")
     if inertial is None:
         return 0.0

@@ -1,4 +1,5 @@
-"""Joints of a URDF made uniform: unit axes, `continuous` as bounded revolute, grippers and mimics frozen."""
+"""Normalises the joints of a URDF: axes get unit length, `continuous` joints become revolute, gripper and
+mimic joints become fixed."""
 
 from __future__ import annotations
 
@@ -69,7 +70,7 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
 
 
 def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
-    """Name → (value, reason) of the joints an arm controller does not move."""
+    """Returns name → (value, reason) of the joints that an arm controller does not move."""
     frozen: dict[str, tuple[float, str]] = {}
     joints, carriers = named(root, "joint"), parent_joints(root)
     for joint in movable_joints(root):
@@ -83,14 +84,14 @@ def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
                 frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
         elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
             frozen.setdefault(name, (0.0, "its name says it belongs to a gripper"))
-    # A description of a hand alone is still a robot: with nothing else to move, keep what the names suggest.
+    # A hand alone is a robot too: if no other joints move, joints with gripper names stay movable.
     if len(frozen) == len(movable_joints(root)):
         frozen = {name: why for name, why in frozen.items() if child(joints[name], "mimic") is not None}
     return frozen
 
 
 def _same_chain(carriers: dict[str, Element], one: Element, other: Element) -> bool:
-    """Whether one of two joints carries the other."""
+    """Returns whether one of two joints carries the other."""
     pairs = ((one, other), (other, one))
     return any(first in _ancestors(carriers, end_of(second, "child")) for first, second in pairs)
 
@@ -190,5 +191,5 @@ def _text(values: np.ndarray) -> str:
 
 
 def finite_bounds(lower: float, upper: float) -> bool:
-    """Whether a pair of canonical limits means a bounded joint."""
+    """Returns whether a pair of canonical limits belongs to a bounded joint."""
     return math.isfinite(lower) and math.isfinite(upper) and max(abs(lower), abs(upper)) < UNBOUNDED

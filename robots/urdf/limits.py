@@ -1,4 +1,4 @@
-"""Speed and effort limits: what a URDF leaves out is estimated from the robot itself, and reported."""
+"""Speed and effort limits: missing values are estimated from the robot's own model and reported."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from robots.urdf.joints import finite_bounds
 from robots.urdf.read import Refusal, child, label, numbers
 from robots.urdf.structure import movable_joints
 
-_SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: brisk but safe for an arm nobody described
-_LEAST = 1e-6  # rad/s, N·m: a smaller limit is none, nothing moves with it
-_LEVER = 3.0  # effort = this times what holding still against gravity can need
-_ACCELERATION = 10.0  # rad/s², m/s²: and at least enough to accelerate the joint like this
+_SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast but safe for an unknown arm
+_LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, and no motion would be possible with it
+_LEVER = 3.0  # effort limit divided by the largest gravity load
+_ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition
 
 
 def fill_speeds(root: Element) -> Iterator[Finding]:
-    """Fills missing, vanishing and negative velocity limits and marks such effort limits with 0."""
+    """Fills missing, zero and negative velocity limits, and marks effort limits of these kinds with 0."""
     for joint in movable_joints(root):
         limit = child(joint, "limit")
         if limit is None:

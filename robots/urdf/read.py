@@ -1,4 +1,4 @@
-"""Reading a URDF's XML safely, and its numbers strictly."""
+"""Reads the XML of a URDF safely, and its numbers strictly."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robots.errors import InputError, shortened
 from robots.report import Finding
 
 MAX_BYTES = 10_000_000
-_LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: beyond, sums of inertias lose all digits
+_LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: sums of inertias lose all digits for larger numbers
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 """What the readers of URDF in C++ take for a number; Python takes more."""
 _XACRO_HINT = "; is this a xacro file? Run `xacro FILE > robot.urdf` first"
@@ -80,14 +80,15 @@ def load_bytes(path: Path) -> bytes:
 
 
 def label(element: Element) -> str:
-    """How a finding names an element: ``joint 'elbow'``."""
+    """Returns the name of an element in findings: ``joint 'elbow'``."""
     return f"{element.tag} '{shortened(element.get('name', ''))}'"
 
 
 def numbers(
     element: Element, attribute: str, count: int, default: tuple[float, ...] | None = None
 ) -> np.ndarray:
-    """`count` finite numbers of an attribute. Raises Refusal when they are not there or are not numbers."""
+    """Returns `count` finite numbers of an attribute. Raises Refusal if they are missing or are not
+    numbers."""
     text = element.get(attribute)
     where = _owner(element)
     name = f"{element.tag} {attribute}"
@@ -95,7 +96,7 @@ def numbers(
         if default is None:
             raise Refusal(where, f"{name} is missing; it needs {count} number{'s' * (count > 1)}")
         if text is not None:
-            del element.attrib[attribute]  # to other readers an empty number is no number
+            del element.attrib[attribute]  # other readers do not accept an empty number
         return np.array(default, dtype=float)
     words = text.split()
     try:
@@ -117,7 +118,7 @@ def child(element: Element, tag: str) -> Element | None:
 
 
 def without_shapes(root: Element) -> str:
-    """The document without what is only looked at: no reader of kinematics has use for it."""
+    """Returns the document without visual and collision shapes, which readers of kinematics do not need."""
     bare = copy.deepcopy(root)
     for material in bare.findall("material"):
         bare.remove(material)

@@ -1,4 +1,5 @@
-"""The tree of a URDF: every link and joint named once, one root, no loop, only joints with one axis."""
+"""Checks the tree of a URDF: unique names of links and joints, one root, no loops, and only joints with one
+axis."""
 
 from __future__ import annotations
 
@@ -32,17 +33,17 @@ def check_structure(root: Element, source: str) -> Iterator[Finding]:
 
 
 def movable_joints(root: Element) -> list[Element]:
-    """The joints that still move, in the file's order."""
+    """Returns the joints that are not fixed, in the file's order."""
     return [joint for joint in root.findall("joint") if joint.get("type") in MOVABLE]
 
 
 def parent_joints(root: Element) -> dict[str, Element]:
-    """For every link but the root: the joint that carries it."""
+    """Returns for every link except the root the joint that carries it."""
     return {end_of(joint, "child"): joint for joint in root.findall("joint")}
 
 
 def body_of(root: Element) -> dict[str, str]:
-    """For every link: the first link of the rigid body it belongs to, the one a moving joint carries."""
+    """Returns for every link the first link of its rigid body: the link that a moving joint carries."""
     carriers = parent_joints(root)
     found: dict[str, str] = {}
     for link in named(root, "link"):
