@@ -1,4 +1,4 @@
-"""How a robot is controlled: tasks, limits, prediction, the cascade of QPs, controllers."""
+"""Control of a robot: tasks, limits, prediction, the cascade of QPs, and the controllers."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""The controllers by name, one line each, and their routes: for lists and menus, which need none of them
+"""Names, one-line descriptions and routes of the controllers, for lists and menus. No controller is
 loaded."""
 
 from __future__ import annotations

@@ -25,18 +25,18 @@ def solve_cascade(
     previous: Mapping[str, LevelSolution],
     solver: Solver,
 ) -> list[LevelSolution]:
-    """Solves the levels in order; each keeps what (33) asks of the levels above.
+    """Solves the levels in order; each level satisfies the priority constraints (33) of the levels above.
 
-    The ladder, each rung counted by the caller: "solve" the printed problem; "soften" the state rows by the
-    least slack that makes them feasible, and pass the widened rows down (else Theorem 2 breaks);
-    level 1 then falls to the shifted "previous" plan of that level if that was an optimum and meets all rows,
-    or "brake"s as the rows allow; a lower level "inherit"s U_{i−1}, which keeps every priority. So the
-    increments meet all rows whenever any do.
+    The fallbacks, in the order in which they are tried: "solve" solves the printed problem; "soften" widens
+    the state rows by the least slack that makes them feasible, and passes the widened rows to the lower
+    levels (Theorem 2 needs this); level 1 then falls to the shifted "previous" plan of that level if that was
+    an optimum and meets all rows, or "brake"s as the rows allow; a lower level "inherit"s U_{i−1}, which
+    keeps every priority. So the increments meet all rows whenever any do.
 
     Args:
         problems: the levels, highest priority first; at least one.
         rows: all bounds of this tick.
-        previous: last tick's solutions by level name: warm starts and the "previous" rung.
+        previous: last tick's solutions by level name: warm starts and the "previous" fallback.
         solver: QP solver.
     """
     N, _, n = problems[0].B.shape

@@ -1,4 +1,5 @@
-"""The explicit route: every bound a row of a QP for a general solver; the compiled route's second opinion."""
+"""The explicit route: every bound is a row of a QP for a general solver. It serves to check the compiled
+route."""
 
 from __future__ import annotations
 
@@ -36,11 +37,11 @@ def solve_explicit(
     solver: Solver,
     iterations: int | None = None,
 ) -> Point | None:
-    """Problem i over all N·n increments, (32) or (34), with every bound handed to the solver.
+    """Solves Problem i, (32) or (34), over all N·n increments, with every bound as a row of the QP.
 
     The QP is stated in the level's white coordinates, see `white`: its Hessian is the identity however far
     weights and inertias are apart, (33) holds for all of them, and rows have length one. A point whose
-    residual is not all but nothing is solved for once more from the rows that it says bind, see `polished`.
+    residual is larger than rounding is refined from the rows that it reports as active, see `polished`.
     Knots beyond the level's own horizon keep the increments of the level above.
 
     Args:
@@ -49,13 +50,13 @@ def solve_explicit(
         U_above: U_{i−1}, (N, n).
         above: (B_p, U_p) of every level above.
         Z: orthonormal bases of what (33) leaves free, (N, n, d).
-        solver: which solver.
-        iterations: that one attempt may take, see `solve_qp`; None: as many as it likes.
+        solver: name of the QP solver.
+        iterations: largest number of iterations of one attempt, see `solve_qp`; None: no limit.
 
     Returns:
-        the optimum, or None if a row is missed that nothing free can move, or if no solver gave a point that
-        is within `KKT_TOLERANCE` of its optimality conditions: in N·m for every increment, or as a share of
-        it where it is larger than 1 N·m.
+        the optimum, or None if a violated row does not depend on the free directions, or if no solver gave a
+        point that is within `KKT_TOLERANCE` of its optimality conditions: in N·m for every increment, or as a
+        share of increments larger than 1 N·m.
     """
     n = U_above.shape[1]
     level = white(problem, U_above, [B for B, _ in above], Z)
@@ -70,7 +71,7 @@ def solve_explicit(
     reach = every @ np.tile(1.0 / np.sqrt(problem.R), problem.knots)
     kept = np.flatnonzero((length > _NOISE * reach) & (np.isfinite(lower) | np.isfinite(upper)))
     if (np.delete(np.maximum(lower - at, at - upper), kept) > KKT_TOLERANCE).any():
-        return None  # nothing that is free moves such a row
+        return None  # such a row does not depend on the free directions
     length = length[kept]
     A, low, high = A[kept] / length[:, None], (lower - at)[kept] / length, (upper - at)[kept] / length
     found = solve_qp(np.eye(level.c.size), level.c, A, low, high, solver, iterations)
@@ -108,7 +109,7 @@ def _judged(
     gradient, value = x + level.c + A.T @ multipliers, A @ x
     held = multipliers != 0.0
     missing = np.where(multipliers > 0, high, low)[held] - value[held]
-    # Of the gradient that is left, what presses on the rows only changes their multipliers.
+    # The part of the remaining gradient along the active rows only changes their multipliers.
     step = np.linalg.lstsq(A[held], missing + A[held] @ gradient)[0] - gradient
     size = np.maximum(1.0, np.abs(U_above.ravel()[: len(level.P)] + level.P @ x))
     moved = float((np.abs(level.P @ step) / size).max(initial=0.0))

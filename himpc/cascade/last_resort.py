@@ -1,4 +1,4 @@
-"""What is left where a level has no optimum: bounds that give way, and increments that keep to the bounds."""
+"""Fallbacks for a level without an optimum: softened bounds, and increments that satisfy the bounds."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ _ROOM = 1e-7
 
 
 def softened(rows: Rows) -> Rows | None:
-    """The rows with the least slack that makes them feasible; None if they need none."""
+    """Returns the rows widened by the least slack that makes them feasible; None if they need no slack."""
     slack = least_slack(rows)
     return rows.widened(np.where(slack > 0, slack + _ROOM, 0.0)) if slack.any() else None
 
 
 def last_resort(rows: Rows, before: Array | None) -> tuple[Fallback, Array]:
-    """The last rungs: the shifted "previous" plan if it meets all rows, else "brake": increments that meet
-    all rows whenever any do, and bring the joints to rest.
+    """Returns the last fallback: the shifted "previous" plan if it satisfies all rows, else "brake":
+    increments that bring the joints to rest and satisfy all rows whenever this is possible.
 
     Args:
         rows: all bounds.
-        before: the level's increments a tick ago, if they were an optimum.
+        before: the level's increments at the previous tick, if they were an optimum.
 
     Returns:
-        the rung and the increments, (N, n) N·m.
+        the name of the fallback and the increments, (N, n) N·m.
     """
     shape = rows.L.shape[1], rows.lower.shape[1]
     if before is not None and before.shape == shape:
@@ -41,8 +41,8 @@ def last_resort(rows: Rows, before: Array | None) -> tuple[Fallback, Array]:
 
 
 def towards(rows: Rows, U: Array, wanted: Array) -> Array | None:
-    """The last increments that meet the rows on the way from U, which meets them, to `wanted`, (N, n) each;
-    None where there is no way to go."""
+    """Moves from U, which satisfies the rows, towards `wanted` as far as the rows allow, (N, n) each; None if
+    no step is possible."""
     if not np.isfinite(wanted).all():
         return None
     here, change = rows.L @ U, rows.L @ (wanted - U)
@@ -53,6 +53,6 @@ def towards(rows: Rows, U: Array, wanted: Array) -> Array | None:
 
 
 def containing(rows: Rows, U: Array) -> Rows:
-    """The rows widened as far as U needs: lower levels then start from a feasible point."""
+    """Returns the rows widened until U satisfies them: lower levels then start from a feasible point."""
     value = rows.L @ U
     return rows._replace(lower=np.minimum(rows.lower, value), upper=np.maximum(rows.upper, value))

@@ -1,4 +1,4 @@
-"""What goes into a level's QP and what comes out of it."""
+"""The data of a level's QP and its solution."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class LevelProblem(NamedTuple):
         name: the level's stable identity.
         B: (N, m, n), Ĵ^j M̄⁻¹ at every knot.
         C: (N, m, N), effect coefficients of `prediction.task.ResidualModel`.
-        free: (N, m), e for U = 0.
+        free: (N, m), the free response: e for U = 0.
         weighted_free: (N, m), √Q free.
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
@@ -83,16 +83,16 @@ NO_ROWS = ActiveRows(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0), np
 
 
 class LevelSolution(NamedTuple):
-    """The evidence of one level.
+    """The solution of one level with its verification.
 
     Attributes:
         name: the level's identity.
         U: increments of this level and all above, (N, n) N·m.
         cost: the optimal value of the level's cost.
-        active: constraints that bind.
-        kkt_residual: of the applied point, scaled; 0 for rungs that apply no optimum.
-        status: "optimal", "empty" (no freedom left) or what the solver said.
-        rung: which step of the fallback ladder gave U.
+        active: the active constraints.
+        kkt_residual: scaled KKT residual of the applied point; 0 for fallbacks that apply no optimum.
+        status: "optimal", "empty" (no freedom left) or the status of the solver.
+        fallback: name of the fallback that gave U; "solve" if none was needed.
         time_us: wall time of this level, microseconds.
         qp_us: the QP solver's share of it; 0 where no solver was needed.
         leak: ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, m/s² or rad/s².
@@ -111,10 +111,10 @@ class LevelSolution(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Increments for one level, with what was verified about them.
+    """Increments of one level with their verified residual.
 
     Attributes:
-        error: Q^½ e over the level's knots, flattened, if the route has it at hand.
+        error: Q^½ e over the level's knots, flattened, if the route has computed it.
         qp_us: time spent in the QP solver, microseconds.
         time_us: time spent on this level, if the route knows it, microseconds.
     """

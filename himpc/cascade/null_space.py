@@ -1,4 +1,4 @@
-"""Bases of what the priority constraints (33) leave free at each knot."""
+"""Orthonormal bases of the directions that the priority constraints (33) leave free at each knot."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def nested_bases(levels: Sequence[Array]) -> list[Array]:
 
 @lru_cache(maxsize=8)
 def whole_space(N: int, n: int) -> Array:
-    """The basis of level 1, (N, n, n): everything is free."""
+    """Returns the basis of level 1, (N, n, n): all directions are free."""
     return np.tile(np.eye(n), (N, 1, 1))
 
 

@@ -1,5 +1,5 @@
-"""The optimum of min ½‖x + c‖² subject to low ≤ A x ≤ high, rows of length one, where a solver leaves off:
-from a point that is nearly one, or from any point that the rows admit."""
+"""Refines the solution of min ½‖x + c‖² subject to low ≤ A x ≤ high with rows of length one, from an almost
+optimal point or from any feasible point."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) 
 
 
 def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """From x = 0, by the primal active-set method; None if the rows do not admit it.
+    """Finds the optimum from x = 0 by the primal active-set method; None if x = 0 is not feasible.
 
-    Where they admit hardly another point, as below a level that has used up nearly all freedom, a solver that
-    looks for one from outside takes rounding for a contradiction. A row that blocks the way depends on none
-    of those held; after steps of no length the first row in order is taken or given back (Bland), so no set
-    of rows comes twice.
+    If there is hardly another feasible point, as below a level that has used up nearly all freedom, a solver
+    that starts from an infeasible point takes rounding errors for a contradiction. A row that blocks the way
+    depends on none of those held; after steps of no length the first row in order is taken or given back
+    (Bland), so no set of rows comes twice.
     """
     if not ((low <= 0.0) & (high >= 0.0)).all():
         return None
@@ -94,7 +94,7 @@ def _held(side: Array, c: Array, A: Array, low: Array, high: Array) -> tuple[Arr
         return -c, pull
     rows, bound = A[held], np.where(side > 0, high, low)[held]
     x = -c
-    for _ in range(2):  # the second time takes away the first one's rounding
+    for _ in range(2):  # the second pass removes the rounding errors of the first
         x = x + np.linalg.lstsq(rows, bound - rows @ x)[0]
     pull[held] = np.linalg.lstsq(rows.T, -c - x)[0]
     return x, pull

@@ -1,4 +1,5 @@
-"""A level's problem in white coordinates: its Hessian is the identity, and (33) holds for all of them."""
+"""Transforms a level's problem to white coordinates, in which its Hessian is the identity and every point
+satisfies (33)."""
 
 from __future__ import annotations
 

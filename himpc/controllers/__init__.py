@@ -1,4 +1,4 @@
-"""Controllers: one file, one class each."""
+"""The controllers; each file contains one class."""
 
 from typing import TYPE_CHECKING
 

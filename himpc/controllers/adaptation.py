@@ -1,4 +1,4 @@
-"""M̄ that looks after itself: from how heavy a payload must be for gravity to pull as it does.
+"""Adaptation of M̄: the payload is estimated from the gravity torque, and M̄ is fitted to it.
 
 While the robot moves, the applied torque is on average what holds it: τ ≈ g(q) + m φ(q), with g the nominal
 model's gravity (`Settings.nominal`) and φ what one kilogram at the tip adds. The payload m is found by least
@@ -16,14 +16,14 @@ limits, time-delay estimation multiplies its error by 1 − M⁻¹M̄ from tick 
 eigenvalues of M⁻¹M̄ between 0 and 2. By construction M̄ ⪯ M̂, so with M the robot's own inertia
 
 - where M ⪰ M̂, as with a payload that is thought too small, no eigenvalue exceeds 1;
-- none reaches 2 as long as M ≻ ½M̂; links of half the mass, or a payload that was just dropped and still
-  counts, come to that edge.
+- none reaches 2 as long as M ≻ ½M̂; the bound is reached with links of half the mass, or just after a payload
+  was dropped that is still in the estimate.
 
-These are statements about one M̄. That it changes as the arm moves is a disturbance here, as a changing M is
-in Remark 4; runs show what comes of it (`himpc-lab reproduce himpc-adaptation`).
+These statements hold for a constant M̄. Its change as the arm moves acts as a disturbance, like the change of
+M in Remark 4; `himpc-lab reproduce himpc-adaptation` shows its effect.
 
-Gravity needs no derivative: a coarse encoder does not disturb it. What does: friction that stands in τ for
-long, a wrong nominal model, and a payload that gravity does not pull at any joint with (then m̂ stays 0).
+The estimate uses no derivative, and a coarse encoder does not disturb it. It is disturbed by lasting friction
+in τ and by a wrong nominal model; a payload whose weight loads no joint is not seen (m̂ stays 0).
 """
 
 from __future__ import annotations
@@ -77,12 +77,12 @@ class LoadModel:
 
 
 class Adaptation(NamedTuple):
-    """What is known at a tick.
+    """The state of the adaptation at a tick.
 
     Attributes:
         M_bar: the diagonal in force, (n,) kg·m².
         pulled, pull: Σ φᵀ(τ − g) and Σ φᵀφ.
-        ticks: how many were looked at or passed over.
+        ticks: number of ticks, used or skipped.
     """
 
     M_bar: Array
@@ -99,11 +99,11 @@ class Adaptation(NamedTuple):
 def adapted(
     before: Adaptation, model: LoadModel, q: Array, tau: Array, period: float, M_bar: Array
 ) -> Adaptation:
-    """What is known one period later.
+    """Returns the state of the adaptation one period later.
 
     Args:
-        before: at the tick before.
-        model: nominal.
+        before: state at the previous tick.
+        model: the nominal model.
         q: measured position, (n,).
         tau: torque that acted during the period, (n,) N·m.
         period: s.
@@ -126,7 +126,7 @@ def adapted(
 
 
 def wanted(M: Array, Phi: Array, payload_kg: float, M_bar: Array) -> Array:
-    """The M̄ with λ_max(M̂⁻¹M̄) = 1, below LARGEST times what was set, (n,).
+    """Returns the M̄, (n,), with λ_max(M̂⁻¹M̄) = 1, below LARGEST times the value that was set.
 
     Args:
         M, Phi: the nominal inertia and what a kilogram more adds, (n, n).

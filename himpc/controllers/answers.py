@@ -1,4 +1,4 @@
-"""What comes of the answer of code from outside: is it a torque, and what does it do to the levels."""
+"""Checks the return value of a user's controller, and computes its effect on the levels."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ Array = NDArray[np.float64]
 
 
 class OwnFault(Exception):
-    """Code from outside did not do what a controller must; the message is one sentence."""
+    """A user's controller failed or returned an invalid value. The message is one sentence."""
 
 
 def checked(answer: Any, levels: int, n: int, where: str) -> Array:
-    """The torques as (1, n) or one row per level (r, n). Raises OwnFault for anything else."""
+    """Returns the torques as an array (1, n), or (r, n) with one row per level. Raises OwnFault for any other
+    value."""
     what = f"a torque has shape ({n},)" + (f", or ({levels}, {n}) with a row per level" if levels > 1 else "")
     try:
         found = np.array(answer if answer is not None else "", float)

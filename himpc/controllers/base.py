@@ -1,4 +1,4 @@
-"""What all controllers at torque level begin with."""
+"""The base class of all torque-level controllers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 
 class TorqueController(ABC):
-    """Robot, settings in use, the torque that acts and the bounds in force, which come down from none."""
+    """Holds the robot, the settings in use, the acting torque and the bounds in force. After a reset the
+    bounds close in gradually from infinity."""
 
     def __init__(self, robot: Robot, settings: Settings) -> None:
         """Raises InputError if the settings name frames or joints that the robot does not have."""
@@ -37,4 +38,4 @@ class TorqueController(ABC):
 
     @abstractmethod
     def _apply(self, settings: Settings) -> None:
-        """Takes settings into use; raises InputError before it changes anything."""
+        """Applies new settings. Raises InputError before it changes anything."""

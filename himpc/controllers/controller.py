@@ -1,4 +1,4 @@
-"""What a session needs of a controller."""
+"""The interface of a torque-level controller."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 
 
 class Controller(Protocol):
-    """A torque-level controller: measured state and reference in, torque and evidence out."""
+    """A torque-level controller. It computes a torque and its evidence from the measured state and the
+    references."""
 
     @property
     def settings(self) -> Settings:
@@ -28,11 +29,12 @@ class Controller(Protocol):
         ...
 
     def configure(self, settings: Settings) -> None:
-        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        """Applies new settings immediately and without a jump of the torque. If they do not fit, it raises
+        InputError and changes nothing."""
         ...
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period; never raises for a state, and the torque is finite."""
+        """Computes one control period. It raises no error for any state, and the torque is always finite."""
         ...

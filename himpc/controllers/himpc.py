@@ -34,8 +34,8 @@ _FAINTEST = 1e-8
 
 
 class HIMPC(TorqueController):
-    """Reads geometry and limits of the robot, never a mass: time-delay estimation is the model. (Only with
-    `M_bar_adapt` the nominal one tells how large M̄ may be.)
+    """HIMPC with time-delay estimation instead of a dynamic model: it reads geometry and limits of the robot,
+    but no masses. (Only with `M_bar_adapt` the nominal model determines M̄.)
 
     One `step` per period T_s. What it remembers between steps is the torque that was applied (τ₀), the
     previous velocities (for q̈ and ẍ by backward difference) and the previous plan (for the Jacobians
@@ -44,8 +44,8 @@ class HIMPC(TorqueController):
 
     @property
     def problems(self) -> list[LevelProblem]:
-        """What the last tick solved, a problem per level, highest priority first; none where no level is on
-        or no tick came through."""
+        """The problems of the last tick, one per level, highest priority first; empty if no level is enabled
+        or no tick has been solved."""
         if self._idle:
             return []
         return self._asked if self.kernel is None else self.kernel.problems()
@@ -61,7 +61,8 @@ class HIMPC(TorqueController):
         self._weight: dict[str, float] = {}
 
     def configure(self, settings: Settings) -> None:
-        """Takes new settings at once. If they do not fit the robot: InputError, and nothing changes."""
+        """Applies new settings immediately. If they do not fit the robot, it raises InputError and changes
+        nothing."""
         before = [about(task) for task in self._form.tasks]
         same = settings.M_bar == self._settings.M_bar and settings.T_s == self._settings.T_s
         measured_so_far = self._adaptation if same and settings.M_bar_adapt else None
@@ -83,30 +84,30 @@ class HIMPC(TorqueController):
         self._M_bar = self._M_bar_set
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
-        # No joint gives more: a reading beyond it is wrong, and must not pass for a bound to come down from.
+        # No joint can give more torque. A larger reading is wrong and must not be the start of a bound.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings = settings
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         self.kernel = self._compile() if settings.route == "compiled" else None
 
     def _compile(self) -> CompiledTick:
-        """The kernel with these settings."""
+        """Creates the compiled tick for the settings in use."""
         levels = [] if self._idle else [LevelTable.of(level) for level in self._form.levels]
         return CompiledTick(self.robot, self._settings, self._form, self._off, levels)
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period: measured state in, torque and evidence out.
+        """Computes one control period: the torque and its evidence from the measured state.
 
         Args:
             q, v: measured joint positions and velocities, (n,).
             previews: the reference of every task by its name, sampled at this tick with T_s and N.
-            tau_applied: the torque that acted during the last period, (n,) N·m; None: the one asked for.
+            tau_applied: the torque that acted during the last period, (n,) N·m; None: the commanded torque.
 
         Returns:
-            the plan. Whatever the state, its torque is finite and inside the torque bounds; a state
-            that is not finite holds the last torque.
+            the plan. For every state its torque is finite and inside the torque bounds; if the state is not
+            finite, the last torque is held.
         """
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):
@@ -155,7 +156,7 @@ class HIMPC(TorqueController):
     def _step_compiled(
         self, tick: CompiledTick, q: Array, v: Array, previews: Mapping[str, Preview], started: int
     ) -> Plan:
-        """`step` by the kernel."""
+        """Computes `step` by the compiled kernel."""
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, self._settings.T_s)
         if self._weight:
             for place, level in enumerate(self._form.levels):
@@ -168,7 +169,7 @@ class HIMPC(TorqueController):
         return plan
 
     def _adapt(self, q: Array) -> None:
-        """M̄ from the torque that was needed."""
+        """Adapts M̄ to the torque that acted."""
         settings = self._settings
         assert self._load is not None
         before = self._adaptation or Adaptation(self._M_bar_set)
@@ -192,7 +193,7 @@ class HIMPC(TorqueController):
         if problems is None:
             return None
         if self._idle:
-            # With no level on and damping off nothing is asked for: the torque stays.
+            # Without any enabled level and without damping the torque is held.
             return PeriodResult([], x_dot, predict_positions(state, self._still, self._M_bar, settings.T_s))
 
         self._asked = problems
@@ -202,7 +203,7 @@ class HIMPC(TorqueController):
         )
 
     def _cascade(self, problems: list[LevelProblem], tick: PeriodState) -> list[LevelSolution]:
-        """Problem 1 to Problem r."""
+        """Solves Problem 1 to Problem r."""
         return solve_cascade(problems, tick.rows, tick.memory.solutions, self._settings.solver)
 
     def _problems(
@@ -247,7 +248,8 @@ class HIMPC(TorqueController):
         return math.sqrt(_FAINTEST ** (1.0 - weight))
 
     def _hold(self, q: Array, started: int) -> Plan:
-        """The plan for a tick without a usable state: keep the torque, forget the memory."""
+        """Returns the plan for a tick without a usable state: the torque is held and the memory is
+        cleared."""
         N, n = self._settings.horizon, self.robot.n
         self._memory = self._adaptation = None
         if self.kernel is not None:

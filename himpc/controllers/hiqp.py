@@ -20,9 +20,9 @@ _KNOTS = 1
 
 
 class HIQP(HIMPC):
-    """HIMPC with N = 1, whatever horizon the settings name.
+    """HIMPC with N = 1; the horizon of the settings is ignored.
 
-    Δτ_k moves ẍ_{k+1} and ẋ_{k+1}, not x_{k+1}: the printed position rows (32d) are beyond its reach.
+    Δτ_k moves ẍ_{k+1} and ẋ_{k+1}, not x_{k+1}: it cannot influence the printed position rows (32d).
     """
 
     def __init__(self, robot: Robot, settings: Settings) -> None:
@@ -30,13 +30,14 @@ class HIQP(HIMPC):
         super().__init__(robot, replace(settings, horizon=_KNOTS))
 
     def configure(self, settings: Settings) -> None:
-        """Takes new settings at once, but for the horizon. InputError if they do not fit: nothing changes."""
+        """Applies new settings immediately, except the horizon. If they do not fit, it raises InputError and
+        changes nothing."""
         super().configure(replace(settings, horizon=_KNOTS))
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period, see `HIMPC.step`; of the previews it reads the next knot only."""
+        """Computes one control period, see `HIMPC.step`; it reads only the next knot of the previews."""
         if self.kernel is None:
             previews = {name: _next(each) for name, each in previews.items()}
         return super().step(q, v, previews, tau_applied)

@@ -23,11 +23,12 @@ _BINDING = 1e-9
 
 
 _REST = 5.0
-"""1/s: K_v of the last rung, q̈ = −K_v q̇ within the torque bounds, if the first QP has no verified point."""
+"""1/s: K_v of the last fallback, q̈ = −K_v q̇ within the torque bounds, if the first QP has no verified
+point."""
 
 
 class VerifiedOptimum(NamedTuple):
-    """A level's y with what was verified about it."""
+    """The optimum y of a level with its verification."""
 
     y: Array
     active: ActiveRows = NO_ROWS
@@ -42,7 +43,7 @@ class HQP(OneStepController):
 
     Priority: J_p M_n⁻¹ y_i = J_p M_n⁻¹ y_p for all levels p above, as in (34g) with the nominal M_n
     (`settings.nominal`) in M̄'s place. ẍ_i closes (4) with the gains of the tasks. As in section V only the
-    torque is bounded: velocity and position limits are not known to it.
+    torque is bounded; velocity and position limits are not imposed.
 
     [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
     singularity. Multiplied out, as here, no product of Jacobians is inverted, and R > 0 keeps every Hessian
@@ -76,7 +77,8 @@ class HQP(OneStepController):
                 else VerifiedOptimum(y, status="empty")
             )
             if not found.usable:
-                # Staying where the levels above are keeps every priority; below nothing, come to rest.
+                # The solution of the levels above keeps every priority; the first level brings the robot to
+                # rest instead.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
                 fallback = "inherit" if i else "brake"
                 found = VerifiedOptimum(y if i else braking, status=found.status, qp_us=found.qp_us)
@@ -109,7 +111,7 @@ class HQP(OneStepController):
         weighted = demand.form.root_Q[:, None] * B
         H = free.T @ (weighted.T @ weighted + R) @ free
         f = free.T @ (weighted.T @ demand.residual(B @ y) + R @ y)
-        # y meets the bounds up to rounding; it must stay feasible exactly.
+        # y satisfies the bounds up to rounding; this point must stay feasible exactly.
         lower, upper = np.minimum(rows.lower[0] - y, 0.0), np.maximum(rows.upper[0] - y, 0.0)
         solution = solve_qp(H, f, free, lower, upper, self._settings.solver)
         if not solution.solved:
@@ -120,7 +122,7 @@ class HQP(OneStepController):
 
 
 def _binding(multipliers: Array, step: Array, lower: Array, upper: Array) -> ActiveRows:
-    """Of the rows lower ≤ step ≤ upper those that are met and press, (n,) each."""
+    """Returns which bounds of lower ≤ step ≤ upper are active with a multiplier, (n,) each."""
     pressed = np.abs(multipliers) > _BINDING
     if not pressed.any():
         return NO_ROWS

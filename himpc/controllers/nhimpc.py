@@ -71,7 +71,7 @@ class NHIMPC(HIMPC):
 
 
 def _solved(found: PeriodResult) -> bool:
-    """Whether every level is at its optimum; what is none leads to none by being solved again."""
+    """Whether every level is at its optimum. Further iterations are useless otherwise."""
     return bool(found.solutions) and all(solution.fallback == "solve" for solution in found.solutions)
 
 

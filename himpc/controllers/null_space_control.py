@@ -23,11 +23,12 @@ with 0.1, and level 1 is a quarter worse with 0.4; RT1 never comes that close to
 
 
 class Projected(NamedTuple):
-    """What the levels down to one of them apply.
+    """The torque of the levels down to one of them.
 
     Attributes:
         torque: sum of the levels' torques so far, bias left out, (n,) N·m.
-        lost: directions the level cannot move though it has the rows and the levels above leave the freedom.
+        lost: number of directions that are lost to a singularity: the level has rows for them and the levels
+            above leave them free.
     """
 
     torque: Array

@@ -1,4 +1,4 @@
-"""What the one-step controllers share: they look at this tick only and ask for an acceleration per level."""
+"""The base class of the one-step controllers, which have no horizon and demand an acceleration per level."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _NUDGE = 1e-4
 
 
 class Demand(NamedTuple):
-    """What one level asks for now: q̈ with J q̈ = ẍ_d − K_v(ẋ − ẋ_d) − K_p x̃ − J̇q̇, which is (4).
+    """The demand of one level at this tick: q̈ with J q̈ = ẍ_d − K_v(ẋ − ẋ_d) − K_p x̃ − J̇q̇, which is (4).
 
     Attributes:
         form: the level with its weights.
@@ -47,7 +47,7 @@ class Demand(NamedTuple):
     acceleration: Array
 
     def residual(self, effect: Array) -> Array:
-        """√Q times what J q̈ misses, (m,); effect: J q̈, (m,)."""
+        """√Q times the error of J q̈, (m,); effect: J q̈, (m,)."""
         return self.form.root_Q * (effect - self.acceleration)
 
 
@@ -66,8 +66,8 @@ class Law(NamedTuple):
 class OneStepController(TorqueController):
     """State, settings and their bumpless change for OSF, TDEOSF and HQP; a subclass gives the law.
 
-    A change of settings is bumpless: the difference it makes to the torque at once is taken back and fades
-    in over BLEND_SECONDS. `reset` starts with the pure law.
+    A change of settings is bumpless: the jump that it makes in the torque is subtracted, and this correction
+    fades out over BLEND_SECONDS. After `reset` there is no correction.
     """
 
     clips: bool = False
@@ -85,7 +85,8 @@ class OneStepController(TorqueController):
         self._changed = False
 
     def configure(self, settings: Settings) -> None:
-        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        """Applies new settings immediately and without a jump of the torque. If they do not fit, it raises
+        InputError and changes nothing."""
         self._apply(settings)
         self._changed = True
 
@@ -105,7 +106,8 @@ class OneStepController(TorqueController):
 
     @abstractmethod
     def _adopt(self, settings: Settings) -> None:
-        """Prepares what the law needs beyond the stack; raises InputError before it changes anything."""
+        """Prepares the data that the law needs besides the stack. Raises InputError before it changes
+        anything."""
 
     @abstractmethod
     def _law(self, q: Array, v: Array, a: Array, demands: list[Demand]) -> Law:
@@ -114,7 +116,7 @@ class OneStepController(TorqueController):
         Args:
             q, v: measured state, (n,).
             a: q̈ by backward difference of q̇, (n,).
-            demands: the levels, highest priority first; none if nothing is asked for.
+            demands: the levels, highest priority first; empty if no level is enabled.
 
         Raises:
             numpy.linalg.LinAlgError: the model cannot be evaluated here; the torque is then held.
@@ -123,14 +125,15 @@ class OneStepController(TorqueController):
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period: measured state in, torque and evidence out; arguments as in `HIMPC.step`.
+        """Computes one control period: the torque and its evidence from the measured state; arguments as in
+        `HIMPC.step`.
 
         Returns:
             the plan, whose torque is finite. A state that is not finite holds the last torque.
         """
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):
-            # Where torque is bounded, a reading beyond what a joint gives is wrong, see `HIMPC`.
+            # A reading beyond a joint's torque bound is wrong, see `HIMPC`.
             self._tau_0 = np.minimum(np.maximum(tau_applied, -self._reach), self._reach)
         if not (usable(q) and usable(v)):
             return self._hold(q, "state not finite", started)
@@ -192,7 +195,8 @@ class OneStepController(TorqueController):
         return [Demand(level, J[level.rows], acceleration[level.rows]) for level in form.levels]
 
     def _blended(self, law: Law) -> tuple[Array, list[LevelSolution]]:
-        """The torque, and the levels relative to τ₀; what the last change of settings did fades in."""
+        """Returns the torque, and the levels relative to τ₀; the effect of the last change of settings fades
+        in."""
         lead = law.levels[-1].U[0] if law.levels else np.zeros(self.robot.n)
         if self._changed:
             self._offset = (self._lead if self.incremental else self._tau_0 - law.bias) - lead
@@ -206,7 +210,8 @@ class OneStepController(TorqueController):
         return tau, [level._replace(U=level.U + (base - self._tau_0)) for level in law.levels]
 
     def _hold(self, q: Array, status: str, started: int) -> Plan:
-        """The plan for a tick without a usable state or model: keep the torque, forget the velocity."""
+        """Returns the plan for a tick without a usable state or model: the torque is held and the velocity is
+        forgotten."""
         self._before = None
         if self.clips:
             self._tau_0 = np.clip(self._tau_0, self._limits.tau_lower, self._limits.tau_upper)
@@ -236,7 +241,7 @@ class OneStepController(TorqueController):
         )
 
     def _rows(self, limits: LimitsInForce, origin: Array) -> Rows:
-        """The bounds of this tick on torques counted from `origin`."""
+        """Returns the bounds of this tick on torques relative to `origin`."""
         lower, upper = limits.tau_lower - origin, limits.tau_upper - origin
         return Rows(np.ones((1, 1)), lower[None], upper[None], ("torque",))
 

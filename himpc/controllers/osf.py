@@ -19,7 +19,7 @@ class OSF(OneStepController):
     ẍ_i = ẍ_id − K_v (ẋ_i − ẋ_id) − K_p (x_i − x_id).
     Every level is feedback-linearised with the nominal M_n and N_n = C_n q̇ + G_n + F_n (`settings.nominal`),
     decoupled from the levels above by dynamically consistent projection, and closes (4) with the gains of the
-    tasks. No bound is known to it: the torque of the plan is its demand. Nothing is damped unless `damping`
+    tasks. It imposes no bounds: the torque of the plan is its demand. Nothing is damped unless `damping`
     says so; near a singularity of the projected Jacobian the demand grows without bound.
     """
 

@@ -1,4 +1,4 @@
-"""A controller of one's own: code from outside that is shown a `View` and returns a torque."""
+"""Runs a user's own controller, which receives a `View` at every tick and returns a torque."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ _NUDGE = 1e-4
 
 
 class OwnController(TorqueController):
-    """Runs code from outside and does everything else: what it sees, bounds in force, evidence.
+    """Runs a user's control law. It prepares the law's view, applies the bounds in force and collects the
+    evidence.
 
     The answer of the law is a torque (n,) N·m, or one row per level (r, n), the torque that the levels down
     to each would apply: the last row acts, and the leak between levels (33) is then measured with M̄ too.
@@ -55,7 +56,8 @@ class OwnController(TorqueController):
     def __init__(
         self, robot: Robot, settings: Settings, make: Callable[[], Law], call: Calling, where: str
     ) -> None:
-        """make: a fresh law, without memory; where: its file and line. Raises InputError if the settings do
+        """make: creates a new law without memory; where: file and line of the law. Raises InputError if the
+        settings do
         not fit the robot."""
         self._elsewhere = robot.model.createData()
         self._make, self._call, self._where = make, call, where
@@ -71,7 +73,8 @@ class OwnController(TorqueController):
         self._share = 1.0
 
     def configure(self, settings: Settings) -> None:
-        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        """Applies new settings immediately and without a jump of the torque. If they do not fit, it raises
+        InputError and changes nothing."""
         self._apply(settings)
         self._x_dot = None
         self._share = _FIRST_SHARE
@@ -87,7 +90,7 @@ class OwnController(TorqueController):
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period, as `HIMPC.step`; never raises for what the law does."""
+        """Computes one control period like `HIMPC.step`. Errors of the law raise no exception."""
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):
             self._tau_0 = np.array(tau_applied, float)
@@ -201,7 +204,7 @@ class OwnController(TorqueController):
     # ---------------------------------------------------------------- what comes of its answer
 
     def _opened(self, answers: Array) -> Array:
-        """After a change of settings the torque goes over to what the law now wants."""
+        """Blends the torque after a change of settings to the law's new torque."""
         share, T_s = self._share, self._settings.T_s
         if share >= 1.0:
             return answers
@@ -224,7 +227,7 @@ class OwnController(TorqueController):
 
         def evidence() -> Evidence:
             increments = answers - tau_0
-            known = len(answers) == len(now.levels)  # else nobody can tell what each level alone wants
+            known = len(answers) == len(now.levels)  # a single torque does not show the demand of each level
             levels = []
             for i, level in enumerate(now.levels):
                 U = increments[i] if known else increments[-1]
@@ -245,7 +248,8 @@ class OwnController(TorqueController):
         started: int,
         notice: str | None,
     ) -> Plan:
-        """The plan of a tick without an answer. moving: the acceleration to be taken away, (n,)."""
+        """Returns the plan of a tick without a torque from the law. moving: the acceleration to be removed,
+        (n,)."""
         limits: LimitsInForce = self._limits
         tau = np.clip(self._tau_0 - self._M_bar * moving, limits.tau_lower, limits.tau_upper)
         status = "the code failed" if self._failed else "state not finite"

@@ -1,4 +1,4 @@
-"""What one control period starts from and what it finds, on the printed route."""
+"""Input and result of one control period on the printed route."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class PeriodState(NamedTuple):
-    """What one control period starts from; `values` and `errors` are filled while it is solved."""
+    """The input of one control period; `values` and `errors` are filled during the solution."""
 
     state: JointState
     memory: Memory
@@ -29,7 +29,8 @@ class PeriodState(NamedTuple):
 
 
 class PeriodResult(NamedTuple):
-    """What one control period found: levels, ẋ_k of all rows, q at knots 0 … N, how many cascades it took."""
+    """The result of one control period: levels, ẋ_k of all rows, q at knots 0 … N, number of cascades
+    solved."""
 
     solutions: list[LevelSolution]
     x_dot: Array

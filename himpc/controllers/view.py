@@ -1,4 +1,4 @@
-"""What a controller of one's own is shown every tick, in the symbols of the HIMPC paper."""
+"""The data that a user's own controller receives at every tick, in the symbols of the HIMPC paper."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class LevelView:
     """One level of the hierarchy at this tick; m coordinates of all its tasks, one after the other.
 
     Attributes:
-        name: the level's name; "damping" for the one that calms what no other level uses.
+        name: the level's name; "damping" for the level that damps the directions that no other level uses.
         tasks: names of its tasks.
         x: values of its tasks by name: coordinates (m,), or a rotation matrix (3, 3).
         error: x̃ = x − x_d, (m,) m or rad; log₃(R R_dᵀ) for rotations, on fewer than three axes
@@ -87,8 +87,8 @@ class View:
         N: horizon, knots.
         M_bar: diagonal of M̄, (n,) kg·m².
         levels: highest priority first.
-        bounds: what must not be exceeded.
-        nominal: the dynamic model a model-based controller believes in.
+        bounds: the bounds of this tick.
+        nominal: the nominal dynamic model, for model-based controllers.
     """
 
     q: Array
@@ -123,7 +123,7 @@ class View:
         return read_only(self.nominal.bias(self.q, np.zeros(self.n)))
 
     def level(self, name: str) -> LevelView:
-        """A level by its name. Raises KeyError, naming the levels there are."""
+        """Returns a level by its name. Raises KeyError, naming the available levels."""
         for level in self.levels:
             if level.name == name:
                 return level
@@ -131,7 +131,7 @@ class View:
 
 
 def read_only(values: Array) -> Array:
-    """The same numbers in an array of their own that nobody can write to."""
+    """Returns a read-only copy of an array."""
     found = np.array(values, float)
     found.flags.writeable = False
     return found

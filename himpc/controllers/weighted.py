@@ -1,4 +1,4 @@
-"""All tasks in one cost: what strict priorities are compared with."""
+"""A controller with all tasks in one weighted cost, for comparison with strict priorities."""
 
 from __future__ import annotations
 
@@ -86,7 +86,8 @@ class Weighted(HIMPC):
 
 
 def accumulated(levels: Sequence[LevelForm]) -> Iterator[LevelTable]:
-    """Levels 1 … p in one cost, for every p; each entry's evidence is about level p."""
+    """Builds the problems of levels 1 … p in one cost, for every p; the evidence of each problem is about
+    level p."""
     R, knots = np.zeros_like(levels[0].R), 0
     for level in levels:
         R, knots = R + level.R, max(knots, level.knots)
@@ -94,7 +95,7 @@ def accumulated(levels: Sequence[LevelForm]) -> Iterator[LevelTable]:
 
 
 def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:
-    """One problem whose cost is the sum of theirs, named after the last: where it stands in the stack."""
+    """Returns one problem whose cost is the sum of the problems' costs; it has the name of the last one."""
     knots = max(problem.knots for problem in problems)
     N = len(problems[0].B)
     weighted_C = []
@@ -124,7 +125,8 @@ def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:
 
 
 def compromise(problems: Sequence[LevelProblem], rows: Rows) -> Array | None:
-    """What this controller would ask for in a tick of HIMPC, U (N, n) N·m; None if it finds nothing."""
+    """Returns the increments U (N, n), N·m, that this controller chooses in a tick of HIMPC; None if it finds
+    no solution."""
     return increments_of(sum_of_costs(_calmed(problems)), rows)
 
 

@@ -34,7 +34,7 @@ class Avoidance:
     margin: float
 
     def near(self, joints: Placed, gradients: bool = True) -> Clearances:
-        """Pairs near enough to matter at some configurations."""
+        """Returns the pairs that are close enough to be relevant at some configurations."""
         return self.model.between(joints, self.margin + _LOOK, gradients)
 
     def rows(
@@ -51,7 +51,7 @@ class Avoidance:
         )
 
     def depths(self, near: Clearances, N: int) -> Array:
-        """By how much each knot is inside the margin at worst, (N,) m, ≥ 0."""
+        """The largest violation of the margin at each knot, (N,) m, ≥ 0."""
         depth = np.zeros(N)
         np.maximum.at(depth, near.knot, self.margin - near.distance)
         return depth

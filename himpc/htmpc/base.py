@@ -1,4 +1,4 @@
-"""A mobile base: G(q) of (4), and which joints it is made of."""
+"""The mobile base: G(q) of (4), and the joints of the base."""
 
 from __future__ import annotations
 

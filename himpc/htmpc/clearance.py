@@ -1,4 +1,5 @@
-"""Signed distances between a robot's spheres and what it must not touch, in closed form, with gradients."""
+"""Signed distances between a robot's spheres and the shapes that it must not touch, in closed form, with
+gradients."""
 
 from __future__ import annotations
 
@@ -24,8 +25,8 @@ class Clearances:
         knot: (r,) index of the configuration.
         distance: (r,) m, negative inside.
         gradient: (r, n) of the distance with respect to q, m/rad.
-        sphere, shape: (r,) which pair.
-        links: of the spheres. names: of the shapes.
+        sphere, shape: (r,) indices of the pair.
+        links: names of the spheres' links. names: names of the shapes.
     """
 
     knot: Indices
@@ -57,7 +58,7 @@ class CollisionModel:
 
     @property
     def empty(self) -> bool:
-        """Whether there is nothing to keep clear of."""
+        """Whether there are no pairs to check."""
         return not self._around.names
 
     def clearances(self, q: Array, within: float, gradients: bool = True) -> Clearances:
@@ -65,7 +66,7 @@ class CollisionModel:
         return self.between(placed(self._tree, q), within, gradients)
 
     def between(self, where: Placed, within: float, gradients: bool = True) -> Clearances:
-        """The same for joints that are placed already."""
+        """Computes the same distances for joints whose placements are known."""
         around, tree = self._around, self._tree
         K, S = len(where.at), len(around.radius)
         most = K * S * len(around.names)

@@ -1,4 +1,4 @@
-"""How a motion goes on: to rest, or along the plan before."""
+"""Continuation of a motion: braking to rest, or shifting the previous plan."""
 
 from __future__ import annotations
 

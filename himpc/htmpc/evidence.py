@@ -1,4 +1,4 @@
-"""From solved levels to evidence: what was reached, and what binds."""
+"""Converts solved levels to evidence: the errors reached and the active constraints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ _FELT = 1e-6
 
 
 def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
-    """What `solve_level` found for a level; `final` holds the inputs after all levels."""
+    """Builds the evidence of a level from the result of `solve_level`; `final` holds the inputs after all
+    levels."""
     best = solved.at.errors(level)
     return LevelEvidence(
         name=level.name,
@@ -37,7 +38,7 @@ def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
 
 
 def _felt(rows: ConstraintRows, multipliers: Array) -> Felt:
-    """Of slacks, whose multipliers come last, nobody is told."""
+    """Returns the active rows without the bounds of the slacks, whose multipliers come last."""
     multipliers = multipliers[: len(rows.kind)]
     some = np.flatnonzero(np.abs(multipliers) > _FELT)
     return Felt(rows.kind[some], rows.knot[some], rows.part[some], multipliers[some])

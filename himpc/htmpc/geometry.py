@@ -1,4 +1,5 @@
-"""Where all joints of a robot are at many configurations at once: trees of revolute and prismatic joints."""
+"""Forward kinematics of all joints at many configurations at once, for trees of revolute and prismatic
+joints."""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ class Placed(NamedTuple):
 
 
 def placed(tree: Geometry, q: Array) -> Placed:
-    """All joints at configurations q (K, n)."""
+    """Computes the placements of all joints at configurations q (K, n)."""
     q = np.array(q, float)
     joints = len(tree.parent)
     found = Placed(np.empty((len(q), joints, 12)), np.empty((len(q), joints, 3)))
@@ -51,7 +52,7 @@ class Frames(NamedTuple):
 
 
 def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
-    """A frame of the robot, the tip for an empty name, where its joints are as given."""
+    """Returns a frame of the robot (the tip for an empty name) for given placements of the joints."""
     tree, K = geometry(robot), len(where.at)
     found = Frames(np.empty((K, 3, 3)), np.empty((K, 3)), np.empty((K, 6, robot.n)))
     frame_along(_TASK, _PART, tree.parent, tree.is_revolute, *where, *_mounted(robot, name), *found)

@@ -1,4 +1,4 @@
-"""HTIDKC: the hierarchical-task inverse differential kinematic control that the paper compares with."""
+"""HTIDKC: hierarchical-task inverse differential kinematic control, with which the paper compares HTMPC."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ class HTIDKC:
         self._last: Array | None = None
 
     def configure(self, settings: HTMPCSettings) -> None:
-        """Takes new settings at once; the last command stays. InputError changes nothing."""
+        """Applies new settings immediately; the last command is kept. If they do not fit, it raises
+        InputError and changes nothing."""
         home = Configuration(self.robot, self._data, self.robot.home, self.robot.home)
         for level in settings.stack:
             for task in level.tasks:
@@ -68,15 +69,15 @@ class HTIDKC:
         self._settings = settings
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
-        """One control period; of each preview only the first knot is used.
+        """Computes one control period; only the first knot of each preview is used.
 
         Args:
             q, v: measured joint positions and velocities, (n,).
             previews: the reference of every task by its name.
 
         Returns:
-            the plan of one knot; finite and inside the bounds whatever the state: without a plausible one the
-            command fades to zero.
+            the plan of one knot. It is finite and inside the bounds for every state; if the state is not
+            plausible, the command fades to zero.
         """
         started = perf_counter_ns()
         settings, period = self._settings, self._settings.period
@@ -124,7 +125,8 @@ class HTIDKC:
         return task.asked(here, preview).velocity[0] - gain * task.error(task.value(here), preview.value)
 
     def _level_zero(self, q: Array, last: Array) -> _Box:
-        """Velocities that this period allows: those inside all bounds, or the nearest reachable one."""
+        """Returns the velocities that are allowed in this period: those inside all bounds, or the nearest
+        reachable one."""
         limits, T = self._bounds, self._settings.period
         reach = _Box(last - limits.a * T, last + limits.a * T)
         upper = np.minimum(limits.v, _approach(limits.q_upper - q, limits, T))

@@ -38,7 +38,7 @@ _MEMORY = 200
 class HTMPC:
     """Plans velocities by Algorithm 2: one STMPC (9) per level, from the highest priority down.
 
-    It reads geometry and limits of the robot. One `step` per control period; what it remembers is its last
+    It reads geometry and limits of the robot. One `step` per control period; its only memory is the last
     plan. `configure` changes settings and keeps that plan, so the commanded motion goes on without a jump.
     """
 
@@ -56,12 +56,14 @@ class HTMPC:
         return self._settings
 
     def reset(self) -> None:
-        """Forgets the plan: the robot is taken to move on as measured, with no acceleration."""
+        """Forgets the plan; the robot is assumed to continue at the measured velocity without
+        acceleration."""
         self._past: deque[Motion] = deque(maxlen=_MEMORY)
         self._since = self._settings.period
 
     def configure(self, settings: HTMPCSettings) -> None:
-        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        """Applies new settings immediately and without a jump of the command. If they do not fit, it raises
+        InputError and changes nothing."""
         robot = self.robot
         home = Configuration(robot, self._data, robot.home, robot.home)
         tasks = tuple(task for level in settings.stack for task in level.tasks)
@@ -83,7 +85,7 @@ class HTMPC:
         self._settings = settings
 
     def _chosen(self, enabled: Stack) -> Stack:
-        """The levels to solve, of those that are on."""
+        """Returns the levels to solve among the enabled ones."""
         return enabled
 
     def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:
@@ -91,7 +93,7 @@ class HTMPC:
         return np.array(joint_indices(self.robot, settings.hold) if settings.hold else [], np.int64)
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
-        """One control period: measured state in, motion and evidence out.
+        """Computes one control period: the motion and its evidence from the measured state.
 
         Args:
             q, v: measured joint positions and velocities, (n,).
@@ -99,8 +101,8 @@ class HTMPC:
                 T_s = Δt and N.
 
         Returns:
-            the plan; finite and inside the bounds whatever the state: one that is not plausible is taken for
-            where the last plan leads.
+            the plan. It is finite and inside the bounds for every state; a state that is not plausible is
+            replaced by the prediction of the last plan.
         """
         started = perf_counter_ns()
         tick = self._tick(self._start(q, v), previews)
@@ -116,8 +118,8 @@ class HTMPC:
         return self._decided(tick, motion, levels, clearance(at.distances), started)
 
     def _start(self, q: Array, v: Array) -> Start:
-        """The state from which to plan, predicted forward by the delay, and the input acting before."""
-        # The rate may have changed: what was commanded until now was so for the period of that time.
+        """Returns the state from which to plan, predicted forward by the delay, and the input before it."""
+        # The control rate may have changed: the last plan was commanded for the period in force at its time.
         period, past, still = self._since, self._past, np.zeros(self.robot.n)
         usable = plausible(self.robot, q, v)
         if not past and not usable:
@@ -131,7 +133,7 @@ class HTMPC:
         delay = self._settings.delay_s
         if delay == 0.0:
             return Start(np.array(q, float), commandable(v, last, self._bounds), acted)
-        # What has been commanded but has not acted yet will happen whatever is decided now.
+        # Commands that have been given but have not acted yet cannot be changed any more.
         return Start(q + underway(past, period, delay), last, acted)
 
     def _tick(self, start: Start, previews: Mapping[str, Preview]) -> SharedStep:

@@ -24,13 +24,13 @@ class Knots:
     """Frames and Jacobians at all knots of a prediction, knot 1 first."""
 
     def __init__(self, robot: Robot, data: pin.Data, q: Array) -> None:
-        """q: (K, n) configurations; data is for tasks that ask for more than frames."""
+        """q: (K, n) configurations; data: Pinocchio's work space for tasks that need more than frames."""
         self._robot, self._data, self._q = robot, data, q
         self._frames: dict[str, Frames] = {}
 
     @cached_property
     def joints(self) -> Placed:
-        """Where all joints are."""
+        """The placements of all joints."""
         return placed(geometry(self._robot), self._q)
 
     def errors(self, task: Task, desired: Desired) -> Array:
@@ -63,13 +63,13 @@ class Knots:
 
     @cached_property
     def _path(self) -> Configuration:
-        """All knots as one configuration; only Jacobians are asked of it."""
+        """All knots as one `Configuration`, which is used for Jacobians only."""
         robot, data, q = self._robot, self._data, self._q
         return Configuration(robot, data, q[0], q[0], q[1:], jacobians=lambda frame: self._frame(frame).J)
 
     @cached_property
     def _knots(self) -> list[Configuration]:
-        """One configuration per knot; only positions are asked of them."""
+        """One `Configuration` per knot, which are used for positions only."""
         every = enumerate(self._q)
         return [
             Configuration(self._robot, self._data, q, q, placed=partial(self._placement, k)) for k, q in every

@@ -1,4 +1,4 @@
-"""What one step of a velocity-level controller decided, with its evidence."""
+"""The plan of one step of a velocity-level controller, with its evidence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Whole = NDArray[np.int64]
 
 
 class Felt(NamedTuple):
-    """Rows with a multiplier: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,)."""
+    """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,)."""
 
     kind: Whole
     knot: Whole
@@ -27,23 +27,23 @@ class Felt(NamedTuple):
 
 
 class LevelEvidence(NamedTuple):
-    """How one level was solved.
+    """The solution of one level and its verification.
 
     Attributes:
-        name: of the level.
-        status: of the solver at the last QP.
-        rung: "solve", or what was needed instead: "widened" (limits moved out to contain full braking) or
-            "keep" (no verified point: the inputs stay as the level above left them; on the first level the
-            robot brakes).
+        name: name of the level.
+        status: status of the solver at the last QP.
+        fallback: "solve", or the fallback that was needed: "widened" (limits moved out to contain full
+            braking) or "keep" (no verified point: the inputs stay as the level above left them; on the first
+            level the robot brakes).
         kkt_residual: largest scaled KKT residual of the applied QP solutions.
         best: e* at knots 1 … N, (N, m); the level's tasks stacked.
         final: the same errors once all levels are solved.
         cost: J of (8) at e*, without knot 0.
         steps: accepted step sizes, one per iteration; 0 if none was acceptable.
         iterations: QPs solved, first attempts only.
-        unsolved: how many of them had no verified point.
+        unsolved: number of these QPs without a verified point.
         time_us: wall time.
-        felt: constraints with a multiplier at the last QP.
+        felt: constraints with a nonzero multiplier at the last QP.
     """
 
     name: str
@@ -60,7 +60,7 @@ class LevelEvidence(NamedTuple):
     felt: Felt
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
-        """The constraints felt, in words."""
+        """The active constraints in words."""
         found: list[Binding] = []
         kinds, knots, parts, values = self.felt
         each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), strict=True)
@@ -72,7 +72,7 @@ class LevelEvidence(NamedTuple):
 
 
 class VelocityPlan(NamedTuple):
-    """The motion decided, and per level what was found.
+    """The planned motion, and the solution of every level.
 
     Attributes:
         command: v at the end of this control period, (n,), if the command is held; `motion.velocity(s)` gives

@@ -49,7 +49,7 @@ def integrator(N: int, dt: float) -> Integrator:
 
 
 class Start(NamedTuple):
-    """Where a prediction begins: q_0, v_0 and the input that acted before, (n,) each."""
+    """The initial state of a prediction: q_0, v_0 and the input that acted before, (n,) each."""
 
     q: Array
     v: Array

@@ -34,18 +34,18 @@ _RIDGE = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class SharedStep:
-    """What all levels of one step share.
+    """Data that all levels of one step share.
 
     Attributes:
         robot, data: for kinematics.
         settings: in use.
-        start: where the prediction begins.
+        start: initial state of the prediction.
         desired: r per task name at knots 0 … N.
         effort: J_eff.
         rows: (7d) on the inputs.
         bounds: in force.
         plan: the shifted previous plan, (N, n).
-        avoidance: (7c), None if there is nothing to avoid.
+        avoidance: (7c), None without obstacles.
         method: solves the QPs; it remembers the last one of a level.
         table: has room for all rows; `rows` are its first.
     """
@@ -65,7 +65,7 @@ class SharedStep:
 
     @cached_property
     def brake(self) -> Array:
-        """Inputs that stop the robot, (N, n); what is left when bounds contradict each other."""
+        """Inputs (N, n) that stop the robot; used if bounds contradict each other."""
         settings = self.settings
         return braking(self.start, settings.horizon, settings.dt, settings.period, self.bounds)
 
@@ -143,7 +143,7 @@ class Iterate:
 
     @cached_property
     def depths(self) -> Array:
-        """By how much each knot is inside the safety margin, (N,) m."""
+        """Violation of the safety margin at each knot, (N,) m."""
         avoidance, distances = self.tick.avoidance, self.distances
         if avoidance is None or distances is None:
             return np.zeros(len(self.U))
@@ -157,7 +157,7 @@ class Problem:
     Attributes:
         tick: shared data.
         level: the level to optimise.
-        guards: what the levels above have reached, highest first.
+        guards: constraints (9c) of the levels above, highest first.
         absolute: whether the effort is (10) itself, or its proximal form.
     """
 
@@ -173,7 +173,7 @@ class Problem:
 
     @property
     def forced(self) -> bool:
-        """Whether slacks belong to the unknowns: only the first level may buy them."""
+        """Whether slacks are unknowns of the QP: only on the first level."""
         return not self.guards and not self.softened
 
     @property

@@ -43,7 +43,8 @@ class ConstraintRows(NamedTuple):
         )
 
     def widened(self, u: Array, last: int = 0) -> ConstraintRows:
-        """Bounds moved out just far enough to contain u, but for so many rows at the end."""
+        """Returns the rows with bounds widened just enough to contain u, except for the given number of last
+        rows."""
         value = self.A @ u
         lower, upper = np.minimum(self.lower, value), np.maximum(self.upper, value)
         end = len(value) - last
@@ -52,7 +53,8 @@ class ConstraintRows(NamedTuple):
 
 
 class ConstraintTable:
-    """Room for all rows of a controller, filled anew at every step: those of (7d) first, then those of a QP.
+    """Storage for all rows of a controller, filled at every step: the rows of (7d) first, then the rows of a
+    QP.
 
     Attributes:
         A: rows on the inputs u, or on their change d.
@@ -68,7 +70,7 @@ class ConstraintTable:
         self.labels = np.zeros((3, 0), np.int64)
 
     def reserve(self, count: int) -> None:
-        """Room for that many rows; those that are there stay."""
+        """Allocates space for that many rows; existing rows are kept."""
         missing = count - len(self.A)
         if missing > 0:
             self.A = np.vstack([self.A, np.zeros((missing + 100, self.A.shape[1]))])
@@ -86,11 +88,11 @@ class ConstraintTable:
         return ConstraintRows(self.A[first:end], *self.room[:, first:end], *self.labels[:, first:end].copy())
 
     def about(self, u: Array, count: int) -> None:
-        """Makes the room of the first rows that around u."""
+        """Sets the bounds on Ad of the first rows to those on Au, minus Au."""
         about(self.A, self.bounds, u, count, self.room)
 
     def outside(self, count: int) -> float:
-        """By how much the u of `about` leaves the bounds of the first rows, largest row."""
+        """Returns the largest violation of the bounds of the first rows by the u of `about`."""
         lower, upper = self.room[:, :count]
         return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
 

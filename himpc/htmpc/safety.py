@@ -1,4 +1,4 @@
-"""What holds whatever is measured: which states can be used, and which commands may leave."""
+"""Safety checks for any measurement: which states can be used, and which commands may be sent."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ _FARTHEST = 1e6
 
 
 def plausible(robot: Robot, q: Array, v: Array) -> bool:
-    """Whether a measured state can be planned from: finite, and not absurdly far or fast.
+    """Whether a measured state is a valid start of a plan: finite, and neither absurdly far nor absurdly
+    fast.
 
     Args:
-        robot: whose limits say what is absurd.
+        robot: its limits define what is absurd.
         q, v: measured joint positions and velocities, (n,).
     """
     lower, upper, fastest = _believable(robot)
@@ -42,9 +43,10 @@ def _believable(robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def commandable(v: Array, last: Array | None, bounds: MotionBounds) -> Array:
-    """The measured velocity, cut to what may be commanded, (n,).
+    """Returns the measured velocity (n,), clipped to the velocities that may be commanded.
 
-    The commands of a plan begin there: a robot pushed beyond its limit must not be told to go on like that.
+    The commands of a plan begin at this velocity: a robot that was pushed beyond its limit must not receive
+        that velocity as a command.
 
     Args:
         v: measured, (n,).
@@ -57,7 +59,8 @@ def commandable(v: Array, last: Array | None, bounds: MotionBounds) -> Array:
 
 
 def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Array:
-    """The inputs (N, n), the first one such that the commands of this period keep their bounds.
+    """Returns the inputs (N, n) with the first one changed such that the commands of this period keep their
+    bounds.
 
     They do already when the QP's rows were hard and could be met. From a speed above its bound (which was
     tightened) the robot may brake as slowly as its jerk bound asks, but gets no faster.

@@ -56,7 +56,7 @@ class HTMPCSettings:
             and its tasks' gains, are not used.
         horizon: N, knots.
         dt: Δt between knots, s.
-        rate_hz: control rate, 1/s; the plan is shifted by its period from step to step.
+        rate_hz: control rate, 1/s; the plan is shifted by one control period at every step.
         terminal: P = terminal · Q in (8).
         velocity_effort: S of (10) on the velocities (positions cost nothing).
         input_effort: R of (10); None: 0.1 for the base's joints, 0.02 for all others.
@@ -68,17 +68,17 @@ class HTMPCSettings:
             becomes the cost of that error at every knot.
         max_iter: MAX_ITER, QPs per level.
         limits: bounds.
-        obstacles: what the robot keeps clear of, (7c).
+        obstacles: obstacles of the collision avoidance (7c).
         margin_m: δ_safe of (7c), m.
-        self_collision: keep the arm clear of the base.
-        delay_s: how much later a command acts; the measured state is predicted forward by it. Sample the
-            references that much later too.
+        self_collision: whether the arm avoids collisions with the base.
+        delay_s: s, delay of a command; the measured state is predicted forward by it. The references must be
+            sampled later by the same time.
         hold: joints that stay at rest, by name.
         base: how the base moves; see `kinematics.G`.
         gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last one serves all
             further levels.
         rho: of HTIDKC only, ρ: weight of ‖q̇‖² in every level.
-        solver: which of himpc.qp.SOLVERS.
+        solver: name of the QP solver, one of himpc.qp.SOLVERS.
     """
 
     stack: Stack

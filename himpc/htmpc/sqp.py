@@ -34,12 +34,12 @@ _ROUNDING = 1e-12
 
 
 class Solved(NamedTuple):
-    """The outcome of one level.
+    """The result of one level.
 
     Attributes:
-        at: the inputs found, with their kinematics.
-        status, rung, kkt_residual, steps, unsolved, time_us: see `LevelEvidence`.
-        rows, multipliers: of the last QP.
+        at: the solution (inputs) with its kinematics.
+        status, fallback, kkt_residual, steps, unsolved, time_us: see `LevelEvidence`.
+        rows, multipliers: rows and multipliers of the last QP.
     """
 
     at: Iterate
@@ -68,7 +68,8 @@ class _Direction(NamedTuple):
 
 
 def solve_level(problem: Problem, at: Iterate) -> Solved:
-    """At most MAX_ITER steps from an iterate; it ends early when the inputs stand still."""
+    """Solves a level with at most MAX_ITER steps from an iterate; it ends early when the inputs no longer
+    change."""
     started = perf_counter_ns()
     steps: list[float] = []
     residual, fallback, unsolved = 0.0, "solve", 0
@@ -103,7 +104,8 @@ def solve_level(problem: Problem, at: Iterate) -> Solved:
 
 
 def _direction(problem: Problem, at: Iterate) -> _Direction:
-    """The QP's step; when its rows contradict each other, they are moved out to contain full braking."""
+    """Computes the step by a QP; if its rows contradict each other, they are widened until full braking
+    satisfies them."""
     tick = problem.tick
     H, g = problem.model(at)
     rows, bought = problem.with_slack(at, problem.rows(at))
@@ -111,7 +113,7 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     solution = _solve(problem, H, g, rows, bought, own)
     fallback = "solve"
     if not solution.solved:
-        # Below the first level d = 0, on it full braking: these satisfy everything that is left.
+        # Below the first level d = 0 satisfies the remaining rows; on the first level full braking does.
         safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
         fallback = "widened"
         solution = _solve(problem, H, g, rows.widened(safe, bought), bought, own)
@@ -128,9 +130,10 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
     """min ½dᵀHd + gᵀd under the rows, plus the price of one slack per knot that may move the last ones out.
 
     Args:
-        problem, H, g, rows: of the level.
-        bought: how many rows slacks move out.
-        own: whether the compiled method holds H; else, and where it finds no verified point, the QP solver.
+        problem, H, g, rows: problem, Hessian, gradient and rows of the level.
+        bought: number of rows (the last ones) that slacks may relax.
+        own: whether the compiled active-set method has factored H; otherwise, or if it finds no verified
+            point, the QP solver is used.
     """
     solver = problem.tick.settings.solver
     if not bought:
@@ -161,7 +164,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
 
 
 def _price(solution: QPSolution, rows: ConstraintRows, bought: int) -> float:
-    """What one metre would be worth at the dearest knot."""
+    """Returns the largest cost reduction per metre of slack over the knots."""
     paid = np.bincount(rows.knot[-bought:], np.abs(solution.multipliers[-bought:]))
     return float(paid.max())
 
@@ -170,7 +173,7 @@ def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[floa
     """The largest step 1, β, β², … that (13) allows and that lowers the merit enough; 0 if none does."""
     tick = problem.tick
     merit = problem.merit(at)
-    # From outside the bounds the first level has to come back in, whatever that costs.
+    # Outside the bounds the first level must return to them, at any cost.
     returning = problem.forced and tick.table.outside(len(tick.rows.A)) > _FEASIBLE
     alpha = 1.0
     for attempt in range(BACKTRACKS + 1):

@@ -1,4 +1,4 @@
-"""Relatives of HTMPC that leave something out: priorities, coordination, or foresight."""
+"""Variants of HTMPC without priorities, without coordination or without a preview."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ class STMPC(HTMPC):
 
 
 class HTMPC_WPT(HTMPC):
-    """HTMPC that receives waypoints: every reference stays, in its eyes, where it is now (section V-C)."""
+    """HTMPC that receives waypoints: the preview of every reference is constant at its present value (section
+    V-C)."""
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
         return super().step(q, v, {name: _frozen(preview) for name, preview in previews.items()})

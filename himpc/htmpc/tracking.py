@@ -1,4 +1,4 @@
-"""Levels as the controller solves them: errors (6), tracking costs (8) and lexicographic constraints."""
+"""The levels of the controller: errors (6), tracking costs (8) and lexicographic constraints."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Tracking:
-    """One level, ready to be evaluated.
+    """One level with its weights at every knot.
 
     Attributes:
-        name: of the level.
-        tasks: of the level.
+        name: name of the level.
+        tasks: tasks of the level.
         Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured: it costs a constant.
     """
 
@@ -47,7 +47,7 @@ class Tracking:
 
 
 def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
-    """A level with its weights laid out. Raises InputError for weights of the wrong length."""
+    """Builds a level with its weights at every knot. Raises InputError for weights of the wrong length."""
     m = sum(len(task.coordinates(robot)) for task in level.tasks)
     weight = np.asarray(level.Q, float)
     if weight.ndim and weight.shape != (m,):

@@ -1,4 +1,5 @@
-"""QPs of which only a few rows matter: start with those that look binding, add what turns out violated."""
+"""Solves QPs with few active rows: it starts with the rows that are probably active and adds the violated
+ones."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ _ROUNDS = 8
 def solve_by_working_set(
     H: Array, f: Array, A: Array, lower: Array, upper: Array, first: NDArray[np.bool_], solver: Solver
 ) -> QPSolution:
-    """`solve_qp` on growing sets of rows, until all rows hold; the solution is that of the whole problem.
+    """Calls `solve_qp` with growing sets of rows until all rows are satisfied; the result is the solution of
+    the whole problem.
 
     A QP on fewer rows costs less, and if its solution satisfies the others too it solves the whole one, with
     zero for their multipliers. A set that contradicts itself makes the whole problem infeasible.

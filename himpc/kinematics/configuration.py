@@ -35,8 +35,8 @@ class Configuration:
         v: measured joint velocities, (n,).
         knots: predicted joint positions at knots 1 … N−1, (N−1, n); empty for N = 1.
         previews: references by task, for tasks whose coordinates depend on where their target is.
-        jacobians, placed: by a frame's name its Jacobians (N, 6, n), or its placement at q_k, of whoever
-            knows them already.
+        jacobians, placed: Jacobians (N, 6, n) and placements at q_k by the frame's name, if the caller has
+            computed them already.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Configuration:
             index = self.robot.frame_id(frame or self.robot.tip)
             compute, axes = pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
             found = np.empty((self.horizon, 6, self.q.size))
-            # Of a single joint Pinocchio hands out the column without its second axis.
+            # For a single joint Pinocchio returns the Jacobian as a one-dimensional array.
             columns = found if self.q.size > 1 else found[:, :, 0]
             placed = self._placements[frame] = []
             for j, q in enumerate((self.q, *self.knots)):

@@ -1,4 +1,5 @@
-"""Increments that meet all bounds whenever any do, and bring the joints to rest: found joint by joint."""
+"""Computes, joint by joint, increments that bring the joints to rest and satisfy all bounds whenever this is
+possible."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ _MET = 1e-7
 
 
 def braking(rows: Rows) -> Array:
-    """Increments, (N, n) N·m, that meet all rows whenever any increments do, and torque rows always.
+    """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows whenever this is
+    possible.
 
     Rows couple no two joints. With w_j = Σ_{i≤j} τ_i, what a joint's velocity row bounds, and τ_i the torque
     gained up to knot i, torque rows say how far w_j may be from w_{j−1} and velocity rows where it may be.
@@ -40,7 +42,8 @@ def braking(rows: Rows) -> Array:
 
 
 def missed(rows: Rows, U: Array) -> Array:
-    """By how much increments (N, n) miss rows, (r, n) ≥ 0 N·m; 0 up to the rounding of the sums."""
+    """Returns the violation of rows by increments (N, n), (r, n) ≥ 0 N·m; 0 up to the rounding of the
+    sums."""
     value, summed = rows.L @ U, rows.L @ np.abs(U)
     excess = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
     excess[excess <= 1e-14 * len(rows.L) * summed] = 0.0

@@ -1,4 +1,4 @@
-"""What the robot must not exceed, and how the controller is told."""
+"""The limits of the robot: which of them a controller imposes, and the bounds in force."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ PositionMode = Literal["viability", "paper", "off"]
 
 @dataclass(frozen=True)
 class Limits:
-    """Which bounds are imposed, and scales on the robot's own.
+    """Which bounds are imposed, and factors on the robot's own limits.
 
     Attributes:
-        torque: impose (32f).
-        velocity: impose (32e).
+        torque: whether (32f) is imposed.
+        velocity: whether (32e) is imposed.
         position: "viability" (the velocity bound from which the joint can still stop), "paper" (the rows
             (32d) as printed) or "off".
         torque_scale, velocity_scale: factors on the robot's limits, > 0.
@@ -78,12 +78,12 @@ class LimitsInForce:
 
     @cached_property
     def stops(self) -> tuple[Array, Array]:
-        """Where joints are stopped, POSITION_MARGIN before their limits, (n,) rad each."""
+        """Positions at which joints are stopped, POSITION_MARGIN before their limits, (n,) rad each."""
         return self.q_lower + POSITION_MARGIN, self.q_upper - POSITION_MARGIN
 
 
 def in_force(robot: Robot, limits: Limits) -> LimitsInForce:
-    """The robot's limits with the scales and switches applied."""
+    """Returns the robot's limits with the scales and switches applied."""
     unbounded = np.full(robot.n, np.inf)
     tau = robot.tau_limit * limits.torque_scale if limits.torque else unbounded
     position = limits.position != "off"

@@ -1,4 +1,4 @@
-"""Limits that are tightened while the robot moves close in gradually."""
+"""Tightens limits gradually while the robot moves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RAMP_SECONDS = 0.5
 def ramp(
     now: LimitsInForce, goal: LimitsInForce, tau: Array, q: Array, v: Array, T_s: float
 ) -> LimitsInForce:
-    """One control period of closing in from the limits in force to the ones wanted.
+    """Moves the limits in force towards the wanted ones by one control period.
 
     A loosened bound holds at once. A tightened one first falls to the present value (nothing is
     violated there), then closes the rest with time constant RAMP_SECONDS, and no slower than 20 % of

@@ -28,8 +28,8 @@ class Rows(NamedTuple):
         kinds: kind of each block of N rows.
         stopping: (2, n) where the lower, upper velocity row is the position limit's: below the joint's own
             limit, the velocity from which it can still stop. None where no row is.
-        rest: (N, n) N·m, what the velocity rows come to when the joints come to rest, see `coming_to_rest`;
-            None stands for zeros: the velocities stay.
+        rest: (N, n) N·m, the values of the velocity rows when the joints come to rest, see `coming_to_rest`;
+            None means zeros: the velocities stay constant.
     """
 
     L: Array
@@ -133,6 +133,7 @@ def build_rows(
 
 
 def coming_to_rest(state: JointState, M_bar: Array, N: int, T_s: float) -> Array:
-    """What velocity rows come to, (N, n) N·m, where velocities fall as e^{−BRAKING t}; arguments as there."""
+    """Returns the values of the velocity rows (N, n), N·m, when velocities decay as e^{−BRAKING t}; arguments
+    as in `build_rows`."""
     t = T_s * np.arange(1.0, N + 1)[:, None]
     return (np.expm1(-BRAKING * t) * state.v - state.gained_velocity(N, T_s)) * (M_bar / T_s)

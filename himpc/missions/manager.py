@@ -1,4 +1,5 @@
-"""The task manager of the HTMPC paper's section IV: which tasks the controller is given, as pure functions.
+"""The task manager of the HTMPC paper's section IV: it decides which tasks the controller receives, by pure
+functions.
 
 At any time the controller sees the window [𝒯_{l₀}, …, 𝒯_{l₀+L−1}]; when 𝒯_{l₀} is completed l₀ grows by
 one. A task is planned at the moment it enters the window, from where its point is then; a task that is moved
@@ -42,7 +43,7 @@ class Active:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Progress:
-    """How far a mission has come.
+    """The progress of a mission.
 
     Attributes:
         mission: all tasks, done ones included.
@@ -75,11 +76,11 @@ def advanced(
     When the mission is done its last window stays: the robot stays where it ended.
 
     Args:
-        progress: so far.
+        progress: progress up to now.
         L: tasks in the window, ≥ 1.
         t: s.
-        points: where each role's point is, (m,) m.
-        speeds: how fast it moves, m/s.
+        points: position of each role's point, (m,) m.
+        speeds: speed of each role's point, m/s.
     """
     while not progress.done:
         window = _window(progress, L, t, points)

@@ -19,7 +19,7 @@ Point = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Go:
-    """Towards a goal: a waypoint (x_d is the goal at once) or, with a cruise speed, a planned path.
+    """A motion to a goal: a waypoint (x_d is the goal at once) or, with a cruise speed, a planned path.
 
     Attributes:
         goal: m, world.
@@ -89,7 +89,7 @@ class MissionTask:
     Attributes:
         name: stable identity; events refer to it.
         role: which point of the robot it moves, e.g. "ee" or "base".
-        motion: where to.
+        motion: motion to the goal, or a given trajectory.
         tolerance: m.
         hold: s; None: for as long as it takes until the task is released by an event.
         rest: m/s; infinite: it may be passed at any speed.
@@ -103,7 +103,7 @@ class MissionTask:
     rest: float = math.inf
 
     def __post_init__(self) -> None:
-        """Raises InputError for a tolerance, hold or rest that cannot be."""
+        """Raises InputError for an invalid tolerance, hold or rest."""
         if not (math.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"tolerance of task '{self.name}' is {self.tolerance} m: give a number above 0")
         if self.hold is not None and not (math.isfinite(self.hold) and self.hold >= 0):
@@ -126,7 +126,7 @@ def check_mission(mission: Mission) -> None:
 
 
 def find(mission: Mission, name: str) -> int:
-    """The place of a task. Raises InputError, naming the nearest one, if there is none of that name."""
+    """Returns the index of a task. Raises InputError, naming the nearest task, for an unknown name."""
     names = [task.name for task in mission]
     if name not in names:
         raise unknown_name("task of the mission called", name, names)

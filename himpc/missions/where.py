@@ -1,4 +1,4 @@
-"""Where a robot's points are: what the task manager is told at every control period."""
+"""Positions and speeds of a robot's points, which the task manager receives at every control period."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def where(at: Configuration, roles: Mapping[str, Task]) -> tuple[dict[str, Array
         roles: the task of each role.
 
     Returns:
-        where each role's point is, (m,) m or a rotation matrix (3, 3); how fast it moves, m/s or rad/s.
+        position (m,), m, or rotation matrix (3, 3) of each role's point; its speed, m/s or rad/s.
     """
     points = {name: task.value(at) for name, task in roles.items()}
     speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ at.v)) for name, task in roles.items()}

@@ -1,4 +1,4 @@
-"""What one control tick decided, and how it becomes a row of telemetry."""
+"""The plan of one control tick, and its conversion to a row of telemetry."""
 
 from himpc.plan.plan import AtOnce, Binding, Evidence, Plan
 from himpc.plan.row import on_axes, write_plan

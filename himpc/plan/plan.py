@@ -1,4 +1,4 @@
-"""What one control tick decided, with its evidence."""
+"""The plan of one control tick, with its evidence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Binding(NamedTuple):
-    """A constraint that binds: who feels it, which joint, which bound, and how hard."""
+    """An active constraint: its level, joint, bound and multiplier."""
 
     level: str
     joint: str
@@ -30,7 +30,7 @@ class Binding(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What a tick found besides the torque; attributes as in `Plan`."""
+    """The results of a tick besides the torque; attributes as in `Plan`."""
 
     levels: tuple[LevelSolution, ...]
     q: Array
@@ -40,7 +40,7 @@ class Evidence(NamedTuple):
 
 
 class AtOnce(NamedTuple):
-    """What the levels do at this very tick.
+    """The increments of the levels at this tick.
 
     Attributes:
         increments: Δτ_{i,k|k} of every level, highest priority first, (r, n) N·m.
@@ -53,26 +53,26 @@ class AtOnce(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The first input, the prediction, and per level what was found.
+    """The first input, the prediction, and the solution of every level.
 
-    A plan shows what its controller has at hand until the next tick: whoever keeps one freezes it. What was
-    looked at before is its own and stays.
+    A plan refers to data of its controller that are valid until the next tick: call `freeze` to keep a plan
+    longer. Values that were read before are copies and stay valid.
 
     Attributes:
-        tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; what controllers
-            that know no bounds (OSF, TDEOSF) demand.
+        tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; for controllers
+            without bounds (OSF, TDEOSF) the demanded torque.
         tau_0: torque that was applied last, (n,) N·m.
         limits: the bounds in force.
         step_us: wall time from state to torque, microseconds, kinematics included.
         unsolved: how many QPs had no verified point at the first attempt.
-        find_evidence: puts together what else was found, when somebody looks at it for the first time. Raises
-            RuntimeError if the controller has gone on since.
+        find_evidence: collects the other results when they are read for the first time. Raises RuntimeError
+            if the controller has computed another tick in between.
         iterations: how many times the cascade was solved; 1 but for NHIMPC.
-        notice: a sentence for the learner, said once: code of their own failed at this tick.
-        fill: writes what it knows into a row of telemetry at once, references included; returns False if it
-            cannot. None: field by field.
-        at_once: what the levels do now, from the numbers at hand; None: see `levels`.
-        M_bar: diagonal of the M̄ it was made with, (n,) kg·m²; None: the one that was set.
+        notice: a sentence for the user, given once: the user's own code failed at this tick.
+        fill: writes all known fields, references included, into a row of telemetry in one operation; returns
+            False if it cannot. None: fields are written one by one.
+        at_once: increments of the levels at this tick without further computation; None: see `levels`.
+        M_bar: diagonal of the M̄ of this plan, (n,) kg·m²; None: the M̄ of the settings.
     """
 
     tau: Array
@@ -88,13 +88,13 @@ class Plan:
     M_bar: Array | None = None
 
     def freeze(self) -> Plan:
-        """The same plan, whose numbers are its own from now on."""
+        """Returns a copy of the plan whose data stay valid."""
         _ = self.evidence
         return self
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What was found besides the torque."""
+        """The results besides the torque."""
         return self.find_evidence()
 
     @property

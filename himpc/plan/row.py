@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 
 
 def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Preview]) -> None:
-    """Writes what a plan knows, and the references, into a row; the session adds time, states and what needs
-    the plant's M. Fields that the plan says nothing about become NaN."""
+    """Writes the data of a plan and the references into a row; the session adds time, states and the fields
+    that need the plant's M. Fields without data in the plan become NaN."""
     fields = layout.fields
     if plan.fill is None or not plan.fill(row, layout):
         row.fill(math.nan)

@@ -34,14 +34,14 @@ def _steps(N: int, T_s: float) -> Array:
 
 @lru_cache(maxsize=64)
 def _euler(N: int, T_s: float) -> Array:
-    """How q̇_k and q̈_k move q at knots 1 … N, (N, 2)."""
+    """Returns the coefficients of q̇_k and q̈_k in q at knots 1 … N, (N, 2)."""
     steps = _steps(N, T_s)
     return np.hstack([steps, 0.5 * steps * (steps - T_s)])
 
 
 @lru_cache(maxsize=64)
 def _lags(N: int, T_s: float) -> Array:
-    """How Δτ/M̄ at knot s moves q at knot j+1, (N, N)."""
+    """Returns the coefficients of Δτ/M̄ at knot s in q at knot j+1, (N, N)."""
     lag = np.subtract.outer(np.arange(N), np.arange(N)).astype(float)
     return np.where(lag >= 0, T_s**2 * lag * (lag + 1) / 2, 0.0)
 

@@ -31,32 +31,32 @@ _LEAK = 1e-7
 
 @dataclass
 class FallbackBudget:
-    """How often the printed QP may still be asked in this tick."""
+    """The number of times that the printed QP may still be solved in this tick."""
 
     left: int = 3
 
     @property
     def spared(self) -> bool:
-        """Whether so few were needed that all levels may be solved once more."""
+        """Whether the budget left allows all levels to be solved once more."""
         return self.left >= 2
 
 
 def solve_levels(
     arena: Arena, kinds: tuple[Kind, ...], budget: FallbackBudget
 ) -> list[tuple[Fallback, float]]:
-    """Solves all levels of an arena whose problems are there; returns for each one the fallback that gave its
-    U ("solve" if none was needed) and its time, microseconds.
+    """Solves all levels of an arena whose problems have been written; returns for each level the fallback
+    that gave its U ("solve" if none was needed) and its time, microseconds.
 
-    The fallbacks are those of `solve_cascade`, and one more: where the kernel has got somewhere before its
-    time was over, the level goes as far that way as the rows allow ("feasible"). All levels share the budget
-    that the arena was granted: what one used up the next ones do not get, and then they stand on lower rungs.
-    So the time of a tick is bounded.
+    The fallbacks are those of `solve_cascade` and one more, "feasible": if the kernel ran out of budget, the
+    level moves towards the point it had reached as far as the rows allow. All levels share the budget of the
+    arena, which bounds the time of a tick: the part that one level uses is not available to the next ones,
+    which then need further fallbacks.
 
     Args:
         arena: filled by `linearize`. The rows may be wider afterwards: levels below keep what a fallback
             needed.
-        kinds: of the rows.
-        asks: of this tick; what is asked is taken off.
+        kinds: kinds of the rows.
+        budget: the budget of this tick, from which every printed QP is deducted.
     """
     found: list[tuple[Fallback, float]] = []
     for place in range(int(arena.i["sizes"][4])):
@@ -82,7 +82,7 @@ def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], budget: Fallb
         return "solve"
     alone = place == 0 or bool(arena.i["level"][place, ALONE])
     if not alone:
-        # Where U_{i−1} is all but the only point that the rows admit, a little room tells them apart.
+        # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
         if solve_level(*arena.arguments, place, TOLERANCE):
             return "solve"
         above = f["U"][place - 1]
@@ -110,8 +110,8 @@ def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], budget: Fallb
 def _on_the_way(
     arena: Arena, place: int, rows: Rows, fallback: Fallback, U: Array, wanted: Array
 ) -> Fallback:
-    """Puts in place of U, which meets the rows, what is better on the way to where the kernel got; returns
-    the rung: the one given if nothing is."""
+    """Moves U, which satisfies the rows, towards the point that the kernel reached if that improves the cost;
+    returns the name of the fallback, or the given one if there is no improvement."""
     f = arena.f
     on_the_way = towards(rows, U, wanted)
     if on_the_way is not None and place and not arena.i["level"][place, ALONE]:
@@ -134,7 +134,8 @@ def _coming_to_rest(arena: Arena) -> Array:
 
 
 def _as_printed(arena: Arena, place: int, rows: Rows, budget: FallbackBudget) -> Point | None:
-    """The level's optimum by the printed route, if that is a small matter and not done too often already."""
+    """Computes the level's optimum by the printed route, if the problem is small and the budget of this tick
+    is not used up."""
     N, n = arena.f["U"][place].shape
     if N * n > _SMALL or budget.left <= 0:
         return None
@@ -152,7 +153,7 @@ def _write(arena: Arena, rows: Rows) -> None:
 
 
 def _put(arena: Arena, place: int, point: Point) -> None:
-    """A level's point that the kernel did not find."""
+    """Writes a level's point that was not found by the kernel."""
     f, i, active = arena.f, arena.i, point.active
     f["U"][place], f["kkt"][place], i["active_count"][place] = point.U, point.kkt_residual, len(active)
     here = place, slice(0, len(active))

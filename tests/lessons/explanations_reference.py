@@ -13,7 +13,6 @@ REFERENCE = (
         ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
         ("himpc/cascade/polish.py", "From the rows that a solver's point says bind"),
         ("himpc/controllers/nhimpc.py", "J_i(q_{k+j|k}) in place of"),
-        ("himpc/controllers/nhimpc.py", "Whether every level is at its optimum"),
         ("himpc/controllers/null_space_control.py", "There is no QP, so the KKT residual is NaN."),
         ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
         ("himpc/limits/braking.py", "How far the state rows must give way"),
