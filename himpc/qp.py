@@ -1,4 +1,4 @@
-"""The only door to the QP solvers."""
+"""The interface to the QP solvers. No other module imports them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class QPSolution:
 
 
 def is_installed(solver: Solver) -> bool:
-    """Whether a solver can be used here."""
+    """Whether a solver is installed."""
     return solver != "qpoases" or find_spec("casadi") is not None
 
 
@@ -69,11 +69,11 @@ def solve_qp(
         f: (k,).
         A: (r, k).
         lower, upper: (r,), ±inf where there is no bound.
-        solver: which of SOLVERS.
-        iterations: that all attempts of DAQP may take together; None: as many as it likes.
+        solver: name of the solver, one of SOLVERS.
+        iterations: largest number of iterations of all attempts of DAQP together; None: no limit.
 
     Returns:
-        The solver's point with the residual that we computed ourselves: never trust the status.
+        The solver's point with the KKT residual computed here; the solver's status is not relied on.
     """
     left = _Iterations(iterations)
     attempts = _ATTEMPTS[solver]
@@ -87,7 +87,7 @@ def solve_qp(
 
 
 class _Iterations:
-    """How many iterations are left."""
+    """The number of iterations that are left."""
 
     def __init__(self, left: int | None) -> None:
         self._left = left
@@ -117,7 +117,7 @@ def _attempt(
     started = perf_counter_ns()
     x, multipliers, status = attempt(H, f, A, lower, upper, left)
     time_us = (perf_counter_ns() - started) / 1e3
-    with np.errstate(all="ignore"):  # a point that was given up may be anything
+    with np.errstate(all="ignore"):  # after an interruption the point may be arbitrary
         residual = kkt_residual(H, f, A, lower, upper, x, multipliers)
     return QPSolution(x, multipliers, residual, status, time_us)
 
@@ -189,7 +189,7 @@ def _qpoases(
     shapes = {"h": casadi.Sparsity.dense(*H.shape), "a": casadi.Sparsity.dense(*A.shape)}
     options = {"printLevel": "none", "error_on_fail": False, "print_time": False}
     # A solver of its own for every QP: a warm start would make the point depend on what was solved before.
-    with redirect_stdout(StringIO()):  # it prints its licence
+    with redirect_stdout(StringIO()):  # qpOASES prints its licence
         qp = casadi.conic("qp", "qpoases", shapes, options)
         found = qp(h=H, g=f, a=A, lba=lower, uba=upper)
     status = str(qp.stats()["return_status"])
@@ -222,12 +222,13 @@ def _norm(x: Array) -> float:
 
 
 def row_residual(value: Array, lower: Array, upper: Array, multipliers: Array, scale: float) -> float:
-    """Feasibility, and complementarity with the right signs, of rows lower ≤ value ≤ upper."""
+    """Returns the violation of feasibility and of complementarity (with the right signs) for rows lower ≤
+    value ≤ upper."""
     if not value.size:
         return 0.0
     gap = np.minimum(upper - value, value - lower)
     # A multiplier belongs to the bound it pushes from: its product with that bound's gap must vanish.
-    # A gap that is infinite times a multiplier that is zero is fine, hence the cap.
+    # The cap makes the product of an infinite gap and a zero multiplier zero.
     own = np.where(multipliers > 0, upper - value, value - lower)
     product = np.abs(multipliers) * np.minimum(np.abs(own), 1e6)
     return max(-float(gap.min()), float(product.max()) / scale, 0.0)

@@ -40,7 +40,7 @@ class Level:
 
     @property
     def name(self) -> str:
-        """Stable identity of the level, whatever its place in the stack."""
+        """The stable identity of the level, independent of its place in the stack."""
         return "+".join(task.name for task in self.tasks)
 
     def __post_init__(self) -> None:
@@ -64,12 +64,13 @@ def check_names(stack: Stack) -> None:
 
 
 def essence(task: Task) -> Task:
-    """The task without its gains: what it is about."""
+    """Returns the task without its gains: the quantity that it controls."""
     return replace(task, K_p=0.0, K_v=0.0)
 
 
 def about(task: Task) -> Task:
-    """The essence without name and axes: tasks that are equal in this want the same of the same thing."""
+    """Returns the essence without name and axes: tasks that are equal in this control the same quantity of
+    the same frame or joints."""
     task = replace(task, name="", K_p=0.0, K_v=0.0)
     return replace(task, axes=AXES) if isinstance(task, OnAxes) else task
 
@@ -90,10 +91,11 @@ DAMPING_LEVEL = Level((Damping(name="damping"),), Q=200.0, R=10.0)
 
 
 def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, int]]:
-    """Per enabled level how many directions it gets at this configuration, and how many rows it has.
+    """Returns for each enabled level the number of directions that it can control at this configuration, and
+    its number of rows.
 
-    A level gets what its Jacobian adds to the rank of those above; if that is less than its rows, it asks for
-    more than they, or the arm itself, leave it.
+    The first number is what its Jacobian adds to the rank of the levels above. If it is smaller than the
+    number of rows, the levels above or the arm itself leave too few directions.
     """
     found: dict[str, tuple[int, int]] = {}
     J, before = np.zeros((0, configuration.q.size)), 0
@@ -113,7 +115,7 @@ _RANK = 1e-6
 
 
 def freedom_left(robot: Robot, stack: Stack) -> int:
-    """n minus the generic rank of the enabled levels' stacked Jacobian.
+    """Returns n minus the generic rank of the enabled levels' stacked Jacobian.
 
     Generic: the largest rank over a few random configurations, so that a passing singularity does
     not count as freedom.

@@ -1,4 +1,4 @@
-"""One row of numbers per control tick, for recordings, plots and summaries: where each of its fields lies."""
+"""The layout of a telemetry row: one row of numbers per control tick, for recordings, plots and summaries."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ PER_LEVEL = ("cost", "kkt", "rung", "time_us", "leak", "active")
 
 @dataclass(frozen=True)
 class TaskInfo:
-    """A task as telemetry sees it: stable name, its level's name, coordinates and unit ("m" or "rad")."""
+    """The data of a task in telemetry: stable name, its level's name, coordinates and unit ("m" or "rad")."""
 
     name: str
     level: str
@@ -73,7 +73,7 @@ class TaskInfo:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each field of a row lies.
+    """The position of each field in a row.
 
     `q` and `v` are the plant's, `q_measured` and `v_measured` what the controller was given; `tau_0` is what
     acted until then. Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w),
@@ -105,7 +105,7 @@ def arranged(
     per_level: Sequence[str],
     per_task: Sequence[str] = (),
 ) -> Layout:
-    """Fields side by side in this order: scalars, joints, tasks, levels.
+    """Builds a layout with the fields in this order: scalars, joints, tasks, levels.
 
     Args:
         robot: gives the width of joint fields.
@@ -147,7 +147,8 @@ def arranged(
 
 
 def relaid(rows: Array, old: Layout, new: Layout) -> Array:
-    """Rows, (k, size), as another layout has them; NaN where they have nothing of that name and width."""
+    """Converts rows, (k, size), to another layout; fields that the rows do not have in the same width become
+    NaN."""
     found = np.full((len(rows), new.size), math.nan)
     for name, where in new.fields.items():
         before = old.fields.get(name)

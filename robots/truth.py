@@ -48,7 +48,7 @@ def encoder_resolution(robot: Robot, settings: PlantSettings) -> np.ndarray:
 
 def pose(placement: pin.SE3) -> dict[str, np.ndarray]:
     """Position (3,) m and unit quaternion (w, x, y, z), named as MuJoCo's specification names them."""
-    # Of a vector: pin.Quaternion of a matrix keeps 80 bytes for good.
+    # The quaternion is built from a vector: each pin.Quaternion of a matrix leaks 80 bytes.
     x, y, z, w = pin.Quaternion(pin.SE3ToXYZQUAT(placement)[3:]).normalized().coeffs()
     return {"pos": placement.translation, "quat": np.array([w, x, y, z])}
 

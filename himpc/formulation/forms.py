@@ -1,4 +1,4 @@
-"""The levels prepared for one set of settings: everything that does not change from tick to tick."""
+"""The levels prepared for one set of settings: all data that are constant from tick to tick."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class StackForm:
         return (on - back) @ v / (2 * h)
 
     def asked(self, configuration: Configuration, previews: Mapping[str, Preview]) -> Mapping[str, Preview]:
-        """The references in the coordinates of the tasks, see `Task.asked`."""
+        """Returns the references in the coordinates of the tasks, see `Task.asked`."""
         asked = {}
         for task in self.tasks:
             if type(task).asked is not Task.asked and task.name in previews:
@@ -216,7 +216,7 @@ class Prepared(NamedTuple):
 
     Attributes:
         form: the levels to solve; the damping level where there are none.
-        idle: no level is on and damping is off: nothing is asked for.
+        idle: whether no level is enabled and damping is off; the torque is then held.
         off: tasks of the levels that are not solved.
     """
 
@@ -226,7 +226,7 @@ class Prepared(NamedTuple):
 
 
 def prepare(robot: Robot, settings: Settings) -> Prepared:
-    """The levels that take part.
+    """Prepares the levels that take part.
 
     Raises:
         InputError: M̄ has the wrong length, a frame or joint is unknown, or a gain or weight does not fit.
@@ -244,7 +244,8 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
 
 
 def usable(x: Array) -> bool:
-    """Finite, and small enough that its squares and the bounds' differences stay so."""
+    """Whether values are finite, and small enough that their squares and the differences of bounds are finite
+    too."""
     return float(x @ x) < 1e18
 
 

@@ -1,4 +1,4 @@
-"""What an incremental controller remembers from one tick to the next."""
+"""The memory of an incremental controller from one tick to the next."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Memory(NamedTuple):
     def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:
         """q*_{k+j|k−1}, j = 1 … N−1, re-rooted at the measured q: (N−1, n), see (30).
 
-        The last prediction reaches one knot too short for a longer horizon; it goes on at constant velocity.
+        If the last prediction is too short for the horizon, it is continued at constant velocity.
         """
         if self.predicted_q is None:
             return q + T_s * np.arange(1.0, N)[:, None] * v

@@ -1,4 +1,4 @@
-"""A robot's tree of joints as tables of numbers: geometry only, no mass."""
+"""The tree of joints of a robot as arrays: geometry only, without masses."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Geometry(NamedTuple):
     """A robot's tree; row j belongs to joint j, row 0 to the world.
 
     Attributes:
-        parent: (n+1,) the joint before; it always has a smaller number.
-        turn, shift: (n+1, 3, 3) and (n+1, 3) m, from the joint before to this one at q = 0.
+        parent: (n+1,) index of the parent joint, which is always smaller.
+        rotation, translation: (n+1, 3, 3) and (n+1, 3) m, from the parent joint to this one at q = 0.
         axis: (n+1, 3) in the joint's own axes.
-        turns: (n+1,) 1 for a revolute joint, 0 for a prismatic one.
-        moves: (n+1, n) 1 where joint j is carried by the joint of a column.
+        is_revolute: (n+1,) 1 for a revolute joint, 0 for a prismatic one.
+        moves: (n+1, n) 1 where the joint of the column moves joint j.
     """
 
     parent: Indices

@@ -1,4 +1,4 @@
-"""References on a clock of their own."""
+"""References with their own start of time."""
 
 from __future__ import annotations
 

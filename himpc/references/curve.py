@@ -1,4 +1,4 @@
-"""References that are a few numbers: the kernel evaluates them by itself."""
+"""References that a few coefficients describe; the compiled kernel evaluates them without Python."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Curve(NamedTuple):
 
 
 def curve_of(reference: Reference) -> Curve | None:
-    """The numbers of a reference; None for one that only knows how to preview itself."""
+    """Returns the coefficients of a reference; None for a reference that can only be sampled by `preview`."""
     match reference:
         case Hold():
             return Curve(reference.value)

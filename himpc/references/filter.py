@@ -1,4 +1,4 @@
-"""The filter of a dragged target, as formulas; `himpc.tick.kernel.target` has it compiled."""
+"""The filter of a dragged target in Python; `himpc.tick.kernel.target` contains the compiled filter."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: A
     Args:
         samples: (…, w + 3m + 1) value, velocity, acceleration, way from the sample before, and whether it
             rests at the raw target; a value has w = 9 numbers for a rotation, else m.
-        known: how many of them are there; more are made as far as `out` reaches.
-        raw: where the hand is, (w,).
-        caps: speed, acceleration and jerk come first.
+        known: number of samples that exist; further ones are computed up to the length of `out`.
+        raw: the raw target, (w,).
+        caps: largest speed, acceleration and jerk are its first entries.
         T_s: s.
         out: (3, N+1, m) displacement, velocity and acceleration at t … t + N·T_s.
     """
@@ -77,7 +77,7 @@ def _jerked(velocity: Array, acceleration: Array, wish: Array, caps: list[float]
 
 
 def _shortened(x: Array, cap: float) -> Array:
-    """x, shortened to `cap` if it is longer."""
+    """Returns x, scaled down to the norm `cap` if it is longer."""
     length = _norm(x)
     return x * (cap / length) if length > cap else x
 

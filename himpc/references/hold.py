@@ -1,4 +1,4 @@
-"""Stay where you are."""
+"""A constant reference."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Hold:
 
 @lru_cache(maxsize=64)
 def still(N: int, m: int) -> Preview:
-    """m coordinates at rest at zero."""
+    """Returns the preview of m coordinates at rest at zero."""
     zeros = np.zeros((N + 1, m))
     zeros.setflags(write=False)
     return Preview(zeros[0], zeros, zeros, zeros)

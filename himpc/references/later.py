@@ -1,4 +1,4 @@
-"""References a moment later."""
+"""References that are extrapolated by a short time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from himpc.rotation import exp3
 
 @final
 class Later(Mapping[str, Preview]):
-    """Previews whose targets have gone on for `seconds` at their speed; of each only `value` is moved.
+    """Previews whose targets are extrapolated by `seconds` at constant velocity; only `value` changes.
 
     Attributes:
         previews: by the names of their tasks.

@@ -10,8 +10,8 @@ from himpc.references.preview import Preview, Reference
 
 @final
 class Outlook(Mapping[str, Preview]):
-    """The previews of all references at one tick, each sampled when somebody asks for it: a controller that
-    knows a reference's numbers needs no samples.
+    """The previews of all references at one tick. Each is sampled when it is first read; a controller that
+    knows the coefficients of a reference needs no samples.
 
     Attributes:
         references: by the names of their tasks.

@@ -1,4 +1,4 @@
-"""What the EE and base planners produce: straight or quintic motion through points at a cruise speed."""
+"""Paths of the EE and base planners: straight or quintic motion through points at a cruise speed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Path:
         points: (P, m) m, P ≥ 1; the first one is where it starts.
         cruise: largest speed, m/s.
         law: "straight" or "quintic".
-        start: when the motion starts, s.
+        start: start time of the motion, s.
     """
 
     points: Array
@@ -43,7 +43,7 @@ class Path:
     start: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raises InputError for a speed, a law or points that cannot be."""
+        """Raises InputError for an invalid speed, law or point."""
         if not (np.isfinite(self.cruise) and self.cruise > 0):
             raise InputError(f"cruise speed is {self.cruise} m/s: give a finite number above 0, e.g. 0.5")
         if self.law not in LAWS:

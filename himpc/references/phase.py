@@ -1,4 +1,4 @@
-"""Time laws: how far along its path a reference is."""
+"""Time laws: the phase of a reference along its path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What a controller is told about a task's desired motion: now and over the horizon."""
+"""The preview of a task's desired motion: its value now and over the horizon, as the controller receives
+it."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ class Reference(Protocol):
 
 
 def previews(references: Mapping[str, Reference], t: float, T_s: float, N: int) -> dict[str, Preview]:
-    """What a controller's `step` takes: by task the preview of its reference at t (s)."""
+    """Returns the argument `previews` of a controller's `step`: by task the preview of its reference at t
+    (s)."""
     return {name: reference.preview(t, T_s, N) for name, reference in references.items()}
 
 

@@ -40,7 +40,7 @@ class Target:
     target frozen; those states are kept and become the next ticks' reference if the raw target stays.
 
     Attributes:
-        raw: where the hand is: (m,) coordinates, or a rotation matrix (3, 3).
+        raw: the raw target, before the filter: (m,) coordinates, or a rotation matrix (3, 3).
         caps: caps on speed, acceleration and jerk of the filtered motion.
     """
 
@@ -54,7 +54,7 @@ class Target:
         self._filter = roll
         self._m = 3 if self._rotation else value.size
         self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
-        # See `references.filter.roll`; the first `_known` samples are there, the first of them is now.
+        # See `references.filter.roll`; the first `_known` samples exist, and sample 0 is the present.
         self._samples = np.zeros((2, value.size + 3 * self._m + 1))
         self._samples[0, : value.size], self._samples[0, -1], self._known = value.ravel(), 1.0, 1
         self._time: float | None = None
@@ -67,13 +67,13 @@ class Target:
         return self._samples[0, : self.raw.size].reshape(self.raw.shape).copy()
 
     def move(self, raw: Array) -> None:
-        """Puts the hand somewhere else. The motion so far continues smoothly from where it is."""
+        """Moves the raw target. The filtered motion continues smoothly from its present state."""
         self.raw = np.array(raw, float)
         self._samples[0, -1], self._rests = 0.0, False
         self._forget_future()
 
     def jump(self, value: Array) -> None:
-        """Puts hand and reference to `value`, at rest (for resets)."""
+        """Sets the raw and the filtered target to `value`, at rest (for resets)."""
         self.__init__(value, self.caps, self._filter)
 
     def _forget_future(self) -> None:
@@ -90,22 +90,22 @@ class Target:
         return self._gathered(motion)
 
     def stays(self, t: float, seen: object) -> bool:
-        """Whether the preview at t is what somebody has seen before: the target rests."""
+        """Whether the preview at t equals the one before: the target rests."""
         if self._rest is None or self._rest[1] is not seen:
             return False
         self._time = t
         return True
 
     def show(self, t: float, T_s: float, motion: Array) -> Array | None:
-        """`preview`, without its objects, for whoever asks every period.
+        """Writes the preview into an array, without creating objects, for callers at every period.
 
         Args:
             t, T_s: s.
-            motion: takes displacement, velocity and acceleration, (3, N+1, m).
+            motion: output array for displacement, velocity and acceleration, (3, N+1, m).
 
         Returns:
-            x_d, its numbers row by row. None, and nothing is written, if the target rests, or is a rotation
-            of which a task asks for less than all axes.
+            x_d, its numbers row by row. None, and nothing is written, if the target rests, or if it is a
+            rotation and its task controls fewer than three axes.
         """
         if motion.shape[2] != self._m or self._rests_at(t, T_s):
             return None

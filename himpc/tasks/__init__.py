@@ -1,4 +1,4 @@
-"""Tasks: what a level asks the robot to do."""
+"""Tasks: the quantities that a level controls."""
 
 from himpc.tasks.centre_of_mass import CentreOfMass
 from himpc.tasks.frame_orientation import FrameOrientation

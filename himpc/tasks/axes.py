@@ -1,4 +1,4 @@
-"""The choice of axes that tasks of points and rotations share."""
+"""The base class of position and orientation tasks with a choice of axes."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class OnAxes(Task):
     """A task on some of three axes.
 
     Attributes:
-        axes: those that are controlled, any non-empty subset of "xyz".
+        axes: controlled axes, any non-empty subset of "xyz".
     """
 
     axes: str = AXES
 
     def __post_init__(self) -> None:
-        """Raises InputError for anything else."""
+        """Raises InputError for any other value of `axes`."""
         if (
             not self.axes
             or any(axis not in AXES for axis in self.axes)
@@ -39,14 +39,16 @@ class OnAxes(Task):
 
     @property
     def components(self) -> list[int] | slice:
-        """Which of the three components the task controls; a slice, which copies nothing, if it is all."""
+        """Indices of the components that the task controls; a slice, which avoids a copy, if it controls all
+        three."""
         return slice(0, 3) if self.axes == AXES else [AXES.index(axis) for axis in self.axes]
 
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
         return tuple(self.axes)
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """Of a rotation, which turns about all axes, the components on the task's own."""
+        """Returns the components of a reference along the task's axes; a rotation has components along all
+        three."""
         if preview.value.ndim == 1 or preview.velocity.shape[1] == len(self.axes):
             return preview
         on = self.components

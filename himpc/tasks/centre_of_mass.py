@@ -1,4 +1,4 @@
-"""Where the robot's mass is."""
+"""The centre of mass of the robot."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class CentreOfMass(OnAxes):
     """x = centre of mass of what the joints move, along the chosen world axes, m (Pink and Mink: ComTask).
 
     Links that are fixed to the world do not count, as Baxter's torso and head of 36.3 kg: with m_fixed there
-    and m that moves, the centre of mass of all goes only m/(m + m_fixed) as far. The one task that reads
-    masses, those of the robot's own description: a payload is not in it.
+    and m that moves, the centre of mass of all goes only m/(m + m_fixed) as far. No other task reads masses.
+    The masses are those of the robot's description, without a payload.
 
     Attributes:
         axes: world axes that are controlled, any non-empty subset of "xyz".

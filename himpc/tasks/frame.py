@@ -1,4 +1,4 @@
-"""What position and orientation tasks of a frame share."""
+"""The base class of position and orientation tasks of a frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orientation of a frame in the world."""
+"""A task for the orientation of a frame in the world."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Position of a frame's origin in the world."""
+"""A task for the position of a frame's origin in the world."""
 
 from __future__ import annotations
 

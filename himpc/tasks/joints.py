@@ -41,7 +41,7 @@ class OnJoints(Task):
 @final
 @dataclass(frozen=True, kw_only=True)
 class Joints(OnJoints):
-    """Some joints towards their values (level 3 of Table IV: q₁)."""
+    """Moves some joints to their desired values (level 3 of Table IV: q₁)."""
 
     def error(self, value: Array, desired: Array) -> Array:
         return value - desired
@@ -50,7 +50,7 @@ class Joints(OnJoints):
 @final
 @dataclass(frozen=True, kw_only=True)
 class Posture(OnJoints):
-    """All joints towards one posture."""
+    """Moves all joints to a desired posture."""
 
     def error(self, value: Array, desired: Array) -> Array:
         return value - desired
@@ -62,7 +62,7 @@ class Damping(OnJoints):
     """All joints, K_p = 0: the residual of (4) is q̈ + K_v q̇, so what nothing else controls comes to rest.
 
     R in (31) weighs Δτ only: the torque of an untasked direction is frozen, not damped, and a push
-    accelerates that direction for ever. This task, as the last level, is the cure.
+    accelerates that direction for ever. This task, as the last level, damps such motions.
     """
 
     K_p: Gain = 0.0

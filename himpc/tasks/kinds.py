@@ -1,4 +1,4 @@
-"""The kinds of tasks by the word that names them in settings and menus."""
+"""The kinds of tasks, by their name in settings and menus."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Kind:
     """A kind of task.
 
     Attributes:
-        says: what it is, one line.
-        makes: the classes; of more than one, tasks of equal priority, named NAME_SUFFIX.
-        suffixes: see there; empty for one class.
+        says: description in one line.
+        makes: task classes of the kind; several classes give tasks of equal priority, named NAME_SUFFIX.
+        suffixes: suffixes of these names; empty for one class.
     """
 
     says: str
@@ -54,12 +54,12 @@ OWN = "own"
 
 
 def word_of(task: Task) -> str:
-    """The word of a task's kind; OWN if it is of none of ours."""
+    """Returns the name of a task's kind; OWN for a class that is not built in."""
     return _WORDS.get(type(task), OWN)
 
 
 def said(task: Task) -> str:
-    """What a task is about, one line."""
+    """Returns a description of a task in one line."""
     word = word_of(task)
     return KINDS[word].says if word != OWN else (type(task).__doc__ or "a task of your own").split("\n")[0]
 

@@ -1,4 +1,4 @@
-"""What orientation tasks share: how far a rotation is from another one on one, two or all three axes."""
+"""The base class of orientation tasks: the orientation error on one, two or three axes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class OrientationTask(OnAxes):
 
     @abstractmethod
     def angular_jacobian(self, configuration: Configuration) -> Array:
-        """Of ω at every knot, (N, 3, n)."""
+        """Jacobian of ω at every knot, (N, 3, n)."""
 
     def error(self, value: Array, desired: Array) -> Array:
         return turned_away(value @ desired.T, self.axes)
@@ -58,7 +58,7 @@ class OrientationTask(OnAxes):
         return self.slopes(self.rotations(configuration), [preview.value] * len(rows)) @ rows
 
     def slopes(self, rotations: list[Array], desired: list[Array]) -> Array:
-        """What ẋ is of ω at R and R_d of every knot, (N, m, 3)."""
+        """∂ẋ/∂ω at R and R_d of every knot, (N, m, 3)."""
         return np.array([slope(R @ R_d.T, self.axes) for R, R_d in zip(rotations, desired, strict=True)])
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
@@ -92,7 +92,7 @@ class OrientationTask(OnAxes):
 
 
 def turned_away(E: Array, axes: str) -> Array:
-    """x̃ of E = R R_dᵀ on some axes, (m,) rad; see `OrientationTask`."""
+    """Returns x̃ of E = R R_dᵀ on some axes, (m,) rad; see `OrientationTask`."""
     if len(axes) != 2:
         found = log3(E)
         return found if axes == AXES else found[[AXES.index(axis) for axis in axes]]
@@ -111,7 +111,7 @@ def turned_away(E: Array, axes: str) -> Array:
 
 
 def slope(E: Array, axes: str) -> Array:
-    """What ẋ is of ω, (m, 3); see `OrientationTask`."""
+    """∂ẋ/∂ω, (m, 3); see `OrientationTask`."""
     rows = np.eye(3)[[AXES.index(axis) for axis in axes]]
     return rows @ left_inverse(log3(E)) if len(axes) == 1 else rows
 

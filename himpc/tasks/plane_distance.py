@@ -1,4 +1,4 @@
-"""How far a frame is from a plane: above a table, in front of a wall."""
+"""A task for the distance of a frame from a plane, such as a table or a wall."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PlaneDistance(Task):
     unit: ClassVar[Literal["m", "rad"]] = "m"
 
     def __post_init__(self) -> None:
-        """Raises InputError for a normal that is no direction."""
+        """Raises InputError for a normal that has no direction, or an offset that is not finite."""
         if len(self.normal) != 3 or not 0.0 < float(np.linalg.norm(self.normal)) < np.inf:
             raise InputError(
                 f"normal of task '{self.name}' is {list(self.normal)}: give three finite numbers, "

@@ -1,4 +1,4 @@
-"""An axis of a frame toward a point: a camera that looks at something, a torch that shines on it."""
+"""A task that points an axis of a frame at a point, such as a camera or a torch."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Pointing(Task):
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
-        axis: of the frame, one of x, y, z, -x, -y, -z.
+        axis: axis of the frame, one of x, y, z, -x, -y, -z.
     """
 
     frame: str = ""
@@ -50,7 +50,7 @@ class Pointing(Task):
     unit: ClassVar[Literal["m", "rad"]] = "rad"
 
     def __post_init__(self) -> None:
-        """Raises InputError for an axis that is none."""
+        """Raises InputError for an unknown axis."""
         if self.axis not in DIRECTIONS:
             raise unknown_name(f"axis of task '{self.name}'", self.axis, DIRECTIONS)
 
@@ -78,7 +78,7 @@ class Pointing(Task):
         return self.target(configuration) if preview is None else preview.value
 
     def _seen(self, point: Array) -> tuple[Array, Array]:
-        """x (2,) and ∂x/∂s (2, 3) for a point s as the frame sees it, (3,) m."""
+        """Returns x (2,) and ∂x/∂s (2, 3) for a point s in the frame's coordinates, (3,) m."""
         distance = float(np.linalg.norm(point))
         if distance < _NEAREST:
             point = point * (_NEAREST / distance) if distance > 0.0 else _NEAREST * self._direction()
@@ -114,7 +114,8 @@ class Pointing(Task):
         return found
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """A point that moves with ċ changes x by ∂x/∂c ċ; that much is asked for back."""
+        """Returns the reference that compensates a moving point: a point with velocity ċ changes x at the
+        rate ∂x/∂c ċ."""
         if rests(preview):
             return at_rest(preview, 2)
         moved, c_dot, _ = preview[1:]

@@ -1,4 +1,4 @@
-"""One frame of the robot as another one sees it: two hands that carry something together."""
+"""Tasks for the pose of one frame relative to another, such as two hands that carry an object."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ class RelativeTask(OnAxes):
     """A task on some axes of a root frame, which moves itself (Pink and Mink: RelativeFrameTask).
 
     Attributes:
-        frame: name of the frame that is seen; empty means the robot's tip.
-        root: name of the frame that sees it; empty means the robot's first one, which stands still.
+        frame: name of the controlled frame; empty means the robot's tip.
+        root: name of the frame in which the pose is expressed; empty means the robot's first frame, which is
+            fixed.
         axes: axes of the root that are controlled, any non-empty subset of "xyz".
     """
 

@@ -1,4 +1,4 @@
-"""A reference in the coordinates of a task to which it looks different as robot and target move."""
+"""Converts a reference to the coordinates of a task, if they depend on the motion of robot and target."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def seen(preview: Preview, motion: tuple[Array, Array, Array], G: Array, change:
     """ẋ_d = G ẏ_d and ẍ_d = G ÿ_d + Ġ ẏ_d of a target y_d, and by the trapezoidal rule x_d(k+j) − x_d(k).
 
     Args:
-        preview: of the target.
+        preview: preview of the target.
         motion: its displacement, velocity and acceleration, (N+1, 3) each.
         G: (N+1, m, 3) at every knot.
         change: Ġ, (N+1, m, 3), along the motion of robot and target.

@@ -23,9 +23,9 @@ Gain = Annotated[float | tuple[float, ...], GAINS]
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
-    """What a hierarchy level asks for: coordinates, Jacobian and gains, nothing else.
+    """A task of a hierarchy level: its coordinates, Jacobian and gains.
 
-    The closed loop aimed at is (4) of the HIMPC paper: x̃'' + K_v x̃' + K_p x̃ = 0 with x̃ = x − x_d.
+    The desired closed loop is (4) of the HIMPC paper: x̃'' + K_v x̃' + K_p x̃ = 0 with x̃ = x − x_d.
 
     Attributes:
         name: stable identity; events, telemetry and references refer to it.
@@ -56,12 +56,12 @@ class Task(ABC):
         """J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
 
     def target(self, configuration: Configuration) -> Array:
-        """x_d at which the error is zero now: where a draggable target starts."""
+        """Returns the x_d for which the error is zero now: the start of a draggable target."""
         return self.value(configuration)
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """The reference in the task's coordinates; another one than `preview` only if a target is something
-        else than a value of them."""
+        """Returns the reference in the task's coordinates. It differs from `preview` only if the target is
+        not given in these coordinates."""
         return preview
 
     def gains(self, m: int) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""What the settings and the robot say, written into an arena: geometry, tasks, gains, bounds."""
+"""Writes the robot and the settings into an arena: geometry, tasks, gains, bounds."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _BUILT_IN = (FramePosition, FrameOrientation, Joints, Posture, Damping)
 
 
 def is_built_in(task: Task) -> bool:
-    """Whether the kernel knows the task; its rows are handed in otherwise."""
+    """Whether the kernel computes the task; otherwise its rows are computed in Python."""
     return type(task) in _BUILT_IN
 
 
@@ -117,15 +117,15 @@ def write_tasks(
 
 
 def write_limits(arena: Arena, limits: LimitsInForce, paper: bool) -> None:
-    """The bounds in force; positions as they are for `paper`, else where joints are stopped; and, for
-    telemetry, as they are."""
+    """Writes the bounds in force. The position bounds are the limits themselves for `paper`, otherwise the
+    positions at which joints are stopped; telemetry gets the limits themselves."""
     q = limits.q_lower, limits.q_upper
     stops = q if paper else limits.stops
     arena.f["limits"][:] = limits.tau_lower, limits.tau_upper, limits.v_limit, *stops, limits.a_max, *q
 
 
 def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach: int) -> None:
-    """What a task's reference says at `reach` knots."""
+    """Writes the reference of a task at `reach` knots."""
     f = arena.f
     arena.i["law"][place] = SAMPLED
     if preview.value.ndim == 2:
@@ -136,7 +136,8 @@ def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach
 
 
 def write_motion(arena: Arena, span: slice, preview: Preview, reach: int) -> None:
-    """How a reference moves from where it is, at `reach` knots; one knot stands for all."""
+    """Writes the motion of a reference relative to its present value at `reach` knots; a single knot is used
+    for all."""
     motion = arena.f["motion"]
     motion[0, :, span] = preview.displacement[:reach]
     motion[1, :, span] = preview.velocity[:reach]
@@ -144,7 +145,8 @@ def write_motion(arena: Arena, span: slice, preview: Preview, reach: int) -> Non
 
 
 def write_curve(arena: Arena, place: int, span: slice, reference: Reference) -> bool:
-    """Lets the kernel evaluate a task's reference from now on; False if it is not one that it knows."""
+    """Makes the kernel evaluate a task's reference from now on; returns False if the kernel does not support
+    this reference."""
     curve, f = curve_of(reference), arena.f
     if curve is None or curve.centre.shape not in ((span.stop - span.start,), (3, 3)):
         return False

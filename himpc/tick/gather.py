@@ -1,4 +1,4 @@
-"""Where in an arena the numbers of a telemetry row stand."""
+"""Finds the numbers of a telemetry row in an arena."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ _LIMITS = ("tau_lower", "tau_upper", "v_limit", "", "", "", "q_lower", "q_upper"
 
 
 def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> Whole | None:
-    """For every field that a plan and its references fill, where in `arena.data` it stands; NaN for the rest.
+    """Returns for every field that a plan and its references fill its index in `arena.data`; NaN for all
+    other fields.
 
     Args:
         arena: of a controller.

@@ -1,4 +1,5 @@
-"""Rows of tasks that the kernel does not know, evaluated in Python along the knots and handed to it."""
+"""Computes the rows of tasks that are not built into the kernel, in Python along the knots, and writes them
+to the arena."""
 
 from __future__ import annotations
 
@@ -41,8 +42,8 @@ class GivenRows:
                     self.turning.add(task.name)
 
     def at_first(self, task: Task, preview: Preview) -> Preview:
-        """A preview as it comes. Of an orientation on fewer than three axes what it asks for depends on where
-        the robot is: `write` adds that."""
+        """Returns a preview without changes. For an orientation on fewer than three axes the reference
+        depends on the robot's configuration; `write` adds this part."""
         if not isinstance(task, OrientationTask) or len(task.axes) == len(AXES):
             return preview
         self._turned[task.name] = not rests(preview)

@@ -1,4 +1,4 @@
-"""The kernel's kinematics for controllers that have no horizon."""
+"""The compiled kinematics for controllers without a horizon."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ _NUDGES = 3
 
 
 class Seen(NamedTuple):
-    """Where the tasks are: J (m, n), J̇q̇ and x̃ (m,) of those that are solved for; x and x̃ of all by name."""
+    """Kinematics of the tasks at a state: J (m, n), J̇q̇ and x̃ (m,) of the solved tasks; x and x̃ of all
+    tasks by name."""
 
     J: Array
     drift: Array

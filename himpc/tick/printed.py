@@ -1,4 +1,4 @@
-"""A level's problem in an arena, as the printed route wants it."""
+"""Converts a level's problem in an arena to a `LevelProblem` of the printed route."""
 
 from __future__ import annotations
 

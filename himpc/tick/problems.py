@@ -28,7 +28,7 @@ def solve_problems(
 
 
 def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str, LevelSolution]) -> Arena:
-    """An arena in which the problems wait to be solved."""
+    """Creates an arena and writes the problems into it."""
     N, _, n = problems[0].B.shape
     ends = np.cumsum([0] + [problem.B.shape[1] for problem in problems])
     arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L))

@@ -25,14 +25,15 @@ _ACCURACY = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class LevelTable:
-    """What a level is to the kernel.
+    """The data of a level for the kernel.
 
     Attributes:
         rows: its rows among all.
         knots: how many knots it counts, K.
         R: (n,) weight of the increments.
-        own_rows, own_knots, own_R: what its evidence is about; the same but where priorities are left out.
-        alone: (33) does not bind it.
+        own_rows, own_knots, own_R: rows, knots and R for the level's evidence; they differ from the others
+            only without priorities.
+        alone: whether (33) is not imposed on it.
     """
 
     rows: slice

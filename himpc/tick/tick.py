@@ -1,4 +1,4 @@
-"""One control period by the kernel: what a controller hands over, and the plan it gets back."""
+"""One control period by the compiled kernel: its inputs from a controller, and the plan that it returns."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class CompiledTick:
         self._ticks, self.budget, self._reach = 0, budget_of(self.arena), settings.horizon + 1
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
-        """Takes over what a controller remembers; from nothing the robot has moved with constant velocity."""
+        """Takes over a controller's memory; without one, constant velocity is assumed for the past."""
         N, T_s = self._settings.horizon, self._settings.T_s
         memory = memory or Memory.start(q, v, T_s)
         f, i = self.arena.f, self.arena.i
@@ -97,7 +97,7 @@ class CompiledTick:
 
     @property
     def memory(self) -> Memory | None:
-        """What it remembers, for whoever takes over."""
+        """The memory, for a successor."""
         if not self._started:
             return None
         f, i = self.arena.f, self.arena.i
@@ -123,7 +123,7 @@ class CompiledTick:
             write_effects(self.arena, level.rows, by_row * level.root_Q, by_row[:, None] * level.weighted_C)
 
     def take_M_bar(self, M_bar: Array) -> None:
-        """The diagonal of M̄ from now on, (n,) kg·m²."""
+        """Sets the diagonal of M̄, (n,) kg·m²."""
         self.arena.f["M_bar"][:] = M_bar
 
     def problems(self) -> list[LevelProblem]:
