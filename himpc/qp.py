@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Solver = Literal["daqp", "proxqp", "qpoases"]
 SOLVERS: tuple[Solver, ...] = ("daqp", "proxqp", "qpoases")
-"""qpoases, the paper's, comes with CasADi and is there only if that is installed: see `is_installed`."""
+"""The names of the solvers. `qpoases`, which the paper uses, is part of CasADi and needs it installed, see
+`is_installed`."""
 
 KKT_TOLERANCE = 1e-6
-"""A point whose scaled KKT residual is larger counts as unsolved, whatever the solver says."""
+"""A point whose scaled KKT residual is larger counts as unsolved, whatever the solver's status is."""
 
 _PRIMAL_TOLERANCE = 1e-9
 _NOISE = 1e-10

@@ -33,7 +33,7 @@ _RIDGEBACK_UR10 = (
 )
 _BY_ROBOT = {"ridgeback-ur10": _RIDGEBACK_UR10}
 _SLENDER = 0.05
-"""Radius over the length of the whole chain, for robots nobody covered by hand."""
+"""Radius divided by the length of the whole chain, for robots without spheres placed by hand."""
 
 
 def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:

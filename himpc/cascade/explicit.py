@@ -19,13 +19,15 @@ from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""N·m: a row closer than this to its bound is binding."""
+"""N·m: a row closer than this to its bound is active."""
 _NOISE = 1e-11
-"""A row of which no larger share is left by (33) is rounding noise: its joint is not free any more."""
+"""A row whose projection on the free directions of (33) is a smaller share of it is rounding noise: its joint
+is not free any more."""
 _ROOM = 1e-9
-"""N·m by which bounds give way for a last attempt; the rows that then bind are tried without."""
+"""N·m by which bounds are widened for a last attempt; the rows that are then active are tried with their
+exact bounds."""
 _ACCURATE = 1e-9
-"""Points that miss their optimality conditions by more are polished."""
+"""Points with a larger residual of their optimality conditions are refined."""
 
 
 def solve_explicit(

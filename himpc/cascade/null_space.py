@@ -14,7 +14,7 @@ from himpc.constants import RANK_TOLERANCE
 Array = NDArray[np.float64]
 
 CLEARLY_REGULAR = 1e-5
-"""Diagonals of a triangular factor above this share of the largest entry prove full rank, room to spare."""
+"""Diagonals of a triangular factor above this share of the largest entry prove full rank with a margin."""
 
 
 def nested_bases(levels: Sequence[Array]) -> list[Array]:

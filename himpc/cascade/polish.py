@@ -13,19 +13,21 @@ from himpc.qp import QPSolution
 Array = NDArray[np.float64]
 
 _NEAR = 1e-3
-"""A point with a larger residual says nothing of which rows bind."""
+"""A point with a larger residual does not show which rows are active."""
 _LEFT = 1e-12
-"""A multiplier that is a smaller share of the largest one is what a solver left over."""
+"""A multiplier that is a smaller share of the largest one is a residue of the solver."""
 _BEYOND = 1e-9
-"""A row that is beyond its bound by no more is met."""
+"""A row that violates its bound by no more than this counts as satisfied."""
 _WRONG = 1e-12
-"""A multiplier that presses the wrong way by a smaller share of the largest one is none."""
+"""A multiplier of the wrong sign that is a smaller share of the largest one counts as zero."""
 _ALONG = 1e-11
-"""A row that is met at a smaller share of the way's length lies along it: it depends on the rows held."""
+"""A row whose slope along the step is smaller than this share of the step's length is parallel to it: it
+depends on the rows held."""
 _STILL = 1e-9
-"""A way that is a smaller share of the optimum without rows has no length."""
+"""A step that is a smaller share of the unconstrained optimum counts as zero."""
 _CHANGES = 30
-"""How many rows may be taken or given back one by one, beside those that a solver named."""
+"""Largest number of rows that are added or removed one by one, besides those that a solver reported as
+active."""
 
 
 def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:

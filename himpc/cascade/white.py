@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 _FELT = 1e-13
-"""Directions that a level feels by less than this share of its rows are felt by rounding alone."""
+"""The effect of a direction on a level is rounding if it is smaller than this share of the level's rows."""
 _APART = 1e-6
 """Singular values that are a smaller share of the one before belong to directions that rows do not fix."""
 

@@ -41,16 +41,16 @@ from robots.nominal import NominalSettings
 Array = NDArray[np.float64]
 
 LARGEST = 6.0
-"""M̄ of a joint stays below this times what was set."""
+"""Upper limit of M̄ of a joint, relative to the value that was set."""
 RISE = 5.0
-"""1/s: it grows by at most this share of itself in a second; it falls at once."""
+"""1/s: largest relative growth rate of M̄; a decrease takes effect at once."""
 LAG = 0.1
-"""s: after this time a measurement counts 1/e."""
+"""s: time after which the weight of a measurement has fallen to 1/e."""
 EVERY = 5
-"""Ticks from one look at the model to the next."""
+"""Number of ticks between two evaluations of the model."""
 FAINT = 1e-5
-"""μ: a kilogram must pull with 0.3 % of the joints' torque limits to be told from nothing; what pulls more is
-found a little too small."""
+"""μ: a payload is detected if a kilogram loads the joints with 0.3 % of their torque limits; with larger
+loads the estimate is slightly too small."""
 
 
 class LoadModel:

@@ -19,7 +19,7 @@ from robots import NominalModel
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""N·m: a row with a larger multiplier that is closer than a thousand times this to its bound is binding."""
+"""N·m: a row with a larger multiplier is active if it is closer than a thousand times this to its bound."""
 
 
 _REST = 5.0

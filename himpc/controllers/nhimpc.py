@@ -13,9 +13,9 @@ from himpc.tick.tick import CompiledTick
 from robots import Robot
 
 TOLERANCE = 1e-6
-"""N·m: the iteration ends when no increment of any level changes by more."""
+"""N·m: the iteration ends when no increment of any level changes by more than this."""
 MAX_ITERATIONS = 10
-"""The iteration ends after so many solutions of all levels, converged or not."""
+"""Largest number of iterations; each solves all levels once."""
 
 
 class NHIMPC(HIMPC):

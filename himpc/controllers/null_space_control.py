@@ -18,7 +18,7 @@ ROUNDING = 1e-10
 """Singular values below this share of ‖J_i L⁻ᵀ‖, M = L Lᵀ, count as zero: rounding hides them."""
 
 DAMPED = 0.2
-"""Where the damped variants begin to damp. On RT2 of the HIMPC paper OSF asks for 18 times the torque limit
+"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper OSF asks for 18 times the torque limit
 with 0.1, and level 1 is a quarter worse with 0.4; RT1 never comes that close to a singularity."""
 
 

@@ -27,10 +27,10 @@ from himpc.tick.kinematics import Kinematics
 Array = NDArray[np.float64]
 
 BLEND_SECONDS = 0.5
-"""How long what a change of settings would have done to the torque at once takes to arrive."""
+"""s: time over which the effect of a change of settings on the torque is blended in."""
 
 _NUDGE = 1e-4
-"""rad or m: how far the joints are moved to both sides to see the Jacobians change."""
+"""rad or m: displacement of the joints to both sides for the central difference of the Jacobians."""
 
 
 class Demand(NamedTuple):
@@ -71,9 +71,9 @@ class OneStepController(TorqueController):
     """
 
     clips: bool = False
-    """Whether the torque bounds are imposed; otherwise the plan's torque is what the law demands."""
+    """Whether the torque bounds are imposed; otherwise the plan's torque is the demand of the law."""
     incremental: bool = False
-    """Whether the bias is counted from τ₀: it then carries the torque over, and only the rest can jump."""
+    """Whether the bias contains τ₀: the bias is then continuous, and only the rest of the torque can jump."""
 
     def reset(self, tau_0: Array) -> None:
         """Forgets its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""

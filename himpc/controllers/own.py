@@ -28,18 +28,18 @@ from robots import NominalModel, Robot
 Array = NDArray[np.float64]
 
 Law = Callable[[View], Any]
-"""What the code from outside is: one call per tick."""
+"""A user's control law: a function that is called once per tick."""
 Calling = Callable[[Law, View], Any]
-"""Calls the law. Raises OwnFault, one sentence, if that does not work."""
+"""Calls the law. Raises OwnFault with one sentence if the call fails."""
 
 REST = 5.0
 """1/s: rate at which a robot whose code failed comes to rest, τ = τ₀ − M̄ (q̈ + REST · q̇): the torque is held
 but for what still moves."""
 OPENING_SECONDS = 0.3
-"""How long after a change of settings the law has its full say again."""
+"""s: time after a change of settings until the law's torque is applied in full."""
 _FIRST_SHARE = 0.02
 _NUDGE = 1e-4
-"""rad or m: how far the joints are moved to both sides to see the Jacobians change."""
+"""rad or m: displacement of the joints to both sides for the central difference of the Jacobians."""
 
 
 class OwnController(TorqueController):

@@ -25,7 +25,8 @@ from himpc.tick.tick import CompiledTick
 Array = NDArray[np.float64]
 
 DAMPING_SHARE = 1e-4
-"""Share of the damping level's Q that counts: it must calm what no task uses, not compete with tasks."""
+"""Factor on the damping level's Q: it must damp the directions that no task uses without competing with the
+tasks."""
 
 
 class Weighted(HIMPC):

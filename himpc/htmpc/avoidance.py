@@ -16,9 +16,10 @@ from himpc.htmpc.rows import ConstraintRows, ConstraintTable
 Array = NDArray[np.float64]
 
 PENALTY = 1e3
-"""Price of one metre inside the margin at one knot: more than any tracking gain."""
+"""Penalty per metre of violation of the margin at one knot: more than any tracking gain."""
 _LOOK = 0.35
-"""m beyond the margin: farther pairs get no row. More than a knot's motion changes in one step."""
+"""m beyond the margin: pairs that are farther apart get no row. It is larger than the change of a knot's
+position in one step."""
 
 
 @dataclass(frozen=True, eq=False)

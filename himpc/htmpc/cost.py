@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 MU = 1e-3
 """Weight of the barrier (the HTMPC authors' published value)."""
 ZETA = 5e-3
-"""Distance from a bound at which the logarithm gives way to a parabola (the authors' value)."""
+"""Distance from a bound below which a parabola replaces the logarithm (the authors' value)."""
 
 
 def gauss_newton(

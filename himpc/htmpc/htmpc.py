@@ -32,7 +32,7 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 _MEMORY = 200
-"""Plans remembered: a delay of 1 s at 200 Hz."""
+"""Number of plans that are stored: enough for a delay of 1 s at 200 Hz."""
 
 
 class HTMPC:

@@ -14,11 +14,11 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 _FASTEST = 20.0
-"""A joint measured at more than this many times the robot's limit is a broken measurement."""
+"""A joint speed above this multiple of the robot's limit is a measurement error."""
 _OUTSIDE = 10.0
-"""rad or m beyond its range at which a joint's position is a broken measurement."""
+"""rad or m: a joint position farther outside its range is a measurement error."""
 _FARTHEST = 1e6
-"""The same for a joint without a range, from zero."""
+"""rad or m: the same limit for a joint without a range, measured from zero."""
 
 
 def plausible(robot: Robot, q: Array, v: Array) -> bool:

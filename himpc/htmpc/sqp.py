@@ -24,7 +24,7 @@ DECREASE = 0.05
 """Share of the promised decrease that a step must bring (the authors' value)."""
 BACKTRACKS = 10
 UNCORRECTED = 0.2
-"""Share of δ that a step may take without being led back."""
+"""Share of δ by which a step may worsen the levels above without a second-order correction."""
 CORRECTIONS = 4
 """So many of the longest steps are led back before they are shortened; see `_led_back`."""
 
@@ -64,7 +64,7 @@ class _Direction(NamedTuple):
     H: Array
     g: Array
     own: bool
-    """Whether the compiled method holds H."""
+    """Whether the compiled active-set method has factored H."""
 
 
 def solve_level(problem: Problem, at: Iterate) -> Solved:

@@ -35,8 +35,8 @@ class Configuration:
         v: measured joint velocities, (n,).
         knots: predicted joint positions at knots 1 … N−1, (N−1, n); empty for N = 1.
         previews: references by task, for tasks whose coordinates depend on where their target is.
-        jacobians, placed: Jacobians (N, 6, n) and placements at q_k by the frame's name, if the caller has
-            computed them already.
+        jacobians, placed: functions from a frame's name to its Jacobians (N, 6, n) and to its placement at
+            q_k, if the caller has computed them already.
     """
 
     def __init__(

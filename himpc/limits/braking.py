@@ -12,9 +12,9 @@ from himpc.qp import solve_qp
 Array = NDArray[np.float64]
 
 _ITERATIONS = 300
-"""That the QP of one joint may take."""
+"""Largest number of iterations of the QP of one joint."""
 _MET = 1e-7
-"""N·m: a row that is missed by less counts as met."""
+"""N·m: a row with a smaller violation counts as satisfied."""
 
 
 def braking(rows: Rows) -> Array:

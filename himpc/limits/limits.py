@@ -50,7 +50,8 @@ class Limits:
 
 
 POSITION_MARGIN = 0.007
-"""rad: how far before its limit a joint is stopped; the estimation error carries it up to half of that on."""
+"""rad: distance before its limit at which a joint is stopped; the estimation error moves it up to half of
+this distance further."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ class Rows(NamedTuple):
 
 
 BRAKING = 20.0
-"""1/s: what brakes loses its velocity at this rate, and is all but at rest after a quarter of a second."""
+"""1/s: decay rate of the velocity of a braking joint, which is almost at rest after a quarter of a second."""
 
 REACTION = 5.0
 """Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""

@@ -45,12 +45,12 @@ KINDS: dict[str, Kind] = {
     "pointing": Kind("an axis of a frame toward a point", (Pointing,)),
     "plane_distance": Kind("a frame's distance from a plane", (PlaneDistance,)),
 }
-"""Every kind; the words are those of Pink and Mink where these mean the same (frame, com, relative frame,
-posture, damping)."""
+"""All kinds of tasks; the names are those of Pink and Mink where the meaning is the same (frame, com,
+relative frame, posture, damping)."""
 
 
 OWN = "own"
-"""Instead of a word, for kinds that somebody else made."""
+"""Name of the kind of tasks that are not built in."""
 
 
 def word_of(task: Task) -> str:

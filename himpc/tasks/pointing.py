@@ -22,7 +22,8 @@ DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 AHEAD = 0.5
 """m from the frame's origin at which a target starts, on the axis."""
 _NEAREST = 0.02
-"""m: a point nearer than this is taken to be this far; the direction to it could turn arbitrarily fast."""
+"""m: smallest distance that is used for a nearer point; the direction to it could otherwise turn arbitrarily
+fast."""
 _ASIDE = 1e-2
 """Sine of the angle to the opposite direction below which ‖J‖ grows no further (0.6°)."""
 _STRAIGHT = 1e-9

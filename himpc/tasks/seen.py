@@ -8,7 +8,7 @@ from himpc.references.preview import Preview
 from himpc.tasks.task import Array
 
 NUDGE = 1e-4
-"""s, of the motion to both sides along which G is seen to change."""
+"""s: time step to both sides for the central difference of G along the motion."""
 
 
 def rests(preview: Preview) -> bool:

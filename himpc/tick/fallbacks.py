@@ -21,12 +21,12 @@ from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.printed import printed_problem
 
 _SMALL = 40
-"""Unknowns up to which the printed QP is asked where the kernel gives up."""
+"""Largest number of unknowns for which the printed QP is solved after the kernel has failed."""
 _ITERATIONS = 100
-"""What DAQP may take then, at each of at most two attempts: together a matter of milliseconds."""
+"""Largest number of iterations of DAQP in each of at most two attempts, which take milliseconds together."""
 
 _LEAK = 1e-7
-"""m/s²: what a point may move levels above by."""
+"""m/s²: largest change of the levels above by a point."""
 
 
 @dataclass

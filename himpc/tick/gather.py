@@ -12,7 +12,8 @@ from himpc.tick.configure import Span, is_built_in
 from himpc.tick.kernel.arena import AT, Arena, Whole
 
 _LIMITS = ("tau_lower", "tau_upper", "v_limit", "", "", "", "q_lower", "q_upper")
-"""Fields that the rows of `limits` are; stops and decelerations are none."""
+"""Telemetry fields of the rows of `limits`; an empty name means that the row (stops, decelerations) has no
+field."""
 
 
 def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> Whole | None:

@@ -24,7 +24,7 @@ MEMORY = 1_000_000_000  # bytes of address space
 _T = TypeVar("_T")
 _PARENT_DIES = 1  # PR_SET_PDEATHSIG of Linux
 PATIENCE = 10.0
-"""Most wall time of isolated work, in units of what it is allowed."""
+"""Largest wall time of isolated work, as a multiple of its time limit."""
 
 
 @dataclass(frozen=True)

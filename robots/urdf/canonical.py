@@ -22,7 +22,8 @@ from robots.urdf.read import Refusal, parse, without_shapes
 from robots.urdf.structure import check_structure, movable_joints
 
 MAX_JOINTS = 20
-"""Moving joints a controller can serve every millisecond: a tick takes 0.4 ms then, with three levels."""
+"""Largest number of moving joints: a tick with three levels then takes 0.4 ms, and the control period is 1
+ms."""
 MAX_FINDINGS = 200
 
 

@@ -17,7 +17,7 @@ from robots.report import Finding
 MAX_BYTES = 10_000_000
 _LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: sums of inertias lose all digits for larger numbers
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-"""What the readers of URDF in C++ take for a number; Python takes more."""
+"""The format of numbers that C++ readers of URDF accept; Python accepts more."""
 _XACRO_HINT = "; is this a xacro file? Run `xacro FILE > robot.urdf` first"
 
 

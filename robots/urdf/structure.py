@@ -15,12 +15,12 @@ from robots.urdf.read import end_of, label, named
 MAX_LINKS = 1_000
 MAX_SHAPES = 5_000
 MAX_DEPTH = 200
-"""Joints one after the other: readers of URDF descend by recursion."""
+"""Largest number of joints in a chain: readers of URDF descend by recursion."""
 MAX_NAME = 100
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
 _GUESSES = 5
-"""Findings that come with a suggestion: the first tell how the rest is meant."""
+"""Number of findings with a suggested name: the first ones show how to correct the others."""
 
 
 def check_structure(root: Element, source: str) -> Iterator[Finding]:
