@@ -101,7 +101,7 @@ def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
 
 
 def barrier_value(rows: ConstraintRows, u: Array) -> float:
-    """The value of `barrier` alone."""
+    """Returns only the value of `barrier`."""
     value = rows.A @ u
     h = np.concatenate([rows.upper - value, value - rows.lower])
     h = h[np.isfinite(h)]

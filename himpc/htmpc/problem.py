@@ -129,13 +129,13 @@ class Iterate:
 
     @cached_property
     def near(self) -> Clearances | None:
-        """Distances with gradients; None if there is nothing to avoid."""
+        """Distances with gradients; None without obstacles."""
         avoidance = self.tick.avoidance
         return avoidance.near(self.knots.joints) if avoidance is not None else None
 
     @cached_property
     def distances(self) -> Clearances | None:
-        """Distances, with gradients only if they are known already; None if there is nothing to avoid."""
+        """Distances; gradients only if they are known already. None without obstacles."""
         avoidance = self.tick.avoidance
         if avoidance is None or "near" in self.__dict__:
             return self.near
@@ -178,7 +178,7 @@ class Problem:
 
     @property
     def corrects(self) -> bool:
-        """Whether a step that (13) refuses may be bent back before it is shortened: not in the paper."""
+        """Whether a step that (13) refuses gets a second-order correction first (not in the paper)."""
         return bool(self.guards) and not self.softened
 
     def merit(self, at: Iterate) -> float:

@@ -36,7 +36,7 @@ class ConstraintRows(NamedTuple):
     part: NDArray[np.int64]
 
     def take(self, chosen: NDArray[np.bool_]) -> ConstraintRows:
-        """The chosen rows."""
+        """Returns the chosen rows."""
         A, lower, upper, kind, knot, part = self
         return ConstraintRows(
             A[chosen], lower[chosen], upper[chosen], kind[chosen], knot[chosen], part[chosen]
@@ -80,11 +80,12 @@ class ConstraintTable:
             )
 
     def absolute(self, count: int) -> ConstraintRows:
-        """The first rows, on u: views."""
+        """Returns the first rows, on u, as views."""
         return ConstraintRows(self.A[:count], *self.bounds[:, :count], *self.labels[:, :count])
 
     def changes(self, first: int, end: int) -> ConstraintRows:
-        """Rows on d from one place to another: views, but for the labels."""
+        """Returns the rows on d from index `first` to index `end`: views, except the labels, which are
+        copied."""
         return ConstraintRows(self.A[first:end], *self.room[:, first:end], *self.labels[:, first:end].copy())
 
     def about(self, u: Array, count: int) -> None:
@@ -132,8 +133,8 @@ def limit_rows(
 def held(
     rows: ConstraintRows, brake: Array, joints: NDArray[np.int64], table: ConstraintTable
 ) -> ConstraintRows:
-    """Rows that keep some joints on their way to rest: their inputs are those of `brake` (N, n). They take
-    the place of the given ones at the beginning of the table."""
+    """Writes rows that bring some joints to rest with the inputs of `brake` (N, n). These rows replace the
+    given ones at the beginning of the table."""
     N, n = brake.shape
     chosen = (np.arange(N)[:, None] * n + joints).ravel()
     value = brake.ravel()[chosen]

@@ -46,7 +46,7 @@ def commandable(v: Array, last: Array | None, bounds: MotionBounds) -> Array:
     """Returns the measured velocity (n,), clipped to the velocities that may be commanded.
 
     The commands of a plan begin at this velocity: a robot that was pushed beyond its limit must not receive
-        that velocity as a command.
+    that velocity as a command.
 
     Args:
         v: measured, (n,).

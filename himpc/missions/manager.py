@@ -131,7 +131,7 @@ def _completed(first: Active, released: frozenset[str], t: float) -> bool:
 
 
 def release(progress: Progress, name: str) -> Progress:
-    """Ends the hold of a task; one that is not at its goal yet will not wait there.
+    """Ends the hold of a task; a task that has not reached its goal yet will not wait there.
 
     Raises:
         InputError: no such task, or it does not wait for a release.

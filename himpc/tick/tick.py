@@ -38,11 +38,11 @@ class CompiledTick:
         robot: gives the geometry.
         settings: as for the controller.
         form: the levels that are solved.
-        off: tasks of the levels that are not; their errors are measured.
+        off: tasks of the levels that are not solved; only their errors are computed.
         levels: what each level is to the kernel; none are solved if there are none.
         tolerance: N·m; all levels are solved again, along their own prediction, until no increment changes by
             more, see `NHIMPC`.
-        most: how often they are solved.
+        most: largest number of these iterations.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class CompiledTick:
         if memory.x_dot is not None and memory.form is self._form:
             f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
         if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
-            f["path"][:] = memory.predicted_q  # what goes on as it was does so to the last bit
+            f["path"][:] = memory.predicted_q  # an unchanged memory continues bitwise unchanged
         else:
             f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
         for place, level in enumerate(self._form.levels if self._levels else ()):
@@ -92,7 +92,7 @@ class CompiledTick:
         self._started = True
 
     def forget(self) -> None:
-        """Forgets what it remembers."""
+        """Clears the memory."""
         self._started = self._looked = False
 
     @property
@@ -115,7 +115,7 @@ class CompiledTick:
         )
 
     def fade(self, place: int, share: float | Array) -> None:
-        """Lets `share` of a level's √Q count, one number or one per row."""
+        """Multiplies a level's √Q by `share`, one number or one per row."""
         if not np.array_equal(share, self._shares[place]):
             level = self._form.levels[place]
             self._shares[place] = share
@@ -180,7 +180,7 @@ class CompiledTick:
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
             if not budget.spared or any(fallback != "solve" for fallback, _ in fallbacks):
-                break  # what is no optimum leads to none by being solved again; what is hard takes its time
+                break  # a repeat needs optima at all levels and budget left
         if self._most > 1:
             finish_tick(*arena.arguments, True)
         return self._plan(fallbacks, tau_0, limits, iterations, started)
@@ -214,11 +214,11 @@ class CompiledTick:
                 preview = previews[task.name]
                 if preview is not read:
                     write_preview(self.arena, place, span, self._given.at_first(task, preview), self._reach)
-                # A target at rest shows it again; of others nobody knows whether it has changed.
+                # A target at rest gives the same preview again; other previews may have changed.
                 self._read[place] = preview if target else None
 
     def _shows(self, place: int, span: slice, target: Target, t: float) -> bool:
-        """Whether a target on its way has put its motion where the kernel reads it."""
+        """Whether a moving target has written its motion to the arrays that the kernel reads."""
         f = self.arena.f
         x_d = target.show(t, self._settings.T_s, f["motion"][:, :, span])
         if x_d is None:
