@@ -1,4 +1,4 @@
-"""Constants that the compiled tick and the printed route share."""
+"""Numbers that the compiled tick shares with the equations as printed."""
 
 RANK_TOLERANCE = 1e-10
 """Directions that a level feels by less than this share of ‖B‖ are left to lower levels."""
