@@ -1,4 +1,4 @@
-"""What the page and its simulation process say to each other. Everything here is frozen and picklable."""
+"""The messages between the page and its simulation process. All are frozen and picklable."""
 
 from __future__ import annotations
 
@@ -32,41 +32,41 @@ class Post:
 
 @dataclass(frozen=True)
 class Play:
-    """Run or pause."""
+    """Run (True) or pause."""
 
     running: bool
 
 
 @dataclass(frozen=True)
 class StepTicks:
-    """Pause, then run so many ticks."""
+    """Pause, then run this number of ticks."""
 
     ticks: int = 1
 
 
 @dataclass(frozen=True)
 class Speed:
-    """Simulated seconds per second that are asked for."""
+    """The requested speed: simulated seconds per second."""
 
     factor: float
 
 
 @dataclass(frozen=True)
 class ResetAll:
-    """The scene as it was first loaded, settings included."""
+    """Reset the scene to the state in which it was first loaded, settings included."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """Another scene or robot."""
+    """Load another scene or robot."""
 
     choice: SceneChoice
 
 
 @dataclass(frozen=True)
 class Lead:
-    """Whether a ghost, another process, follows this one. On: the scene is reset, so that both begin
-    together, and `Script` reports tell what happens from there on."""
+    """Whether a ghost (another process) follows this one. When it is switched on, the scene is reset so that
+    both begin together, and `Script` reports describe what happens from then on."""
 
     on: bool
 
@@ -80,7 +80,7 @@ class WaitAt:
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """Where a ghost begins: the leader's scene, and its settings at its last reset."""
+    """The start of a ghost: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
     settings: SceneSettings
@@ -88,8 +88,8 @@ class Begin:
 
 @dataclass(frozen=True, eq=False)
 class FollowLeader:
-    """What a ghost hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
-    they count where the script begins anew."""
+    """A message of the leader to its ghost. own: assignments "PATH=VALUE" on top of the leader's settings;
+    they take effect when the script begins again."""
 
     script: Script
     own: tuple[str, ...]
@@ -97,7 +97,7 @@ class FollowLeader:
 
 @dataclass(frozen=True)
 class Tell:
-    """Tell what the run was; the answer is `Told`."""
+    """Request a description of the run; the answer is `Told`."""
 
 
 @dataclass(frozen=True)
@@ -217,19 +217,19 @@ class Status:
 
 @dataclass(frozen=True)
 class Loading:
-    """The command to load a scene was heard: the next word may take a while."""
+    """The simulation has received the command to load a scene; its next report may take a while."""
 
 
 @dataclass(frozen=True)
 class LoadRefused:
-    """A scene or robot could not be loaded; the one before goes on."""
+    """A scene or robot could not be loaded; the previous scene continues."""
 
     sentence: str
 
 
 @dataclass(frozen=True)
 class SimulationFailed:
-    """The simulation stopped with an exception; `died`: its process ended without a word of its own."""
+    """The simulation stopped with an exception; `died`: its process ended without sending a report."""
 
     sentence: str
     died: bool = False
@@ -250,7 +250,7 @@ class Script:
 
 @dataclass(frozen=True)
 class Reached:
-    """The time a ghost has come to, s."""
+    """The time that a ghost has reached, s."""
 
     t: float
 

@@ -1,4 +1,4 @@
-"""What the page must know about a mission to show it."""
+"""The data of a mission that the page shows."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Person:
 
 @dataclass(frozen=True, eq=False)
 class MissionView:
-    """How far a mission is. paths: per role the predicted path, (N + 1, 3) m."""
+    """The state of a mission. paths: predicted path per role, (N + 1, 3) m."""
 
     rows: tuple[MissionRow, ...]
     done: bool

@@ -1,4 +1,4 @@
-"""What a page is told of a controller of its learner's own."""
+"""What a page is told about a controller from the learner's own file."""
 
 from __future__ import annotations
 
