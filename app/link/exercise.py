@@ -22,8 +22,8 @@ Answer = int | float | tuple[tuple[float, float], ...]
 """A prediction: the index of an option, a value, or the points (t in s, value) of a sketch."""
 
 Phase = Literal["waiting", "preparing", "running", "done"]
-""""waiting": before the run; "preparing": the ghost is being computed; "running": the script runs; "done":
-the run has ended and the robot can be moved freely."""
+"""Before the run ("waiting"); while the ghost is computed ("preparing"); while the script runs; after the run
+("done"), when the robot can be moved freely."""
 
 
 @dataclass(frozen=True)
