@@ -42,10 +42,10 @@ class Door:
     """The access rules of a server.
 
     Attributes:
-    local: whether only this machine can connect.
-    trusted: origins beside our own, as a browser writes them: a reverse proxy's.
-    passes: what a visitor must bring, in the URL or in the cookie.
-    names: what this machine is called by others.
+        local: whether only this machine can connect.
+        trusted: further allowed origins, as browsers write them, e.g. a reverse proxy's.
+        passes: the secrets that a visitor must send in the URL or in the cookie.
+        names: the names under which other machines know this one.
     """
 
     local: bool = True
