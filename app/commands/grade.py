@@ -34,7 +34,8 @@ def grade(
     The name of an exercise instead of a file shows this exercise, with --hints N also its first N hints.
 
     Every file runs in a process of its own for at most a minute. A folder of submissions gives one table. If
-    the command was stopped, the same command continues it. Exit code 0: all points; 1: some are missing; 2: it cannot be run.
+    the command was stopped, the same command continues it. Exit code 0: all points; 1: some are missing; 2:
+    it cannot be run.
 
     Args:
         file: Python file with the solution, or a folder of them; or the name of an exercise; or a text of

@@ -28,8 +28,8 @@ def sweep(
 ) -> int:
     """Run a grid of settings of a scene on all cores and draw it as a map.
 
-    Ctrl-C stops the sweep, and the same command continues it. Runs that fail or lose control are marked in the
-    map.
+    Ctrl-C stops the sweep, and the same command continues it. Runs that fail or lose control are marked
+    in the map.
 
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file of your own.
