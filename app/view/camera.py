@@ -16,7 +16,7 @@ _NARROW = 0.75
 _SLIM = 0.2
 """Smallest ratio of width to height that is used: with a smaller one the camera would be too far away."""
 _ASIDE = np.array([1.0, 0.75, 0.55])
-"""Default viewing direction."""
+"""Default direction from the points to the camera."""
 _THICK = 0.07
 """Distance that links extend around their joints, as a share of the robot's size."""
 _SHEET = 0.6

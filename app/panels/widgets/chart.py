@@ -55,7 +55,7 @@ class ChartLine:
 
 
 def of_ghost(lines: Sequence[ChartLine], ghost: bool) -> list[ChartLine]:
-    """The lines together with the lines of the ghost, if there is one."""
+    """The lines of the ghost; empty if there is no ghost."""
     return [line.of_ghost() for line in lines] if ghost else []
 
 
