@@ -23,7 +23,7 @@ COMMANDS: dict[str, str] = {
     "new": "write a controller, scene, lesson or task of your own to begin with",
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",
-    "sweep": "a grid of runs over settings, as a map; stopped, it carries on",
+    "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
 """One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`."""

@@ -2,13 +2,12 @@
 
     python -m benchmarks.switches [--clients K] [--minutes M] [--every S] [--speed X] [--seed N]
 
-Starts the real server, and in a process of their own K clients that draw nothing (benchmarks/client.py).
-Every S seconds each learner opens another scene, starts a ghost or ends it, as a random number says;
-simulations go at X times real time, so that a small machine has time for all of them. Memory is looked at
-every five seconds, as it is: nothing is collected or given back for that. Prints a line of JSON for every
-five minutes (of a shorter run for every sixth part): the median and the most of the server's memory in that
-time, MB. At the end everybody goes back to the first scene, and what the server holds is compared with what
-it held after a warm-up.
+Starts the real server and, in a process of their own, K clients that draw nothing (benchmarks/client.py).
+Every S seconds each learner opens another scene, starts a ghost or ends it, at random. The simulations run at
+X times real time, so that a small machine can run all of them. Memory is measured every five seconds, without
+garbage collection before it. Prints a line of JSON for every five minutes (in a shorter run for every sixth
+part): the median and the maximum of the server's memory in that time, MB. At the end all learners return to
+the first scene, and the server's memory is compared with that after the warm-up.
 
 Exit code 0 if memory was never more than BASE + K · EACH, nothing was left behind, and memory in the last
 third of the time was at most 10 % more than in the first. Thirds are compared if each is at least five
