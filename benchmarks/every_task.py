@@ -39,9 +39,9 @@ SETTLED = {"m": 1e-3, "rad": np.deg2rad(0.1)}
 
 @dataclass(frozen=True)
 class Found:
-    """How far a task is off: the largest coordinate, over the tasks of its kind, as a share of what `SETTLED`
-    says for its unit, which is m for prismatic joints. moved: how far the drag was, likewise. calm: largest
-    |v| over its limit at the end."""
+    """The error of a task: its largest coordinate over the tasks of its kind, divided by `SETTLED` of its
+    unit, which is m for prismatic joints. moved: the distance of the drag, in the same units. calm:
+    largest ratio of |v| to its limit at the end."""
 
     robot: str
     kind: str

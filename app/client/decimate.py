@@ -16,7 +16,7 @@ def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray
 
     Args:
         curves: (k, m), finite.
-        tolerance: how far a curve may then be from what it was, in the curves' unit.
+        tolerance: largest deviation from the original curve, in the curves' unit.
         phase: number of the first point.
 
     Returns:

@@ -25,14 +25,15 @@ class SceneChoice:
     """A run, with the data that only a page needs.
 
     Attributes:
-        run: scene, robot, settings and seed; of a lesson its step's, script included, and no scene yet while
-            its file is not read. A controller is named by an assignment, so that only `files` are opened.
+        run: scene, robot, settings and seed; for a lesson those of the step, with its script; without a scene
+            until the lesson's file is read. A controller is named by an assignment, so that only `files` are
+            opened.
         urdf_text: an uploaded robot, instead of the run's.
-        exercise: the step of a lesson that it is.
-        mine: what the learner had changed of that step, as assignments; made anew once when it is loaded.
-        scenes: Python files that may be the scene. These and the run's `files` and `tasks` are what whoever
-            started the program named: no others are run.
-        within: the folder below which the URDF and its meshes have to lie, if the URDF was named on the page.
+        exercise: the step of a lesson, if the choice is one.
+        mine: the learner's changes to that step, as assignments; applied once when it is loaded.
+        scenes: Python files that may be the scene. Only these and the run's `files` and `tasks` are ever
+            run: the person who started the program named them.
+        within: the folder that must contain the URDF and its meshes, if the URDF was named on the page.
     """
 
     run: RunSpec

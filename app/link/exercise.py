@@ -113,19 +113,20 @@ class SignalCurve:
 
 @dataclass(frozen=True, eq=False)
 class Lecture:
-    """How far an exercise is.
+    """The state of an exercise.
 
     Attributes:
-        exercise: which.
+        exercise: the exercise.
         phase: see `Phase`.
         attempt: counts runs since the exercise was opened.
-        t: s, how much of the run is judged; duration: s, how long it is.
+        t: time up to which the run is judged, s; duration: length of the run, s.
         answer: the learner's prediction.
-        changed: one sentence if the run is not the lesson's own: settings differ, or a hand interfered.
+        changed: one sentence if the run is not the lesson's own: settings differ, or the learner
+            interfered.
         values: measured, per claim or goal; NaN while there is nothing to measure.
         holds: whether each claim or goal holds so far; None while there is nothing to measure.
-        truth: what the prediction is about, as measured.
-        grade: how the prediction did, after the run.
+        truth: the measured value of the predicted quantity.
+        grade: the grade of the prediction, after the run.
         curves: per signal of the step; ghosts: the same of the second robot, where it was computed.
         sketched: what a sketch is about.
         result, points_for: of a challenge, after the run: the result and the number that gives its points.

@@ -128,12 +128,12 @@ Command = (
 
 @dataclass(frozen=True, eq=False)
 class TaskView:
-    """What the page must know about a task to draw it.
+    """The data of a task that the page needs to draw it.
 
-    kind: the word of himpc.tasks.KINDS; frame: a link's name (tasks on frames only); axes: the axes under
-    control; raw: where the hand put a draggable target, None for other references; path: (k, 3) closed curve
-    in space that a position goes round, m; speed_cap: of the filtered target, m/s or rad/s; root: the link
-    that sees the frame, of relative tasks; normal, offset: of the plane, for a distance to one.
+    kind: a key of himpc.tasks.KINDS; frame: name of a link (tasks on frames only); axes: the controlled
+    axes; raw: the raw value of a draggable target, None for other references; path: (k, 3) closed curve of
+    a position reference, m; speed_cap: speed limit of the filtered target, m/s or rad/s; root: the link to
+    which the frame of a relative task is relative; normal, offset: the plane of a distance task.
     """
 
     name: str
@@ -153,8 +153,8 @@ class TaskView:
 @dataclass(frozen=True, eq=False)
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
-    besides the robot; again: it is the same run as before, under another stack; left_out: why tasks of one's
-    own are not offered, a sentence each."""
+    besides the robot; again: the same run continues with another stack; left_out: a sentence for each of
+    the user's own tasks that is not offered."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -237,10 +237,10 @@ class SimulationFailed:
 
 @dataclass(frozen=True, eq=False)
 class Script:
-    """What a leader's ghost must hear.
+    """Data that a leader sends to its ghost.
 
-    events: what the leader's log gained; t: the time the leader has come to, s; begin: begin anew from there
-    before taking the events.
+    events: new events in the leader's log; t: the time that the leader has reached, s; begin: if given,
+    the ghost starts again from there before it applies the events.
     """
 
     events: tuple[tuple[float, Event], ...]
@@ -257,7 +257,7 @@ class Reached:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What a run was, so that it can be repeated.
+    """A description of a run with which it can be repeated.
 
     choice: the scene, as it was loaded; settings: in force now; log: (time, event) of every event that took
     effect since it was loaded; t: s since the last reset.

@@ -10,9 +10,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class MissionRow:
-    """A task of a mission. goal: m, or x y z w of an orientation; None for a given trajectory; hold: s at the
-    goal, None: until released; there_s: for how long it has been at its goal; done_at: s, when it was
-    completed."""
+    """A task of a mission. goal: m, or x y z w of an orientation; None for a given trajectory; hold: time
+    to stay at the goal, s, None: until released; there_s: time at the goal so far, s; done_at: time of its
+    completion, s."""
 
     name: str
     role: str
@@ -26,7 +26,8 @@ class MissionRow:
 
 @dataclass(frozen=True)
 class Person:
-    """hand: m, where a ball is handed over; place: m on the floor; balls: how many were received."""
+    """hand: point at which a ball is handed over, m; place: position on the floor, m; balls: number of
+    balls received."""
 
     hand: tuple[float, float, float]
     place: tuple[float, float]

@@ -1,7 +1,7 @@
 """Shared memory between the simulation (one writer) and the page (readers): telemetry rows and poses.
 
-Nothing is pickled and nobody waits: the writer fills a row, then raises the count; readers look only at
-rows behind the count and not so old that they might be overwritten meanwhile.
+Data are not pickled, and no process waits: the writer fills a row, then increments the count; readers read
+only rows below the count that are recent enough not to be overwritten meanwhile.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ class Spares:
         """
         Args:
             worker: the module that a child runs, see `ForkServer`.
-            lent: a fork server of that worker that others use, too. Who made it ends it.
+            lent: a fork server of that worker that is shared with others; its creator ends it.
         """
         self._worker = worker
         self._lent = lent

@@ -25,14 +25,14 @@ def new_token() -> str:
 
 @dataclass(frozen=True)
 class Passes:
-    """Of one server, from its start to its end.
+    """The secrets of one server; they are valid until it ends.
 
     Attributes:
-        token: lets in; None: nobody needs one.
-        owner: lets in, too, and proves that who brings it started the server; None: nobody can prove it.
-        cookie: the cookie's name. Cookies of one host are sent to all its ports, so each server has a name of
-            its own for it.
-        key: what cookies are made with. They do not contain what is in the address.
+        token: admits a visitor; None: no token is needed.
+        owner: admits a visitor as the person who started the server; None: no page has this role.
+        cookie: the cookie's name. Browsers send cookies to all ports of a host, so each server uses
+            another name.
+        key: the key from which cookies are derived. They do not contain the secrets of the address.
     """
 
     token: str | None = field(default=None, repr=False)

@@ -51,10 +51,10 @@ def serve(
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
 
-    With `classroom` all pages show one session; who types the printed token into the page steers it.
-    The page asks for a token unless `ask_token` is False. Files below `own_files` are opened by path, and
-    run, from the page whose address carries the owner's secret; with None from no page.
-    `key` signs what learners hand in.
+    With `classroom` all pages show one session, and pages on which the printed token was typed control it.
+    The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
+    secret may open and run files below `own_files` by path; with None no page may. `key` signs the
+    learners' progress.
     """
     server = PageServer(
         choice,

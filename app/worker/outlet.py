@@ -14,10 +14,10 @@ class Outlet:
 
     Attributes:
         block: the shared memory.
-        poses: what computes the poses that go there.
+        poses: computes the poses that are written there.
         layout: of the rows.
         step_us, late: columns; None if there is none.
-        told: whether the page knows of it.
+        told: whether the page was told about this memory.
     """
 
     def __init__(self, session: Session, told: bool = True) -> None:
