@@ -23,19 +23,19 @@ COMMANDS: dict[str, str] = {
     "new": "write a controller, scene, lesson or task of your own to begin with",
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",
-    "sweep": "a grid of runs over settings, as a map; stopped, it carries on",
+    "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
-"""What there is, in one line each; `app/commands/NAME.py` holds `NAME(…) -> exit code`."""
+"""One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one command and returns its exit code: 0 sound, 1 a claim failed, 2 wrong input."""
+    """Run one command and return its exit code: 0 success, 1 a claim failed, 2 wrong input."""
     with interruptible() as interrupted:
         try:
             return _run(list(sys.argv[1:] if argv is None else argv))
         except BrokenPipeError:
-            # The reader of our output has gone (e.g. `| head`): nothing is left to say.
+            # The reader of our output has closed the pipe (e.g. `| head`), so that no message can be shown.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except BaseException:
@@ -64,7 +64,7 @@ def _call(name: str, arguments: list[str]) -> int:
 
     command: Callable[..., int] = getattr(import_module(f"app.commands.{name}"), name)
     prog = "himpc-lab" if name == "serve" else f"himpc-lab {name}"
-    # No flag has a twin that takes it back: of --no-browser that would be --no-no-browser.
+    # Flags have no negative form: the one of --no-browser would be --no-no-browser.
     return tyro.cli(command, prog=prog, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
 
 

@@ -1,1 +1,1 @@
-"""What is measured rather than tested: `python -m benchmarks.NAME` in a checkout."""
+"""Measurements, as opposed to tests: run `python -m benchmarks.NAME` in a checkout."""

@@ -1,14 +1,14 @@
-"""Both routes where many bounds are active: long horizons, low velocity and torque limits, dragged targets.
+"""Both routes with many active bounds: long horizons, low velocity and torque limits, dragged targets.
 
     python -m benchmarks.bounds [--quick] [--seconds 0.3] [--scenes NAME …] [--horizons N …]
                                 [--velocity SCALE …] [--torque SCALE …] [--still | --dragged] [--alone]
 
-Runs every torque scene with every horizon and every scale of its velocity and torque limits, once as it is
-and, where it has a target, once with the target put elsewhere every 50 ms. Prints a line of a Markdown table
-for each: how many of the QPs had no verified optimum, how fast the fastest joint was as a share of its limit,
-the longest step's processor time, and the most of its budget that a tick of the compiled route used.
---quick takes the hardest few; --alone leaves out the explicit route. Exit code 1 if the compiled route leaves
-more unsolved than the explicit one, a joint is more than 2 % faster, or a step takes more than 20 ms.
+Runs every torque scene with every horizon and every scale of its velocity and torque limits: once unchanged
+and, if it has a target, once with a target that jumps every 50 ms. Prints a line of a Markdown table for
+each: how many QPs had no verified optimum, the largest joint velocity as a share of its limit, the processor
+time of the longest step, and the largest share of its budget that a tick of the compiled route used. --quick
+runs only the hardest few; --alone leaves out the explicit route. Exit code 1 if the compiled route leaves
+more QPs unsolved than the explicit one, a joint is more than 2 % faster, or a step takes more than 20 ms.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from lessons.session.torque import TorqueSession
 HORIZONS, VELOCITY, TORQUE = (1, 5, 10, 20, 30), (1.0, 0.3, 0.2, 0.1), (1.0, 0.5)
 LONGEST_MS = 20.0
 _EVERY = 50
-"""Ticks between two places of a target that is dragged."""
+"""Ticks between two jumps of a dragged target."""
 
 
 class Cell(NamedTuple):
@@ -47,7 +47,7 @@ class Cell(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a route did there.
+    """The results of one route.
 
     Attributes:
         unsolved, of: QPs without a verified optimum, and all QPs.
@@ -73,7 +73,7 @@ QUICK = (
 
 
 def run(cell: Cell, route: Route, ticks: int) -> Found:
-    """One run."""
+    """Runs one cell with one route."""
     scene = torque_scene(cell.scene)
     limits = replace(scene.settings.limits, velocity_scale=cell.velocity, torque_scale=cell.torque)
     session = TorqueSession(
@@ -84,7 +84,7 @@ def run(cell: Cell, route: Route, ticks: int) -> Found:
     unsolved, of, speed, longest, spent = 0, 0, 0.0, 0.0, 0.0
     kernel = getattr(session.controller, "kernel", None)
     gc.collect()
-    gc.freeze()  # what the collector finds is no part of a tick
+    gc.freeze()  # garbage collection is not part of a tick
     for tick in range(ticks):
         target = session.target(name) if name and cell.dragged else None
         if name and target is not None and tick % _EVERY == 0:
@@ -107,7 +107,7 @@ def run(cell: Cell, route: Route, ticks: int) -> Found:
 
 
 def target_of(session: TorqueSession) -> str | None:
-    """The first position target that can be put elsewhere."""
+    """The first position target that can be moved."""
     for name in session.references:
         target = session.target(name)
         if target is not None and target.raw.ndim == 1:
@@ -116,7 +116,7 @@ def target_of(session: TorqueSession) -> str | None:
 
 
 def cells(given: argparse.Namespace) -> Iterator[Cell]:
-    """Those that were asked for."""
+    """The cells that the command line asks for."""
     if given.quick:
         yield from QUICK
         return
@@ -131,7 +131,7 @@ def cells(given: argparse.Namespace) -> Iterator[Cell]:
 
 
 def faults(found: Found, reference: Found | None) -> list[str]:
-    """What the compiled route must not do."""
+    """Sentences about limits that the compiled route exceeded."""
     said = ["slow"] if found.longest_ms > LONGEST_MS else []
     if reference is not None:
         said += ["unsolved"] if found.unsolved * reference.of > reference.unsolved * found.of else []
@@ -140,7 +140,7 @@ def faults(found: Found, reference: Found | None) -> list[str]:
 
 
 def main() -> int:
-    """Prints the table and how many cells are at fault."""
+    """Prints the table and the number of cells with faults."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--seconds", type=float, default=0.3)

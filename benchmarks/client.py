@@ -1,11 +1,12 @@
-"""Clients that speak the page's protocol and draw nothing: they receive and decode every message.
+"""Clients that use the page's protocol and draw nothing: they receive and decode every message.
 
     python -m benchmarks.client URL [--clients K] [--tab TAB] [--delay SECONDS]
 
-Each answers what the page waits for (camera, local storage) and says that it shows the plots of one tab.
-Prints a line of JSON every second and client: messages, megabytes, and how often the busiest plot and the
-busiest node of the scene were renewed. --delay: rests so long before each packet, as a slow line would. A
-number on stdin lets the first client reload its page so often, each time until it sees its robot, and say so.
+Each client answers the page's requests (camera, local storage) and reports that it shows the plots of one
+tab. Prints a line of JSON per second and client: messages, megabytes, and how often the busiest plot and the
+busiest node of the scene were updated. --delay: waits this long before each packet, as a slow line would. A
+number on stdin lets the first client reload its page that many times, each time until it sees its robot, and
+print a line.
 """
 
 from __future__ import annotations
@@ -31,13 +32,14 @@ from app.panels.widgets.in_view import ASLEEP, AWAKE, LABEL
 from browsing.wire import camera, messages_of, pack
 
 PATIENCE = 60.0
-"""s for a robot to appear."""
-_TAB = "Joints"  # the one with the most curves
+"""Time, s, within which a robot must appear."""
+_TAB = "Joints"  # the tab with the most curves
 
 
 @dataclass
 class Second:
-    """What came within a second. plots, links: how often each chart and each node of the scene changed."""
+    """What arrived within a second. plots, links: how often each chart and each node of the scene was
+    updated."""
 
     bytes: int = 0
     messages: int = 0
@@ -45,7 +47,7 @@ class Second:
     links: Counter[str] = field(default_factory=Counter)
 
     def rates(self, seconds: float) -> dict[str, float]:
-        """Per second."""
+        """The rates per second."""
         return {
             "megabytes_per_s": 1e-6 * self.bytes / seconds,
             "messages_hz": self.messages / seconds,
@@ -55,7 +57,7 @@ class Second:
 
 
 class Viewer:
-    """One browser. What it stores outlives its connections."""
+    """One browser. Its storage outlives its connections."""
 
     def __init__(self, url: str, tab: str | None = _TAB, delay: float = 0.0) -> None:
         self._url = url.replace("http", "ws", 1)
@@ -69,7 +71,7 @@ class Viewer:
         self._said = ""
 
     def connect(self, slow: bool = False) -> Connection:
-        """slow: a line that takes some kilobytes until they are read."""
+        """slow: emulates a slow line that reads some kilobytes at a time."""
         protocol: Any = [f"viser-v{__version__}"]
         line = socket()
         if slow:
@@ -77,7 +79,7 @@ class Viewer:
         address = urlsplit(self._url)
         line.connect((address.hostname, address.port))
         queue = 1 if slow or self._delay else 16
-        # A page sends no pings; ours would end it where the machine has no time to answer them.
+        # Pages send no pings; ours would close the connection on a machine that is too busy to answer them.
         connection = connect(
             self._url,
             sock=line,
@@ -91,14 +93,14 @@ class Viewer:
         return connection
 
     def watch(self, client: int, asked: SimpleQueue[int]) -> None:
-        """Stays connected until it is ended, and prints a line of JSON every second. asked: numbers of
-        reloads."""
+        """Stays connected until it is cancelled, and prints a line of JSON every second. asked: numbers of
+        reloads to make."""
         while self._watch(client, asked):
             came = sum(self.visit() for _ in range(asked.get()))
             _tell({"client": client, "came": came})
 
     def _watch(self, client: int, asked: SimpleQueue[int]) -> bool:
-        """Until it is asked to reload; False if the connection ends before."""
+        """Watches until a reload is requested; returns False if the connection ends before."""
         with self.connect() as page:
             began = time.monotonic()
             while asked.empty():
@@ -113,7 +115,7 @@ class Viewer:
         return True
 
     def visit(self) -> bool:
-        """Comes, waits until a robot moved or its plots did, and leaves."""
+        """Connects, waits until a robot moved or its plots were updated, and disconnects."""
         self.second = Second()
         end = time.monotonic() + PATIENCE
         with self.connect() as page:
@@ -124,7 +126,7 @@ class Viewer:
         return False
 
     def hear(self, page: Connection, timeout: float) -> None:
-        """Takes one packet, if there is one in time."""
+        """Receives one packet, if one arrives in time."""
         time.sleep(self._delay)
         try:
             raw = page.recv(timeout=timeout)
@@ -138,11 +140,11 @@ class Viewer:
 
     @property
     def drawn(self) -> set[str]:
-        """Titles of the charts that were renewed in the present `second`."""
+        """Titles of the charts that were updated in the present `second`."""
         return {self._charts[uuid] for uuid in self.second.plots if uuid in self._charts}
 
     def show(self, tab: str | None) -> None:
-        """The plots of another tab; None: the whole page goes behind other ones."""
+        """Shows the plots of another tab; None: puts the whole page into the background."""
         self._tab = tab
 
     def _forget(self) -> None:
@@ -166,7 +168,7 @@ class Viewer:
                 pass
 
     def _note(self, message: dict[str, Any]) -> None:
-        """Where charts are, and whom to tell which of them are seen."""
+        """Notes where charts are, and which control reports the visible ones."""
         props = message.get("props", {})
         if "container_uuid" in message:
             self._parents[message["uuid"]] = message["container_uuid"]
@@ -204,13 +206,13 @@ class Viewer:
 
 
 def _tell(line: dict[str, float]) -> None:
-    # In one piece: other clients write, too.
+    # Written in one call, since other clients print as well.
     sys.stdout.write(json.dumps(line) + "\n")
     sys.stdout.flush()
 
 
 def main() -> None:
-    """Watches as the command line says."""
+    """Runs clients as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("url")
     parser.add_argument("--clients", type=int, default=1)

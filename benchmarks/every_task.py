@@ -1,9 +1,9 @@
-"""Every kind of task on every robot of the catalog, in closed loop under two controllers: held, then dragged
-to where another posture has it, so that it can be reached.
+"""Every kind of task on every robot of the catalog, in closed loop under two controllers: the task is held,
+then dragged to the value that it has in another posture, so that it can be reached.
 
     python -m benchmarks.every_task [--seconds 3] [--json -]
 
-A row per robot and kind: how far it is off after it was held, and after it was dragged (mm or degrees).
+Prints a row per robot and kind: the error after holding and after dragging (mm or degrees).
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from robots.truth import joint_axis
 CONTROLLERS = ("himpc", "hqp")
 HELD_FOR = 0.1  # s
 SETTLED = {"m": 1e-3, "rad": np.deg2rad(0.1)}
-"""By unit of a coordinate: closer than this it has settled."""
+"""Per unit of a coordinate: errors below this count as settled."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """How far a task is off: the largest coordinate, over the tasks of its kind, as a share of what `SETTLED`
-    says for its unit, which is m for prismatic joints. moved: how far the drag was, likewise. calm: largest
-    |v| over its limit at the end."""
+    """The error of a task: its largest coordinate over the tasks of its kind, divided by `SETTLED` of its
+    unit, which is m for prismatic joints. moved: the distance of the drag, in the same units. calm:
+    largest ratio of |v| to its limit at the end."""
 
     robot: str
     kind: str
@@ -54,13 +54,13 @@ class Found:
 
 @cache
 def scene_of(robot: str) -> TorqueScene:
-    """The scene in which a robot of the catalog holds still."""
+    """The scene in which a robot of the catalog holds its posture."""
     own = f"{robot}-hold"
     return torque_scene(own) if own in SCENES else torque_scene("hold", robot)
 
 
 def entry(kind: str, scene: TorqueScene) -> dict[str, Any]:
-    """A task of a kind that the robot of a scene can do something about."""
+    """A task of the given kind that the robot of a scene can influence."""
     robot = scene.robot
     tasks = [task for level in scene.settings.levels for task in level.tasks]
     fields = {name for of in KINDS[kind].makes for name in of.__dataclass_fields__}
@@ -80,7 +80,7 @@ def entry(kind: str, scene: TorqueScene) -> dict[str, Any]:
 
 
 def measured(robot: str, kind: str, controller: str, seconds: float) -> Found:
-    """A run: held, then dragged for so many seconds."""
+    """Results of a run: the task is held, then dragged for some seconds."""
     scene = scene_of(robot)
     stack = [entry(kind, scene), {"task": "posture", "name": "rest"}]
     session = TorqueSession(prepared(scene, controller, [assignment("stack", stack)]))
@@ -111,7 +111,7 @@ def run(session: TorqueSession, seconds: float) -> None:
 
 
 def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
-    """The largest error in units of `SETTLED`; infinite once control is lost."""
+    """The largest error in units of `SETTLED`; infinite after control was lost."""
     plan = session.plan
     if plan is None or session.diverged_at is not None:
         return float("inf")
@@ -121,7 +121,7 @@ def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
 
 
 def settled_within(task: Task, robot: Robot) -> NDArray[np.float64]:
-    """`SETTLED` of each coordinate, (m,)."""
+    """The value of `SETTLED` for each coordinate, (m,)."""
     names, joints = task.coordinates(robot), {}
     if isinstance(task, (Joints, Posture, Damping)):
         joints = {name: joint_axis(robot.model, at)[0] for at, name in enumerate(robot.joint_names, start=1)}

@@ -1,10 +1,11 @@
-"""The optimum of every level of a hierarchy to far more digits than a double has: a judge of both routes.
+"""The optimum of every level of a hierarchy to far more digits than a double has: the reference for both
+routes.
 
-Nothing of `himpc` takes part but the problem's data. A set of rows that bind is guessed, and the optimality
-conditions of (32) or (34) under these rows, with (33) as printed, are linear: they are solved in doubles and
-corrected until what they miss by, evaluated in integers of several hundred bits, is nothing. Whether the
-guess was right is then plain to see: no other row is beyond its bound, and every multiplier presses the right
-way. The cost is strictly convex, so a point that meets the conditions is the optimum, whoever made the guess.
+Only the problem's data come from `himpc`. A set of active rows is guessed. Under these rows the optimality
+conditions of (32) or (34), with (33) as printed, are linear: they are solved in doubles, and corrected until
+their residuals, evaluated in integers of several hundred bits, vanish. The guess was right if no other row
+exceeds its bound and every multiplier has the right sign. The cost is strictly convex, so a point that
+satisfies the conditions is the optimum, whatever the guess was.
 """
 
 from __future__ import annotations
@@ -23,22 +24,23 @@ from himpc.limits.rows import Rows
 
 Array = NDArray[np.float64]
 Fixed = NDArray[Any]
-"""Integers of any length: numbers times 2^_BITS."""
+"""Integers of arbitrary length, which represent numbers times 2^_BITS."""
 
 _BITS = 300
 _RANK = 1e-10
-"""Directions that a level feels by less than this share of its rows are left to lower levels, as in himpc."""
+"""A direction whose effect on a level is below this share of its rows is left to lower levels, as in
+himpc."""
 _DEPENDENT = 1e-9
-"""A bound of which no larger share is left by rows that are held already depends on them."""
+"""A bound depends on the rows that are held if at most this share of it is independent of them."""
 _BEYOND = 1e-11
-"""N·m: what a row that depends on others may be beyond its bound, since the data are doubles."""
+"""N·m by which a dependent row may exceed its bound, since the data are doubles."""
 _CORRECTIONS = 60
 _CHANGES = 60
 
 
 @dataclass(frozen=True, eq=False)
 class Exact:
-    """A level's optimum.
+    """The optimum of a level.
 
     Attributes:
         U: (N, n) N·m, rounded.
@@ -52,24 +54,24 @@ class Exact:
 
 
 def fixed(x: Any) -> Fixed:
-    """Doubles as integers times 2^_BITS."""
+    """Converts doubles to integers times 2^_BITS."""
     return np.asarray(np.frompyfunc(lambda v: int(math.ldexp(v, _BITS)), 1, 1)(np.asarray(x, np.float64)))
 
 
 def rounded(x: Fixed) -> Array:
-    """And back."""
+    """Converts integers times 2^_BITS to doubles."""
     return np.asarray(np.frompyfunc(lambda v: v / (1 << _BITS), 1, 1)(x), np.float64)
 
 
 def times(a: Fixed, b: Fixed) -> Fixed:
-    """Matrix product."""
+    """The matrix product of two fixed-point arrays."""
     return (a @ b) >> _BITS
 
 
 def optimum(
     problem: LevelProblem, rows: Rows, above: Sequence[tuple[LevelProblem, Exact]], guess: ActiveRows
 ) -> Exact | None:
-    """The optimum of Problem i; None where the guess and `_CHANGES` others lead to none.
+    """The optimum of Problem i; None if the initial guess and `_CHANGES` changes of it do not lead to one.
 
     Args:
         problem: its data.
@@ -86,7 +88,7 @@ def optimum(
             return None
         U, held, pull = found
         wrong = np.where(held, -side * pull, 0.0)
-        side = np.where(held, side, 0.0)  # rows that depend on those held are met without being held
+        side = np.where(held, side, 0.0)  # rows that depend on those held are satisfied without being held
         if wrong.max(initial=0.0) > 1e-13 * np.abs(pull).max():
             side[np.unravel_index(wrong.argmax(), side.shape)] = 0.0
             continue
@@ -101,8 +103,8 @@ def optimum(
 
 
 class _Corrector:
-    """Solves v + Aᵀe + Cᵀλ = r₁, A v − e = r₂, C v = r₃ in doubles, by QR factorisations: neither A nor C is
-    squared."""
+    """Solves v + Aᵀe + Cᵀλ = r₁, A v − e = r₂, C v = r₃ in doubles by QR factorisations, without squaring A
+    or C."""
 
     def __init__(self, A: Array, C: Array) -> None:
         self._A, self._count = A, len(C)
@@ -111,7 +113,7 @@ class _Corrector:
         self._F = np.linalg.qr(np.vstack([A @ self._free, np.eye(self._free.shape[1])]), mode="r")
 
     def solve(self, right: Array) -> Array:
-        """(v, e, λ) for (r₁, r₂, r₃)."""
+        """The solution (v, e, λ) for the right-hand sides (r₁, r₂, r₃)."""
         d, k = self._A.shape[1], len(self._A)
         r1, r2, r3 = right[:d], right[d : d + k], right[d + k :]
         v = self._held @ solve_triangular(self._R, r3, trans=1) if self._count else np.zeros(d)
@@ -124,7 +126,7 @@ class _Corrector:
 
 
 class _System:
-    """The linear conditions of one level."""
+    """The linear optimality conditions of one level."""
 
     def __init__(
         self, problem: LevelProblem, rows: Rows, above: Sequence[tuple[LevelProblem, Exact]]
@@ -149,7 +151,7 @@ class _System:
         self._L = rows.L
 
     def _kept_at(self, knot: int, above: list[Array]) -> Array:
-        """Independent rows of (33) at a knot, as printed."""
+        """The independent rows of (33) at a knot, as printed."""
         chosen = np.empty((0, self._n))
         basis = np.empty((self._n, 0))
         for B in above:
@@ -197,7 +199,7 @@ class _System:
             U[:K] += fixed(change[:d].reshape(K, n))
             e += fixed(change[d : d + k].reshape(e.shape))
             pull += fixed(change[d + k :])
-            # A unit in the last place of the result, with many digits to spare.
+            # One unit in the last place of the result, with many spare digits.
             if np.abs(change[:d]).max() < 1e-30 * (1.0 + np.abs(rounded(U)).max()):
                 break
         else:
@@ -209,7 +211,7 @@ class _System:
     def _missing(
         self, U: Fixed, e: Fixed, pull: Fixed, row: NDArray[Any], joint: NDArray[Any], bound: Fixed
     ) -> list[Array]:
-        """What the conditions miss by, rounded only at the end: stationarity, e, and rows held."""
+        """The residuals of the conditions, rounded only at the end: stationarity, e, and rows held."""
         K = self._K
         pushed = np.array([times(self._B[j], U[j]) for j in range(self._N)])
         error = np.array(
@@ -257,7 +259,7 @@ class _System:
         return rows.reshape(len(rows), K * n)
 
     def _independent(self, side: Array) -> NDArray[np.bool_]:
-        """Which of the rows that are to be held depend neither on (33) nor on one another."""
+        """The rows to be held that depend neither on (33) nor on one another."""
         row, joint = np.nonzero(side)
         held = np.zeros(side.shape, bool)
         if not len(row):

@@ -1,4 +1,4 @@
-"""What a random user did and found, and what was written to the terminal meanwhile."""
+"""The log of a random user: its actions, the faults found, and what was written to standard error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 @dataclass
 class Findings:
-    """What a random walk did and what it found."""
+    """The actions of a random walk and the faults that it found."""
 
     seed: int
     actions: Counter[str] = field(default_factory=Counter)
@@ -39,7 +39,7 @@ class Findings:
 
 
 class StandardError:
-    """What this process and its children write to standard error, kept and passed on."""
+    """Stores what this process and its children write to standard error, and passes it on."""
 
     def __enter__(self) -> StandardError:
         self._file = tempfile.TemporaryFile()

@@ -1,12 +1,12 @@
-"""Torque-level runs under hostile states, settings and events: nothing may raise, turn into NaN or take long.
+"""Torque-level runs with hostile states, settings and events: none may raise, give NaN or take long.
 
     python -m benchmarks.fuzz [--ticks 1000000] [--seed 0] [--minutes 60] [--episode SEED]
 
-Every episode is a scene and a controller by chance, of some hundred ticks. Between the ticks the robot is put
-into states that cannot be, readings of the torque sensor are nonsense, settings and targets change. Counts
-exceptions, numbers that are not finite, torques above the robot's own limit, and ticks that used more than
-20 ms of processor time; prints one line each with the episode's seed, which `--episode` walks again, and JSON
-at the end or when it is interrupted. Exit 1 if there was any.
+Every episode is a random scene and controller with some hundred ticks. Between the ticks the robot is put
+into impossible states, the torque sensor returns invalid values, and settings and targets change. Counts
+exceptions, numbers that are not finite, torques above the robot's own limit, and ticks that used more than 20
+ms of processor time. Each fault is printed in a line with the episode's seed, with which `--episode` repeats
+it, and a summary in JSON at the end or after an interruption. Exit code 1 if there was any fault.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ BOUNDED = ("himpc", "hiqp", "nhimpc", "weighted", "hqp")
 """Controllers that impose the torque bounds."""
 LONGEST_S = 0.020
 _KNOTS = 150
-"""Joints times knots, at most: what a step costs without any trouble must be well below LONGEST_S."""
+"""Largest product of joints and knots: an undisturbed step must take much less than LONGEST_S."""
 
 
 @dataclass
 class Tally:
-    """What was found."""
+    """The counts and faults."""
 
     ticks: int = 0
     episodes: int = 0
@@ -64,7 +64,7 @@ class Tally:
     lines: list[str] = field(default_factory=list)
 
     def fault(self, kind: str, seed: int, tick: int, what: str) -> None:
-        """Notes one, and tells of the first of each kind in an episode."""
+        """Counts a fault, and prints the first of each kind in an episode."""
         self.faults[kind] += 1
         line = f"{kind}: --episode {seed}, tick {tick}: {what}"
         if not any(each.startswith(f"{kind}: --episode {seed},") for each in self.lines):
@@ -73,7 +73,7 @@ class Tally:
 
 
 def state(rng: np.random.Generator, session: TorqueSession) -> tuple[Array, Array]:
-    """A measured state that is off by any size, or no state at all."""
+    """A measured state with an error of any size, or with invalid values."""
     q, v = session.plant.q, session.plant.v
     n, robot = q.size, session.robot
     match int(rng.integers(8)):
@@ -98,7 +98,7 @@ def state(rng: np.random.Generator, session: TorqueSession) -> tuple[Array, Arra
 
 
 def event(rng: np.random.Generator, session: TorqueSession) -> Event:
-    """Something that a learner may do, of any size."""
+    """An event that a learner may cause, with values of any size."""
     settings, robot = session.settings, session.robot
     level = settings.levels[int(rng.integers(len(settings.levels)))].name
     size = float(10.0 ** rng.uniform(-3, 3))
@@ -140,7 +140,7 @@ def event(rng: np.random.Generator, session: TorqueSession) -> Event:
 
 
 def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan, spent: float) -> None:
-    """What must hold of every plan."""
+    """Checks what must be true of every plan."""
     tally.ticks += 1
     tally.fallbacks.update(level.fallback for level in plan.levels)
     tally.longest_ms = max(tally.longest_ms, 1e3 * spent)
@@ -149,7 +149,7 @@ def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan
         tally.fault("slow", seed, tick, f"{1e3 * spent:.1f} ms ({shape})")
     if not np.isfinite(plan.tau).all():
         tally.fault("not finite", seed, tick, str(plan.tau))
-    # Where no bound is imposed, a demand may be anything; the motors' own limit is the plant's.
+    # Without torque bounds any demand is allowed; the limit of the motors is a part of the plant.
     imposed = session.settings.limits.torque and session.settings.controller in BOUNDED
     excess = np.abs(plan.tau) - session.robot.tau_limit
     if imposed and (excess > 1e-9).any():
@@ -157,7 +157,7 @@ def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan
 
 
 def episode(seed: int, ticks: int, tally: Tally) -> None:
-    """One run."""
+    """Runs one episode."""
     rng = np.random.default_rng(seed)
     scene = torque_scene(str(rng.choice(SCENES)))
     most = max(2, min(30, _KNOTS // scene.robot.n))
@@ -169,7 +169,7 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
     session = TorqueSession(replace(scene, settings=settings))
     tally.episodes += 1
     gc.collect()
-    gc.freeze()  # what the collector finds is no part of a step
+    gc.freeze()  # garbage collection is not part of a step
     wild, eventful = rng.choice([0.0, 0.02, 0.3]), rng.choice([0.0, 0.01, 0.1])
     for tick in range(ticks):
         try:

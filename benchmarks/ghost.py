@@ -1,10 +1,11 @@
-"""Two robots on one page: does the simulation hold real time, and how often are the plots renewed?
+"""Two robots on one page: whether the simulation keeps up with real time, and how often the plots are
+updated.
 
     python -m benchmarks.ghost [--scene S] [--set PATH=VALUE]… [--seconds S] [--alone]
 
-Starts the real server and, in a process of its own, a client that speaks the page's protocol and draws
-nothing (benchmarks/client.py); starts a ghost, waits until everything runs, and measures. Prints JSON; exit 0
-if the simulation lost less than 1 % of real time and the plots were renewed at least 10 times a second.
+Starts the real server and, in a process of its own, a client that uses the page's protocol and draws nothing
+(benchmarks/client.py); starts a ghost, waits until everything runs, and measures. Prints JSON; exit code 0 if
+the simulation lost less than 1 % of real time and the plots were updated at least 10 times per second.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from lessons.teaching.lesson import Ghost
 SETTLE = 5.0  # s
 LONG = 120.0  # s
 HOLDS, PLOTS_HZ = 0.99, 10.0
-"""The factor is the ratio of two clocks that are read a moment apart: no more digits would mean anything."""
+"""Smallest real-time factor and plot rate. The factor is the ratio of two clocks that are read a moment
+apart, so that more digits would be noise."""
 
 
 def main() -> int:
@@ -53,7 +55,8 @@ def main() -> int:
 
 
 def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[str, float]:
-    """Simulated over real time while a client watches, what it got, and how busy each process was."""
+    """Simulated over real time while a client watches, the data that it received, and the load of each
+    process."""
     client = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.client", server.link],
         stdout=subprocess.PIPE,
@@ -77,7 +80,7 @@ def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[st
 
 
 def measured(learner: SimulationClient, lines: list[str], seconds: float) -> dict[str, float]:
-    """lines: what the client prints, one per second."""
+    """lines: the output of the client, one per second."""
     busy = {name: psutil.Process(pid) for name, pid in pids(learner).items()}
     for process in busy.values():
         process.cpu_percent()
@@ -105,19 +108,19 @@ def measured(learner: SimulationClient, lines: list[str], seconds: float) -> dic
 
 
 def simulated(learner: Simulation) -> float:
-    """s, as the memory shared with the simulation says now."""
+    """Simulated time, s, in the memory that is shared with the simulation."""
     found = learner.read(lambda block, _: block.moment()[0])
     return 0.0 if found is None else found
 
 
 def follows(learner: SimulationClient) -> bool:
-    """Whether the ghost has come along for a while."""
+    """Whether the ghost has kept up for a while."""
     ghost = learner.ghost
     return ghost is not None and simulated(ghost) > 1.0
 
 
 def pids(learner: SimulationClient) -> dict[str, int]:
-    """The processes at work."""
+    """The ids of the processes that are running."""
     found = {"page": psutil.Process().pid, "robot": learner.pid}
     if learner.ghost is not None:
         found["ghost"] = learner.ghost.pid

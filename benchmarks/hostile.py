@@ -1,4 +1,4 @@
-"""A user who sends what no browser would, and at the wrong moment; a page's protocol without a browser."""
+"""A user who sends messages that no browser would send, at the wrong moments. It uses the page's protocol."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ LOOKS: tuple[dict[str, Any], ...] = (
 
 
 class HostileUser:
-    """One connection, one stream of random numbers."""
+    """One connection with one stream of random numbers."""
 
     def __init__(self, url: str, seed: int) -> None:
         self.actions: Counter[str] = Counter()
@@ -51,12 +51,12 @@ class HostileUser:
 
     @property
     def once_all(self) -> bool:
-        """Whether each thing was done."""
+        """Whether every action was done at least once."""
         return sum(self.actions.values()) >= len(self._actions())
 
     def act(self) -> None:
-        """One hostile thing, or one that a learner may do, so that the next meets another page: each once,
-        then as chance will have it."""
+        """Does one hostile action, or one that a learner may do, so that the next action meets another state
+        of the page. Each is done once, then at random."""
         actions = self._actions()
         if not self._due:
             self._due = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])
@@ -69,7 +69,7 @@ class HostileUser:
         self.actions[chosen.__name__.strip("_")] += 1
 
     def _actions(self) -> Sequence[tuple[Callable[[], None], float]]:
-        """With how likely each is."""
+        """The actions and their weights."""
         return (
             (self._look, 3.0),
             (self._write_odd, 4.0),
@@ -88,7 +88,7 @@ class HostileUser:
         )
 
     def close(self) -> None:
-        """The tab is closed."""
+        """Closes the tab."""
         self.page.__exit__()
 
     # ---------------------------------------------------------------- numbers
@@ -97,7 +97,7 @@ class HostileUser:
         return self._random.choice(NUMBERS) if self._random.random() < 0.5 else self._random.gauss(0.0, 1.0)
 
     def _numbers(self, count: int) -> tuple[Any, ...]:
-        """So many, as a rule."""
+        """A number of values, usually the right number."""
         chance = self._random.random()
         if chance < 0.05:
             return tuple(self._number() for _ in range(self._random.randrange(7)))
@@ -106,7 +106,7 @@ class HostileUser:
         return tuple(self._number() for _ in range(count))
 
     def _place(self) -> tuple[float, ...]:
-        """One that a hand may reach."""
+        """A position that a user may drag to."""
         return tuple(self._random.uniform(-1.2, 1.2) for _ in range(3))
 
     def _turn(self) -> tuple[float, ...]:
@@ -115,7 +115,7 @@ class HostileUser:
     # ---------------------------------------------------------------- the 3D view
 
     def _look(self) -> None:
-        """A camera, odd in one or two of its parts."""
+        """Sends a camera message with one or two unusual fields."""
         said = vars(camera())
         for _ in range(self._random.choice((1, 1, 2))):
             match self._random.randrange(6):
@@ -131,12 +131,12 @@ class HostileUser:
                 case 4:
                     said[self._random.choice(("fov", "near", "far"))] = self._number()
                 case _:
-                    # From where the page itself put it, to there.
+                    # From the position that the page itself set.
                     said["look_at"] = self.page.eye or self._place()
         self._send("ViewerCameraMessage", said)
 
     def _look_while_built(self) -> None:
-        """Another scene is asked for; until it is there the camera looks at where it is, or has no size."""
+        """Loads another scene; until it is built the camera looks at its own position, or has no size."""
         odd, before = self._random.choice(LOOKS), len(self.page.made)
         self._choose_scene()
         for _ in range(100):
@@ -206,14 +206,14 @@ class HostileUser:
             return
         uuid = self._random.choice(inputs)[0]
         if self._random.random() < 0.2:
-            uuid = self._random.choice(list(self.page.made))["uuid"]  # perhaps gone
+            uuid = self._random.choice(list(self.page.made))["uuid"]  # the control may be gone
         name = self._random.choice(
             ("value",) * 8 + ("label", "min", "options", "removed", "__class__", "order")
         )
         self._send("GuiUpdateMessage", {"uuid": uuid, "updates": {name: self._random.choice(ODD)}})
 
     def _write_fitting(self) -> None:
-        """What a learner may set."""
+        """Writes a value that a learner may set."""
         inputs = self._inputs()
         if inputs:
             uuid, control = self._random.choice(inputs)
@@ -261,7 +261,7 @@ class HostileUser:
         return [each for each in self._inputs() if each[1]["props"].get("label") == label]
 
     def _axes_then_reset(self) -> None:
-        """Axes or frame of a task are changed, and the robot is put back at once."""
+        """Changes the axes or the frame of a task, and resets the robot at once."""
         menus = self._labelled("Axes") or self._labelled("Frame")
         if menus:
             self._set(*self._random.choice(menus))
@@ -274,7 +274,7 @@ class HostileUser:
             self._send("GuiUpdateMessage", {"uuid": uuid, "updates": {"value": choice}})
 
     def _drag_while_rebuilt(self) -> None:
-        """The stack is changed, and arrows that make room for others are dragged on."""
+        """Changes the stack, and continues to drag arrows that are being replaced."""
         menus = [*self._labelled("Axes"), *self._labelled("Frame"), *self._labelled("Seen from")]
         if menus:
             self._set(*self._random.choice(menus))
@@ -333,7 +333,7 @@ class HostileUser:
             case 0:
                 self.page.send(self._random.randbytes(self._random.choice((0, 1, 30, 3000))))
             case 1:
-                self.page.send(b"\x91" * self._random.choice((10, 100_000)))  # a list in a list in a list
+                self.page.send(b"\x91" * self._random.choice((10, 100_000)))  # a deeply nested list
             case 2:
                 names = ("uuid", "name", "updates", "value", "owner", "position", "content", "source")
                 said = {self._random.choice(names): self._random.choice(ODD) for _ in range(3)}
@@ -342,7 +342,7 @@ class HostileUser:
                 self.page.send(pack(camera())[: self._random.randrange(60)])
 
     def reload(self) -> None:
-        """The same user's page anew, with nothing kept."""
+        """Reloads the page of the same user, with empty storage."""
         self.page.__exit__()
         self.page = Wire(self._url)
 
@@ -356,9 +356,10 @@ class HostileUser:
 
 
 def roam(server: PageServer, seconds: float, seed: int, complaints: Callable[[], str]) -> Findings:
-    """A hostile user for so long, each thing once at least; it ends early when something broke.
+    """Runs a hostile user for a time, with each action at least once; it ends early after a fault.
 
-    complaints: everything that was written to standard error so far."""
+    complaints: everything that was written to standard error so far.
+    """
     found = Findings(seed)
     user = HostileUser(server.link, seed)
     try:
@@ -378,7 +379,7 @@ def roam(server: PageServer, seconds: float, seed: int, complaints: Callable[[],
 
 
 def _look(server: PageServer, page: Wire, found: Findings, complaints: Callable[[], str]) -> None:
-    """Judges what happened."""
+    """Checks what happened."""
     said = complaints()
     for word in ("Traceback", "Exception", "Warning", "[viser]"):
         if word in said:
@@ -394,7 +395,7 @@ def _look(server: PageServer, page: Wire, found: Findings, complaints: Callable[
 
 
 def _answers(server: PageServer, user: HostileUser) -> bool:
-    """Whether a new page shows the session, and takes what is pressed there."""
+    """Whether a new page shows the session and accepts a command."""
     user.reload()
     if not eventually(lambda: user.page.find("Playback") is not None and bool(server.sessions.learners)):
         return False

@@ -1,10 +1,10 @@
-"""What a step of HTMPC takes, and what it took in another checkout: both side by side, turn about.
+"""The time of a step of HTMPC, here and in another checkout, measured alternately.
 
     python benchmarks/htmpc.py [SCENE…] [--before CHECKOUT] [--runs R]
 
-Each checkout has a process of its own that runs the scene; they take turns of a second of simulated time, so
-that both see the same noise, and the clock is the processor's: what runs beside them does not count. Prints
-JSON: median and 99th percentile of state in → motion out, and their ratios.
+Each checkout has a process of its own that runs the scene. They take turns of a second of simulated time, so
+that both are disturbed equally, and processor time is measured, so that other programs do not count. Prints
+JSON: median and 99th percentile of the time from state to motion command, and their ratios.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ import numpy as np
 SCENES = ("ridgeback-ur10-square", "ridgeback-ur10-cluttered")
 HERE = Path(__file__).parents[1]
 TURN = 10
-"""Control steps."""
+"""Number of control steps."""
 PLACES = (
     ("lessons.session.velocity", "VelocitySession", "lessons.scenes.missions", "velocity_scene"),
     ("lessons.mobile.session", "MobileSession", "lessons.scenes.mobile", "mobile_scene"),
 )
-"""Where session and scenes are, now and in older checkouts."""
+"""The modules of session and scenes, now and in older checkouts."""
 
 
 def child(scene: str) -> None:
-    """Steps a scene for every line on stdin; prints the times, µs, of that many steps."""
+    """Runs some steps of a scene for every line on stdin, and prints their times, µs."""
     time.perf_counter_ns = time.thread_time_ns
     for session, kind, scenes, scene_of in PLACES:
         try:
@@ -56,7 +56,7 @@ def child(scene: str) -> None:
 
 
 def measure(scene: str, checkouts: dict[str, Path], seconds: float) -> dict[str, list[float]]:
-    """Step times of every checkout, µs."""
+    """The step times of every checkout, µs."""
     started = {}
     for name, place in checkouts.items():
         environment = os.environ | {"PYTHONPATH": str(place), "OPENBLAS_NUM_THREADS": "1"}

@@ -1,11 +1,11 @@
-"""Does memory stay where it is over many changes of lesson, in a real browser and in the server?
+"""Memory over many changes of lesson, in a real browser and in the server.
 
     python -m benchmarks.memory [--switches 50]
 
-Opens lesson after lesson by its card and runs a moment of its first step. After every lesson was open twice
-(until then the browser compiles what it runs often, and keeps that in its heap), measures the page's heap
-(after a garbage collection) and the server's memory; and again after so many more changes. Prints JSON; exit
-0 if both grew by less than 10 %.
+Opens one lesson after another by its card and runs its first step for a moment. When every lesson has been
+open twice (until then the browser compiles frequent code and keeps it in its heap), measures the page's heap
+(after a garbage collection) and the server's memory; and again after the given number of further changes.
+Prints JSON; exit code 0 if both grew by less than 10 %.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def main() -> int:
 
 
 def switch(page: Page, count: int) -> None:
-    """To another lesson, and a moment of whatever it shows."""
+    """Opens another lesson, and runs it for a moment."""
     open_lesson(page, load_lesson(COURSE[count % len(COURSE)]))
     run = page.get_by_role("button", name="Run this step", exact=True)
     if run.count() and run.is_enabled():
@@ -66,8 +66,8 @@ def switch(page: Page, count: int) -> None:
 
 
 def memory(page: Page) -> dict[str, float]:
-    """MB of the page's heap and of the server, once both had a moment to let go."""
-    # The lesson on show has its share in the heap: always measured on the same one.
+    """MB of the page's heap and of the server, after a moment without activity."""
+    # The visible lesson adds to the heap, so the measurement always uses the same lesson.
     open_lesson(page, load_lesson(COURSE[0]))
     page.wait_for_timeout(4000)
     gc.collect()

@@ -1,9 +1,9 @@
-"""A user who tries everything in no order: the page must survive, and the robot must stay inside its bounds.
+"""A user who tries everything at random: the page must survive, and the robot must stay within its bounds.
 
     python -m benchmarks.monkey [--minutes M] [--seed N] [--scene S] [--hostile]
 
-Uses a browser; with --hostile it speaks the page's protocol instead, and sends what no browser would, see
-benchmarks/hostile.py. Prints what was done as JSON; the exit code is 1 if anything broke.
+Uses a browser; with --hostile it uses the page's protocol instead and sends messages that no browser would
+send, see benchmarks/hostile.py. Prints all actions as JSON; exit code 1 if there was a fault.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ UNBOUNDED = ("osf", "osf_damped", "tdeosf", "tdeosf_damped")
 LEAK = 1e-6
 """m/s² or rad/s²."""
 BOUND = 1e-9
-"""N·m beyond a torque bound that is still rounding."""
+"""N·m above a torque bound that count as rounding."""
 ANSWER = 60.0
-"""s: a page that shows nothing new for so long, while its robot should move, is dead."""
+"""Time, s, after which a page counts as dead if it shows nothing new although its robot should move."""
 _PATIENCE = 1_500
-"""ms for an element to take a click; what is covered or gone by then is not clicked."""
+"""Time, ms, for an element to accept a click; a covered or removed element is not clicked."""
 _HOTKEYS = ("Space", "?", "Escape", "ArrowLeft", "ArrowRight", *"123nbrsdltjk")
 _PANELS = ("Start", "Tasks", "Control", "Plant", "Robot", "Help", "Errors", "Joints", "Who binds")
 
 
 class Monkey:
-    """One browser tab, one learner, one stream of random numbers."""
+    """One browser tab of one learner, with one stream of random numbers."""
 
     def __init__(self, page: Page, server: PageServer, seed: int, complaints: Callable[[], str]) -> None:
         """complaints: everything that was written to standard error so far."""
@@ -69,7 +69,7 @@ class Monkey:
         return self.server.sessions.learners[0]
 
     def act(self) -> None:
-        """One thing a user may do."""
+        """Does one random action of a user."""
         actions: list[tuple[Callable[[], None], float]] = [
             (self._click, 6.0),
             (self._tab, 5.0),
@@ -83,13 +83,13 @@ class Monkey:
             (self._reload, 0.1),
         ]
         chosen = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])[0]
-        # An element may vanish, or lie below another one, between the look and the click.
+        # An element may be removed or covered between the check and the click.
         with suppress(Error):
             chosen()
             self.found.actions[chosen.__name__.strip("_")] += 1
 
     def _hear_error(self, error: Error) -> None:
-        # Viser's own button that saves the picture opens a file dialog, which nobody here answers.
+        # Viser's button that saves the picture opens a file dialog, which nobody would close.
         if "showSaveFilePicker" not in error.message:
             self.found.blame(f"the browser: {error}")
 
@@ -167,7 +167,7 @@ class Monkey:
     # ---------------------------------------------------------------- eyes
 
     def look(self) -> None:
-        """Judges everything that happened since the last look."""
+        """Checks everything that happened since the last check."""
         if "Traceback" in (said := self._complaints()):
             self.found.blame("on the terminal: " + said[said.index("Traceback") :][-1500:])
         learner = self.learner
@@ -195,7 +195,7 @@ class Monkey:
         settings = self.learner.settings
         if not isinstance(settings, TorqueSettings):
             return
-        # Null-space methods know no bounds: what motors that do not saturate are asked for, they give.
+        # Null-space methods have no bounds: motors without saturation apply whatever torque is requested.
         if settings.controller in UNBOUNDED and not settings.plant.saturate:
             self._unbounded = block
         if self._unbounded is not block:
@@ -238,8 +238,9 @@ class Monkey:
 def walk(
     browser: Browser, server: PageServer, minutes: float, seed: int, complaints: Callable[[], str]
 ) -> Findings:
-    """A random walk of so many minutes; it ends early when something broke."""
-    # With less, viser's panel of statistics has no canvas to draw on, and a user finds it sooner or later.
+    """A random walk of a number of minutes; it ends early after a fault."""
+    # In a smaller window, viser's statistics panel has no canvas to draw on, which a random user finds in the
+    # end.
     page = open_page(browser, server.link, scale=0.5, rest=SELDOM)
     page.set_default_timeout(_PATIENCE)
     page.set_default_navigation_timeout(SLOW)
@@ -267,7 +268,7 @@ def main() -> int:
 
 
 def hostile(given: argparse.Namespace) -> Findings:
-    """Without a browser."""
+    """Runs the hostile user, without a browser."""
     with StandardError() as said:
         server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=4, grace=0.2)
         try:
@@ -277,7 +278,7 @@ def hostile(given: argparse.Namespace) -> Findings:
 
 
 def usual(given: argparse.Namespace) -> Findings:
-    """In a browser."""
+    """Runs the usual user, in a browser."""
     with StandardError() as said, sync_playwright() as playwright:
         server = PageServer(SceneChoice(RunSpec(given.scene)), port=0, max_sessions=1)
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)

@@ -1,11 +1,11 @@
-"""Both routes against the optimum to many digits: random stacks on every robot of the catalog.
+"""Compares both routes with the optimum to many digits: random stacks on every robot of the catalog.
 
     python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30] [--json -]
 
-A stack is of one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
-acceleration), horizons and limits, at a random state and with random targets. Each route solves what the
-controller would at that tick, and `benchmarks.exact` says where the optimum is. A row per robot: how often a
-route gave no point where there is an optimum, and how far its points are from the optimum, N·m.
+A stack has one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
+acceleration), horizons and limits, in a random state and with random targets. Each route solves the problem
+of the controller at that tick, and `benchmarks.exact` computes the optimum. Prints a row per robot: how often
+a route gave no point although there is an optimum, and the distance of its points from the optimum, N·m.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ROUTES: tuple[Route, ...] = ("compiled", "explicit")
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """What a controller solves at one tick."""
+    """The problem of a controller at one tick."""
 
     robot: str
     seed: int
@@ -58,8 +58,8 @@ class Stack:
 
 @dataclass(frozen=True)
 class Found:
-    """How a route did at one level: bounds that hold the optimum, and how far the route's point is from it,
-    N·m; None where the route gave none."""
+    """The result of a route at one level: the number of bounds that hold the optimum, and the distance of the
+    route's point from it, N·m; None if the route gave no point."""
 
     robot: str
     seed: int
@@ -71,7 +71,7 @@ class Found:
 
 
 def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
-    """A stack that can be solved; None if at this state no torque keeps to all limits."""
+    """A random stack that has a solution; None if no torque satisfies all limits in this state."""
     rng = np.random.default_rng(seed)
     scene = scene_of(robot)
     kinds = [kind for kind in KINDS if kind != "damping"]
@@ -111,7 +111,7 @@ def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
 
 
 def judged(stack: Stack) -> list[Found] | None:
-    """A row per level; None where the optimum was not found out."""
+    """One row per level; None where the exact optimum was not found."""
     solutions = {route: stack.solve(route) for route in ROUTES}
     above: list[tuple[LevelProblem, Exact]] = []
     found = []
@@ -123,7 +123,7 @@ def judged(stack: Stack) -> list[Found] | None:
             best = best or optimum(problem, stack.rows, above, guess)
         if best is None:
             return None
-        for route in ROUTES:  # below a level without a point there is another problem
+        for route in ROUTES:  # after a level without a point, the next problem differs
             right[route] = right[route] and points[route].fallback == "solve"
         errors = [float(np.abs(points[route].U - best.U).max()) if right[route] else None for route in ROUTES]
         found.append(
@@ -134,7 +134,7 @@ def judged(stack: Stack) -> list[Found] | None:
 
 
 def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iterator[Stack]:
-    """So many of them, robot by robot in turn."""
+    """Random stacks, for each robot in turn."""
     done = 0
     while done < count:
         stack = random_stack(robots[done % len(robots)], seed, longest)
@@ -145,7 +145,7 @@ def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iter
 
 
 def table(found: list[Found]) -> str:
-    """A row per robot, in Markdown."""
+    """One row per robot, in Markdown."""
     lines = [
         "| robot | levels, held by bounds | compiled: none, worst error | explicit: none, worst error |",
         "|---|--:|--:|--:|",

@@ -1,11 +1,11 @@
-"""What a rough day leaves of the page: killed, stopped and hanging simulations, large uploads, little memory.
+"""The page under disturbances: killed, stopped and hanging simulations, large uploads, little memory.
 
     python -m benchmarks.rough [--kills 100] [--stops 20] [--shm 8]
 
-Two pages without a browser are treated roughly through the server they share, a third only watches. As root,
-with `--shm` MB of shared memory (a mount of its own). Prints JSON: how often a page recovered by its button,
-the longest the watching page heard nothing, the longest answer to a GET, and what was left behind. Exit 0 if
-every page recovered and nothing was.
+Two pages without a browser share a server and are disturbed; a third page only watches. Run as root with
+`--shm` MB of shared memory (a mount of its own). Prints JSON: how often a page recovered with its button, the
+longest time in which the watching page received nothing, the longest response time of a GET, and what was
+left behind. Exit code 0 if every page recovered and nothing was left behind.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _INSIDE = "HIMPC_LAB_ROUGH_INSIDE"
 
 
 def main() -> int:
-    """Treats a server roughly, as the command line says."""
+    """Disturbs a server as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--stops", type=int, default=20)
@@ -63,7 +63,7 @@ def main() -> int:
 
 
 def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, object]:
-    """Everything in a row; see the module. scene: which the pages show."""
+    """All disturbances in sequence; see the module. scene: the scene that the pages show."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
     before, there = _memory_left(), set(psutil.Process().children(recursive=True))
     server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=3)
@@ -71,7 +71,7 @@ def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, objec
     treated = recovered = 0
     try:
         with contextlib.ExitStack() as opened:
-            # One after the other: each must be known to whom it belongs.
+            # The pages open one after the other, so that the processes of each are known.
             pairs = [(opened.enter_context(Wire(server.link)), _learner(server, place)) for place in range(3)]
             (witness, *wires), learners = zip(*pairs, strict=True)
             assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
@@ -135,7 +135,7 @@ def _hurt(learner: SimulationClient, number: signal.Signals) -> None:
 
 
 def _hang(learner: SimulationClient) -> None:
-    """A scene is asked for that will never be there: its process stops while it loads."""
+    """Requests a scene that never loads: its process stops while loading."""
     _hurt(learner, signal.SIGSTOP)
     learner.load(SceneChoice(RunSpec("panda-hold")))
 
@@ -143,7 +143,7 @@ def _hang(learner: SimulationClient) -> None:
 def _recovers(
     learner: SimulationClient, page: Wire, harm: Callable[[SimulationClient], None], by_reset: bool
 ) -> bool:
-    """Whether the page says what is the matter, and its button brings a running robot back."""
+    """Whether the page says what is wrong, and whether its button starts a running robot again."""
 
     def says() -> bool:
         return any(page.shows(badge) for badge in ("STOPPED", "SILENT", "LOADING"))
@@ -163,7 +163,8 @@ def _recovers(
 
 
 def _upload(page: Wire, answers: list[str]) -> None:
-    """A file nobody wants, as fast as it goes; the server may well hang up. Its answer goes to `answers`."""
+    """Uploads an unwanted file as fast as possible; the server may close the connection. Its response goes to
+    `answers`."""
     eventually(lambda: page.find("Upload a URDF") is not None, LONG)
     button = page.find("Upload a URDF")
     assert button is not None, "the page has no button to upload a robot"
@@ -186,7 +187,7 @@ def _upload(page: Wire, answers: list[str]) -> None:
 
 @contextlib.contextmanager
 def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
-    """(longest silence of a page, longest answer to a GET), s, while it lasts."""
+    """(longest silence of a page, longest response time of a GET), s, during the disturbance."""
     worst, over = [0.0, 0.0], threading.Event()
     seen: dict[str, object] = {}
 
@@ -221,11 +222,10 @@ def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
 
 
 def _memory_left() -> set[str]:
-    """What has a name in shared memory and is no other living program's, and rings that this process still
-    looks at."""
+    """Named shared memory that belongs to no other living program, and rings that this process still maps."""
     found = {f"/dev/shm/{path.name}" for path in Path("/dev/shm").glob("*")}
     others = {line.split()[-1] for each in psutil.pids() if each != os.getpid() for line in _maps(each)}
-    # Its owner may have taken a name away meanwhile.
+    # Its owner may have removed a name meanwhile.
     named = {name for name in found - others if os.path.exists(name)}
     return named | {line.strip() for line in _maps(os.getpid()) if "himpc-lab" in line}
 
@@ -233,7 +233,7 @@ def _memory_left() -> set[str]:
 def _maps(process: int) -> list[str]:
     try:
         return Path(f"/proc/{process}/maps").read_text().splitlines()
-    except OSError:  # it has ended, or is not ours to look at
+    except OSError:  # the process has ended or belongs to another user
         return []
 
 

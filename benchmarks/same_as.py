@@ -19,11 +19,11 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 TIMING = ("step_ms", "real_time_factor", "late_ticks")
-"""Keys that differ from run to run."""
+"""Keys whose values differ between runs."""
 NEW: tuple[str, ...] = ("levels",)
-"""Keys that COMMIT may not have had."""
+"""Keys that COMMIT may not have."""
 _HOW = {"route", "max_kkt_residual"}
-"""Keys of a result that tell how it was found."""
+"""Keys of a result that describe how it was computed."""
 
 _RUNS = """
 import json, sys
@@ -66,7 +66,7 @@ def main() -> int:
 
 
 def _names() -> list[str]:
-    """SCENE/CONTROLLER for all that fit."""
+    """SCENE/CONTROLLER for all combinations that fit."""
     from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
     from lessons.scenes.names import SCENES, VELOCITY_SCENES
 
@@ -91,7 +91,7 @@ def _differs(name: str, then: Path, now: Path, tolerance: float) -> bool:
 
 
 def _same(before: Any, after: Any, tolerance: float) -> bool:
-    """Equal, numbers up to the tolerance; before and after: parts of a JSON object."""
+    """Whether two parts of a JSON object are equal, numbers up to the tolerance."""
     if isinstance(before, dict) and isinstance(after, dict):
         keys = before.keys() - (_HOW if tolerance > 0 else set())
         return before.keys() == after.keys() and all(_same(before[k], after[k], tolerance) for k in keys)

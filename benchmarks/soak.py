@@ -1,17 +1,17 @@
-"""Does the server stay as it is: memory of server and simulations, threads, handles; and over reconnects?
+"""Whether the server's memory, threads and handles stay constant, over time and over reconnections.
 
     python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--json -]
 
-Runs a server of its own, and in a process of their own K clients that speak the page's protocol
-(benchmarks/client.py). Watches for M minutes; the first ten of them (or the first half of a shorter run) fill
-what is kept to look back at and to export, at twice the speed, and two minutes of every robot's own time are
-waited for. Then one of the clients reloads its page N times. Prints a table; exit 0 if memory of the server
-and of its children grew by at most 5 % since everything was filled, threads and handles are as many as
-before, and 100 reloads cost at most 5 MB.
+Runs a server and, in a process of their own, K clients that use the page's protocol (benchmarks/client.py).
+Measures for M minutes. The first ten of them (or the first half of a shorter run) fill the histories for
+looking back and for export, at twice the speed, and last until every robot has run for two minutes of its own
+time. Then one of the clients reloads its page N times. Prints a table; exit code 0 if the memory of the
+server and of its children grew by at most 5 % since the histories were full, the numbers of threads and
+handles are the same as before, and 100 reloads cost at most 5 MB.
 
-Memory is what a process has written and shares with no other, after what is free was given back: what an
-allocator keeps for later goes up and down by more than a leak would, and so do pages of libraries, which are
-shared as long as any program on the machine has them open, too.
+Memory is what a process has written and shares with no other process, after free memory was returned to the
+system. The free memory that an allocator keeps varies by more than a leak would, and so do the pages of
+libraries, which are shared as long as another program on the machine uses them.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ NEAR = 5  # samples over which a median is taken, at least
 BATCHES = 5  # of reloads
 REST = 5.0  # s
 GROWTH, PER_100, SPARE = 1.05, 5.0, 3
-"""Of memory; MB; threads and handles that come and go."""
+"""Allowed growth of memory; MB; numbers of threads and handles that vary."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Sample:
 
 
 def main() -> int:
-    """Watches as the command line says."""
+    """Runs the test as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--clients", type=int, default=8)
@@ -95,14 +95,14 @@ def main() -> int:
 
 
 def go(learners: Sequence[SimulationClient], speed: float) -> None:
-    """Simulated seconds per second of all robots."""
+    """Sets the speed of all robots, simulated seconds per second."""
     for learner in learners:
         learner.send(Speed(speed))
 
 
 def reconnected(viewers: Viewers, times: int) -> float | None:
-    """MB that the server keeps of a hundred reloads of a page, after some that warm it up: the median slope
-    between any two of several batches, since a single reading goes up and down."""
+    """MB that the server keeps per hundred reloads of a page, after some reloads to warm up: the median slope
+    between any two of several batches, since a single reading varies."""
     if not times:
         return None
     visit(viewers, max(20, times // 5))
@@ -115,13 +115,13 @@ def reconnected(viewers: Viewers, times: int) -> float | None:
 
 
 def visit(viewers: Viewers, times: int) -> None:
-    """A browser reloads so often."""
+    """Lets a browser reload a number of times."""
     came = viewers.reload(times)
     assert came == times, f"of {times} visits only {came} saw a robot"
 
 
 def rested(client: int) -> float:
-    """MB of the server after a moment's rest."""
+    """MB of the server after a moment without activity."""
     time.sleep(REST)
     found: list[float] = []
     for _ in range(NEAR):
@@ -131,18 +131,19 @@ def rested(client: int) -> float:
 
 
 def watched(minutes: float, client: int, after: float = 0.0) -> list[Sample]:
-    """Samples over so many minutes, and enough to judge them; after: the minute at which they begin."""
+    """Samples over a number of minutes, and enough of them for a verdict; after: the minute of the first
+    one."""
     began, found = time.monotonic(), list[Sample]()
     while (minute := (time.monotonic() - began) / 60) < minutes or len(found) < 2 * NEAR:
         found.append(sample(after + minute, client))
-        if len(found) % 12 == 1:  # now and then: an hour is long, and what comes last may fail
+        if len(found) % 12 == 1:  # printed from time to time: a run takes an hour and may fail at its end
             print(json.dumps(asdict(found[-1])), file=sys.stderr, flush=True)
         time.sleep(EVERY)
     return found
 
 
 def sample(minute: float, client: int) -> Sample:
-    """What server and children hold now. client: number of the process that is no part of the server."""
+    """What the server and its children use now. client: id of the process that is not part of the server."""
     server = psutil.Process()
     tidy()
     memory = written(server)
@@ -167,7 +168,7 @@ def sample(minute: float, client: int) -> Sample:
 
 
 def written(process: psutil.Process) -> float:
-    """Bytes that a process has written and shares with no other."""
+    """Bytes that a process has written and shares with no other process."""
     if sys.platform != "linux":
         return process.memory_full_info().uss
     try:
@@ -178,17 +179,17 @@ def written(process: psutil.Process) -> float:
 
 
 def tidy() -> None:
-    """Gives back what is free, as far as the system's allocator can."""
+    """Returns free memory to the system, if its allocator supports that."""
     gc.collect()
     with contextlib.suppress(OSError, AttributeError):  # not glibc
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def judged(later: list[Sample], cost: float | None) -> list[str]:
-    """Sentences on what is over the figures; later: samples since all was filled."""
+    """Sentences about exceeded limits; later: samples after the histories were full."""
     if len(later) < 2 * NEAR:
         return [f"Too short: {len(later)} samples since everything was filled."]
-    some = max(NEAR, len(later) // 10)  # what is on its way to a client comes and goes within minutes
+    some = max(NEAR, len(later) // 10)  # data on the way to a client vary within minutes
     first, last = later[:some], later[-some:]
     faults: list[str] = []
     for name in ("server", "children"):
@@ -205,7 +206,7 @@ def judged(later: list[Sample], cost: float | None) -> list[str]:
 
 
 def table(samples: list[Sample], cost: float | None, faults: list[str]) -> str:
-    """For people: about thirty lines."""
+    """A table of about thirty lines."""
     names = list(asdict(samples[0]))
     lines = ["  ".join(name.rjust(9) for name in names)]
     lines += [

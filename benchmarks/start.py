@@ -1,4 +1,4 @@
-"""What a start costs: CPU and wall time until the page listens, of lists and help, and of compiling.
+"""The cost of a start: CPU and wall time until the page listens, of lists and help, and of compiling.
 
     python benchmarks/start.py [--runs 5] [--cold]
 
@@ -25,7 +25,7 @@ COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lamb
 
 
 def cost(command: list[str], **environment: str) -> float:
-    """CPU of a command and its children, s."""
+    """CPU time of a command and its children, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, env={**os.environ, **environment}, capture_output=True, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -33,7 +33,7 @@ def cost(command: list[str], **environment: str) -> float:
 
 
 def listening(arguments: list[str]) -> tuple[float, float]:
-    """(CPU of the server, wall time) until it prints that it is ready, s."""
+    """(CPU time of the server, wall time), s, until it prints that it is ready."""
     began = time.perf_counter()
     command = [sys.executable, "-m", "app", "--no-browser", "--port", "0", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:

@@ -1,18 +1,17 @@
-"""Does the server's memory stay where it is while learners change scenes, with and without ghosts?
+"""Whether the server's memory stays constant while learners change scenes, with and without ghosts.
 
     python -m benchmarks.switches [--clients K] [--minutes M] [--every S] [--speed X] [--seed N]
 
-Starts the real server, and in a process of their own K clients that draw nothing (benchmarks/client.py).
-Every S seconds each learner opens another scene, starts a ghost or ends it, as a random number says;
-simulations go at X times real time, so that a small machine has time for all of them. Memory is looked at
-every five seconds, as it is: nothing is collected or given back for that. Prints a line of JSON for every
-five minutes (of a shorter run for every sixth part): the median and the most of the server's memory in that
-time, MB. At the end everybody goes back to the first scene, and what the server holds is compared with what
-it held after a warm-up.
+Starts the real server and, in a process of their own, K clients that draw nothing (benchmarks/client.py).
+Every S seconds each learner opens another scene, starts a ghost or ends it, at random. The simulations run at
+X times real time, so that a small machine can run all of them. Memory is measured every five seconds, without
+garbage collection before it. Prints a line of JSON for every five minutes (in a shorter run for every sixth
+part): the median and the maximum of the server's memory in that time, MB. At the end all learners return to
+the first scene, and the server's memory is compared with that after the warm-up.
 
-Exit 0 if memory never was more than BASE + K · EACH, nothing was left behind, and memory in the last third of
-the time was at most 10 % more than in the first. Thirds are compared where each is five minutes long: shorter
-ones differ by the scenes that happen to be open.
+Exit code 0 if memory was never more than BASE + K · EACH, nothing was left behind, and memory in the last
+third of the time was at most 10 % more than in the first. Thirds are compared if each is at least five
+minutes long: shorter ones differ by the scenes that happen to be open.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ PERIOD = 5.0  # minutes
 LOOK = 5.0  # s
 GROWTH = 1.1
 BASE, EACH = 300.0, 50.0
-"""MB of a server with its libraries and the meshes of all scenes, and of a learner with a ghost."""
+"""MB for a server with its libraries and the meshes of all scenes, and for a learner with a ghost."""
 
 
 @dataclass
@@ -64,7 +63,7 @@ class Period:
     megabytes: list[float] = field(default_factory=list)
 
     def told(self) -> dict[str, float]:
-        """For people."""
+        """The period as a line for the terminal."""
         return {"minute": round(self.began, 1), "median": median(self.megabytes), "most": max(self.megabytes)}
 
 
@@ -86,7 +85,7 @@ def main() -> int:
             for learner in learners:
                 learner.send(Speed(options.speed))
             assert wait_until(lambda: all(map(runs, learners)), LONG), "nothing runs"
-            for scene in (*SCENES, SCENES[0]):  # each robot's meshes are read once
+            for scene in (*SCENES, SCENES[0]):  # the meshes of each robot are loaded once
                 everybody(learners, scene, options.speed)
             before = state(server)
             print(json.dumps({"after the warm-up": before}), flush=True)
@@ -101,7 +100,7 @@ def main() -> int:
 
 
 def switched(learners: tuple[SimulationClient, ...], options: argparse.Namespace) -> list[Period]:
-    """Everybody does something every so many seconds, one after the other."""
+    """Lets each learner in turn do an action, at fixed intervals."""
     chance, length = random.Random(options.seed), min(PERIOD, options.minutes / 6)
     periods = [Period(0.0)]
     began = looked = time.monotonic()
@@ -119,7 +118,7 @@ def switched(learners: tuple[SimulationClient, ...], options: argparse.Namespace
 
 
 def change(learner: SimulationClient, chance: random.Random, speed: float) -> None:
-    """One thing a learner does."""
+    """Does one action of a learner."""
     match chance.choices(("scene", "ghost", "alone"), (5, 3, 2))[0]:
         case "scene":
             learner.load(SceneChoice(RunSpec(chance.choice(SCENES))))
@@ -131,7 +130,7 @@ def change(learner: SimulationClient, chance: random.Random, speed: float) -> No
 
 
 def everybody(learners: tuple[SimulationClient, ...], scene: str, speed: float) -> None:
-    """All learners go to a scene, alone."""
+    """Moves all learners to a scene, without ghosts."""
     for learner in learners:
         learner.stop_ghost()
         learner.send(Load(SceneChoice(RunSpec(scene))))
@@ -140,23 +139,23 @@ def everybody(learners: tuple[SimulationClient, ...], scene: str, speed: float) 
 
 
 def shows(learner: SimulationClient, scene: str) -> bool:
-    """Whether a scene runs."""
+    """Whether a scene is running."""
     return learner.choice.run.scene == scene and runs(learner)
 
 
 def runs(learner: Simulation) -> bool:
-    """Whether some ticks of the scene have passed."""
+    """Whether the scene has run some ticks."""
     found = learner.read(lambda block, _: block.moment()[0])
     return found is not None and found > 0.01
 
 
 def megabytes() -> float:
-    """MB of the server, as it is."""
+    """MB of the server, without any collection before the measurement."""
     return round(1e-6 * psutil.Process().memory_info().rss, 1)
 
 
 def state(server: PageServer) -> dict[str, float]:
-    """What the server holds on to, once all pages are built and it had a moment to let go."""
+    """The state of the server after all pages were built and a moment passed without activity."""
     viewers = server._viser.get_clients().values()
     assert wait_until(
         lambda: all("/robot/1" in viewer.scene._handle_from_node_name for viewer in viewers), LONG
@@ -176,7 +175,7 @@ def state(server: PageServer) -> dict[str, float]:
 def judged(
     periods: list[Period], before: dict[str, float], after: dict[str, float], most: float
 ) -> list[str]:
-    """Sentences on what is over the figures."""
+    """Sentences about exceeded limits."""
     faults = [
         f"There were {before[name]:g} {name}, then {after[name]:g}."
         for name in ("processes", "blocks", "nodes", "controls")

@@ -1,4 +1,4 @@
-"""Where a control tick's time goes: reference, control step, telemetry, plant.
+"""The computing time of the parts of a control tick: reference, control step, telemetry, plant.
 
     python benchmarks/tick.py [SCENE] [TICKS]
 

@@ -1,12 +1,13 @@
-"""Who is not admitted reaches nothing, and who is silent or floods keeps nobody waiting: measured.
+"""Visitors without access reach nothing, and silent or flooding connections delay nobody: measured.
 
     python -m benchmarks.visitors [--silent 200] [--seconds 5] [--no-browser]
 
-Starts the real server in a process of its own and tries to come in as other sites do: with a foreign origin,
-`null`, another port's, a rebinding name, and with 40 sockets from a page of another site in Chromium. Then a
-page is open while so many silent connections (half without a request, half web sockets without a word) and
-one that sends as fast as it can are there, and a newcomer comes. Prints JSON; exit 0 if nothing of the first
-kind was read, started or lost, the newcomer was answered within 2 s and the page kept at least half its rate.
+Starts the real server in a process of its own and tries to connect as other sites do: with a foreign origin,
+`null`, another port's origin, a rebinding name, and with 40 sockets from a page of another site in Chromium.
+Then, while a page is open, many silent connections are opened (half without a request, half web sockets
+without a message) and one that sends as fast as it can, and a new visitor arrives. Prints JSON; exit code 0
+if nothing of the first kind was read, started or lost, the new visitor was served within 2 s and the page
+kept at least half its rate.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ _FOREIGN = """async ([url, protocol]) => {
 
 
 def serve(pipe: Any) -> None:
-    """The server's process: answers what it has seen until it is told to end."""
+    """The server's process: answers questions about its state until it is told to end."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=3, grace=600.0)
     pipe.send(server.link)
     while pipe.recv() == "seen":
@@ -70,7 +71,7 @@ def serve(pipe: Any) -> None:
 
 
 class Watched:
-    """An open page: counts the packets that come."""
+    """An open page that counts the packets which arrive."""
 
     def __init__(self, url: str) -> None:
         self.packets = 0
@@ -101,7 +102,7 @@ class Watched:
 
 
 def shake(url: str, host: str, origin: str) -> int:
-    """A handshake with a frame sent along; the status of the answer."""
+    """Sends a handshake together with a frame; returns the status of the response."""
     parts = urlsplit(url)
     lines = [
         f"GET /?{parts.query} HTTP/1.1",
@@ -121,7 +122,7 @@ def shake(url: str, host: str, origin: str) -> int:
 
 
 def strangers(url: str) -> dict[str, int]:
-    """The status each kind of other site gets, five times each."""
+    """The status that each kind of foreign site gets, five times each."""
     ours = urlsplit(url).netloc
     kinds = {
         "foreign origin": (ours, "https://evil.example"),
@@ -133,7 +134,7 @@ def strangers(url: str) -> dict[str, int]:
 
 
 def from_chromium(url: str) -> int:
-    """How many of 40 sockets a page of another site in Chromium gets open."""
+    """How many of 40 sockets a page of another site in Chromium can open."""
 
     class Quiet(http.server.BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -142,7 +143,7 @@ def from_chromium(url: str) -> int:
             self.wfile.write(b"<!doctype html><title>another site</title>")
 
         def log_message(self, format: str, *args: Any) -> None:
-            """Says nothing."""
+            """Prints nothing."""
 
     site = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet)
     threading.Thread(target=site.serve_forever, daemon=True).start()
@@ -162,7 +163,7 @@ def from_chromium(url: str) -> int:
 
 @contextlib.contextmanager
 def besieged(url: str, silent: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Silent connections, and one that floods from a process of its own."""
+    """Opens silent connections, and starts a process with one that floods the server."""
     parts = urlsplit(url)
     address = (parts.hostname or "", parts.port or 0)
     with contextlib.ExitStack() as stack:
@@ -184,7 +185,7 @@ def besieged(url: str, silent: int) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def flood(url: str) -> None:
-    """Sends as fast as it can; comes again when it is thrown out."""
+    """Sends as fast as possible, and connects again after each disconnection."""
     word = pack(camera())
     while True:
         with (
@@ -203,7 +204,8 @@ def _drain(connection: Any) -> None:
 
 
 def newcomer(url: str) -> float:
-    """s until a new page is answered: the document, the socket, the first packet after its first word."""
+    """Time, s, until a new page is served: the document, the socket, and the first packet after its first
+    message."""
     parts, cookie = urlsplit(url), let_in(url)
     began = time.monotonic()
     with socket.create_connection((parts.hostname or "", parts.port or 0), timeout=LONG) as plain:
@@ -246,7 +248,7 @@ def main() -> int:
     try:
         pages = [Watched(url), Watched(url)]
         wait_until(lambda: seen()["attached"] == 2, LONG)
-        pages.pop().close()  # one reloads: his place must be kept
+        pages.pop().close()  # one page reloads: its place must be reserved
         wait_until(lambda: seen()["attached"] == 1, LONG)
         page = pages[0]
         time.sleep(3.0)
@@ -270,7 +272,8 @@ def main() -> int:
             besieged_rate = page.rate(options.seconds)
             result["newcomer_s"] = [round(newcomer(url), 2) for _ in range(3)]
             besieged_rate = min(besieged_rate, page.rate(options.seconds))
-        # The page may still have been starting before, and the machine is shared: the better of both counts.
+        # The page may still have been starting before, and the machine is shared: the better of both rates
+        # counts.
         time.sleep(2.0)
         free = max(free, page.rate(options.seconds))
         result["packets_hz"] = {"free": round(free, 1), "besieged": round(besieged_rate, 1)}

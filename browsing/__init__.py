@@ -1,1 +1,1 @@
-"""A learner's hands in a real Chromium: what tests, benchmarks and the pictures of docs/ share."""
+"""Actions of a learner in a real Chromium, for tests, benchmarks and the pictures of docs/."""

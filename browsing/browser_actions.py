@@ -1,4 +1,4 @@
-"""A Chromium, and hands that find the controls viser draws."""
+"""A Chromium, and functions that find and use the controls that viser draws."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ SLOW = 60_000  # ms: WebGL in software on two shared cores
 BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
 
 SCALE = 0.25
-"""Pixels per CSS pixel where nobody looks at the picture."""
+"""Pixels per CSS pixel when nobody looks at the picture."""
 OFTEN, SELDOM = 80, 300
-"""ms between two pictures, where something is dragged in 3D and where nothing is."""
+"""Time between two pictures, ms: while something is dragged in the 3D view, and otherwise."""
 
 _RESTING = """(() => {
   const frame = window.requestAnimationFrame.bind(window);
@@ -71,9 +71,10 @@ def open_page(
     scale: float = SCALE,
     rest: int = SELDOM,
 ) -> Page:
-    """A fresh browser profile with the page loaded and the robot drawn; arguments as of `new_page`."""
+    """A fresh browser profile in which the page is loaded and the robot is drawn; arguments as for
+    `new_page`."""
     page = new_page(browser, width, height, scale, rest)
-    # viser draws no less than a pixel per CSS pixel unless it is told to.
+    # By default, viser draws at least one pixel per CSS pixel.
     load(page, url if scale >= 1 else f"{url}{'&' if urlsplit(url).query else '?'}fixedDpr={scale}")
     return page
 
@@ -125,7 +126,7 @@ def wait_for_scene(page: Page, node: str = "/actual") -> None:
 
 
 def row(page: Page, label: str) -> Locator:
-    """The row of a control: its label and its inputs."""
+    """The row that contains a control's label and inputs."""
     return page.locator(
         f'xpath=(//label[@for and normalize-space(.)="{label}"]'
         '/ancestor::div[contains(@class,"mantine-Flex-root")])[1]'
@@ -133,7 +134,7 @@ def row(page: Page, label: str) -> Locator:
 
 
 def set_number(page: Page, label: str, value: object) -> None:
-    """Types into the number box of a slider or a number input."""
+    """Types a value into the number box of a slider or a number input."""
     box = row(page, label).locator("input[type=text], input[inputmode]").last
     box.fill(str(value))
     box.press("Enter")
@@ -152,7 +153,7 @@ def write(page: Page, label: str, text: str) -> None:
 
 
 def pick(page: Page, label: str, option: str) -> None:
-    """Chooses from a menu."""
+    """Chooses an option of a menu."""
     row(page, label).locator("input").first.click()
     page.get_by_role("option", name=option, exact=True).first.click()
     page.wait_for_timeout(BETWEEN)
@@ -174,7 +175,7 @@ def key(page: Page, name: str) -> None:
 
 
 def position(page: Page, node: str) -> tuple[float, float, float]:
-    """Where the browser draws a node, in its parent's axes."""
+    """The position at which the browser draws a node, in its parent's frame."""
     found: Any = page.evaluate(
         "(n) => { const p = window.__viserMutable.nodeRefFromName[n].position; return [p.x, p.y, p.z]; }",
         node,
@@ -191,7 +192,7 @@ def is_drawn(page: Page, node: str) -> bool:
 
 
 def camera(page: Page) -> tuple[float, float, float]:
-    """Where the learner looks from, in the browser's own axes."""
+    """The position of the camera in the browser's own frame."""
     found: Any = page.evaluate(
         "() => { const p = window.__viserMutable.camera.position; return [p.x, p.y, p.z]; }"
     )
@@ -199,7 +200,7 @@ def camera(page: Page) -> tuple[float, float, float]:
 
 
 def sheet(page: Page) -> tuple[float, float]:
-    """Left and right edge of a phone's panel, pixels."""
+    """The left and right edge of the panel on a phone, pixels."""
     found: Any = page.evaluate(
         """() => { const r = [...document.querySelectorAll("div")].find((d) =>
              getComputedStyle(d).position === "fixed" && d.textContent.includes("Playback"))
@@ -209,7 +210,7 @@ def sheet(page: Page) -> tuple[float, float]:
 
 
 def target_position(page: Page, node: str = "/target/ball") -> tuple[float, float, float]:
-    """Where the browser draws the ball that a hand drags, in the world's axes."""
+    """The position at which the browser draws the target's ball, in world coordinates."""
     found: Any = page.evaluate(
         """(node) => { const m = window.__viserMutable;
              const world = (name) => { const n = m.nodeRefFromName[name]; n.updateWorldMatrix(true, false);
@@ -223,7 +224,7 @@ def target_position(page: Page, node: str = "/target/ball") -> tuple[float, floa
 
 @contextmanager
 def often(page: Page) -> Iterator[None]:
-    """Meanwhile pictures come quickly one after another."""
+    """Within this context pictures follow each other quickly."""
     before: Any = page.evaluate(
         "(rest) => { const before = window.picturesRest; window.picturesRest = rest; return before; }", OFTEN
     )
@@ -234,18 +235,19 @@ def often(page: Page) -> Iterator[None]:
 
 
 def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm: float = 0.18) -> None:
-    """Pulls the gizmo's arrow of a world axis by so many metres. arm: m, where the arrow is taken hold of."""
+    """Drags the gizmo's arrow of a world axis by a distance, m. arm: distance from the centre at which the
+    arrow is grabbed, m."""
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
     with often(page):
-        _see(page)  # a camera that was turned is so from the next picture on
+        _see(page)  # a change of the camera takes effect with the next picture
         start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
         end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
         _drag(page, start, end)
 
 
 def click_on(page: Page, node: str) -> None:
-    """Clicks on the middle of a mesh."""
+    """Clicks on the centre of a mesh."""
     middle = page.evaluate(
         """(node) => { let found = null;
              window.__viserMutable.nodeRefFromName[node].traverse((o) => {
@@ -264,7 +266,7 @@ def click_on(page: Page, node: str) -> None:
 
 
 def turn_target(page: Page, degrees: float) -> None:
-    """Pulls the ring about the target's own z axis."""
+    """Drags the ring around the target's own z axis."""
     radius = 0.16  # 0.65 of the gizmo's size for the iiwa
 
     def on_ring(angle: float) -> Any:
@@ -277,15 +279,15 @@ def turn_target(page: Page, degrees: float) -> None:
 
 
 def _see(page: Page) -> None:
-    """Waits until the next pictures are drawn, however long that takes, and at least a moment."""
+    """Waits until the next pictures are drawn, however long that takes, and for at least a moment."""
     page.evaluate(_PICTURES)
     page.wait_for_timeout(250)
 
 
 def _drag(page: Page, start: list[float], end: list[float]) -> None:
-    """In twelve steps, like a hand would."""
+    """Drags in twelve steps, as a hand would."""
     page.mouse.move(*start)
-    _see(page)  # the arrow must have noticed the mouse
+    _see(page)  # the arrow must have received the mouse event first
     page.mouse.down()
     for k in range(1, 13):
         page.mouse.move(*(s + (e - s) * k / 12 for s, e in zip(start, end, strict=True)))
@@ -295,7 +297,7 @@ def _drag(page: Page, start: list[float], end: list[float]) -> None:
 
 
 def eventually(page: Page, condition: Callable[[], bool], timeout: float = 40.0) -> bool:
-    """Whether the condition comes true; the browser goes on meanwhile."""
+    """Waits for a condition while the browser continues; returns whether it became true."""
     for _ in range(int(timeout / 0.1)):
         if condition():
             return True

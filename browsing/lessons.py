@@ -1,4 +1,4 @@
-"""How a learner goes through a lesson in the page: opens it, predicts, runs, reads, goes on."""
+"""Actions of a learner in a lesson on the page: open it, predict, run, read, continue."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RUN = 120_000  # ms for a scripted run on a busy machine
 
 
 def open_lesson(page: Page, lesson: Lesson) -> None:
-    """By its card in the list of all lessons."""
+    """Opens a lesson by its card in the list of all lessons."""
     label = f"{COURSE.index(lesson.name) + 1} · {lesson.card.title}"
     key(page, "l")
     page.locator(".mantine-Modal-content").get_by_role("button", name=label).click()
@@ -28,7 +28,7 @@ def title_of(part: Step | Challenge) -> str:
 
 
 def expect_part(page: Page, lesson: Lesson, part: Step | Challenge) -> None:
-    """The part is shown, and nothing of it has run."""
+    """Checks that a step is shown and that its run has not begun."""
     parts = parts_of(lesson)
     expect(page.get_by_text(f"{parts.index(part) + 1} of {len(parts)}")).to_be_visible(timeout=RUN)
     expect(page.get_by_text(title_of(part), exact=True).first).to_be_visible()
@@ -36,13 +36,13 @@ def expect_part(page: Page, lesson: Lesson, part: Step | Challenge) -> None:
 
 
 def predict(page: Page, prediction: Prediction) -> None:
-    """Says something, as the controls allow."""
+    """Enters a prediction with the controls that are shown."""
     if isinstance(prediction, Choice):
         press(page, "ABCDEFG"[prediction.tempting])
         expect(page.get_by_text("(your answer)")).to_be_visible()
         return
     label = f"at {prediction.until / 5:.2g} s" if isinstance(prediction, Sketch) else "My guess"
-    # Not by arrow keys: viser turns the camera with them, too.
+    # The arrow keys cannot be used: viser also turns the camera with them.
     track = row(page, label).locator(".mantine-Slider-trackContainer")
     box = track.bounding_box()
     assert box is not None
@@ -51,7 +51,7 @@ def predict(page: Page, prediction: Prediction) -> None:
 
 
 def hurry(page: Page) -> None:
-    """The run as fast as it goes."""
+    """Speeds up the run as far as possible."""
     box = row(page, "As fast as it goes").get_by_role("checkbox")
     if not box.is_checked():
         box.click()
@@ -59,11 +59,11 @@ def hurry(page: Page) -> None:
 
 
 def run(page: Page, button: str = "Run this step") -> None:
-    """Presses the button and waits for the end."""
+    """Presses the button and waits until the run has ended."""
     page.get_by_role("button", name=button, exact=True).click()
     expect(page.get_by_text("DONE", exact=True)).to_be_visible(timeout=RUN)
 
 
 def marks(page: Page, sign: str) -> Locator:
-    """The claims or goals with a mark: "✓", "✗" or "…"."""
+    """The claims or goals with a given mark: "✓", "✗" or "…"."""
     return page.get_by_text(sign, exact=True)

@@ -1,4 +1,4 @@
-"""Another scene on a page that is open: quicker than opening one."""
+"""Loads another scene on an open page, which is quicker than opening a new page."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from browsing.browser_actions import eventually, tab, wait_for_scene
 
 
 def show_scene(page: Page, learner: SimulationClient, choice: SceneChoice) -> None:
-    """Loads a torque-level scene, unless it is there, and waits for the page to be built anew."""
+    """Loads a torque-level scene, if it is not already loaded, and waits until the page is rebuilt."""
     if learner.choice == choice:
         return
-    tab(page, "Robot")  # a page that is built anew begins with another tab
+    tab(page, "Robot")  # a rebuilt page begins with another tab
     learner.send(Load(choice))
     assert eventually(page, lambda: learner.choice == choice)
     expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()

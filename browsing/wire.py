@@ -1,4 +1,4 @@
-"""A page without a browser: speaks viser's protocol and keeps what the page shows, but draws nothing."""
+"""A page without a browser: it uses viser's protocol and stores what the page shows, but draws nothing."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ _HEAD = 16  # bytes: sizes of the message part, raw and compressed
 
 
 def messages_of(raw: bytes) -> list[dict[str, Any]]:
-    """What one packet says; arrays stay behind as placeholders."""
+    """The messages in a packet; arrays are replaced by placeholders."""
     size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
     inner = zstandard.ZstdDecompressor().decompress(raw[_HEAD : _HEAD + packed], max_output_size=size)
     return msgspec.msgpack.decode(inner)["messages"]
 
 
 def pack(message: _messages.Message) -> bytes:
-    """As the server reads it."""
+    """Serialises messages for the server."""
     return msgspec.msgpack.encode(message.as_serializable_dict())
 
 
 def let_in(link: str) -> str:
-    """The cookie, as a browser sends it, that who opens a link of `PageServer` gets; "" if none is given."""
+    """The cookie that a browser gets and sends when it opens a link of `PageServer`; "" if the server sets
+    none."""
     parts = urlsplit(link)
     connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=30)
     connection.request("GET", f"/?{parts.query}")
@@ -41,7 +42,7 @@ def let_in(link: str) -> str:
 
 
 def nothing_kept(request: str) -> _messages.LocalStorageGetItemResponseMessage:
-    """A new browser's answer to what it keeps."""
+    """The answer of a new browser, which has stored nothing."""
     return _messages.LocalStorageGetItemResponseMessage(None, None, request)
 
 
@@ -82,25 +83,25 @@ class Wire:
         self._reader.join(5.0)
 
     def say(self, message: _messages.Message) -> None:
-        """What a browser would send."""
+        """Sends a message as a browser would."""
         self._socket.send(pack(message))
 
     def send(self, raw: bytes) -> None:
-        """Anything at all."""
+        """Sends arbitrary data."""
         self._socket.send(raw)
 
     def write(self, uuid: str, /, **updates: Any) -> None:
-        """Writes attributes of a control, as its input does with `value`."""
+        """Changes attributes of a control, as its input does with `value`."""
         self.say(_messages.GuiUpdateMessage(uuid, updates))
 
     def turn(self, node: str, xyzw: Sequence[float]) -> None:
-        """Turns rings in the 3D view to an orientation."""
+        """Rotates rings in the 3D view to an orientation."""
         x, y, z, w = (float(part) for part in xyzw)
         owner = self.controls_3d[node]
         self.say(_messages.TransformControlsUpdateMessage(node, (w, x, y, z), (0.0, 0.0, 0.0), owner))
 
     def press_key(self, hotkey: str) -> None:
-        """Triggers the command that has a key."""
+        """Triggers the command of a key."""
         found = next(uuid for uuid, each in self.commands.items() if each["hotkey"] == hotkey)
         self.say(_messages.CommandTriggerMessage(found))
 
@@ -110,11 +111,11 @@ class Wire:
         return next((uuid for uuid, each in shown if each["props"].get("label") == label), None)
 
     def folders(self, words: str) -> int:
-        """How many there ever were whose label begins with some words."""
+        """The number of folders so far whose label begins with the given words."""
         return sum(str(each["props"].get("label", "")).startswith(words) for each in list(self.made))
 
     def shows(self, text: str) -> bool:
-        """Whether a piece of text is among what the page shows."""
+        """Whether the page shows a text."""
         shown = [each for each in list(self.controls.values()) if each["props"].get("visible", True)]
         return any(text in str(each["props"].get("content", "")) for each in shown)
 
@@ -166,7 +167,7 @@ class Wire:
 
 
 def eventually(condition: Callable[[], bool], timeout: float = 40.0) -> bool:
-    """Whether a condition comes true."""
+    """Waits for a condition; returns whether it became true."""
     end = time.monotonic() + timeout
     while not condition():
         if time.monotonic() > end:
@@ -176,7 +177,7 @@ def eventually(condition: Callable[[], bool], timeout: float = 40.0) -> bool:
 
 
 def camera() -> _messages.ViewerCameraMessage:
-    """The first word of every page: with it the server takes it for one."""
+    """The first message of every page; the server then treats the client as a page."""
     return _messages.ViewerCameraMessage(
         wxyz=(1.0, 0.0, 0.0, 0.0),
         position=(2.0, -2.0, 1.5),

@@ -1,1 +1,2 @@
-"""What viser does not offer: its private parts behind functions of ours."""
+"""Access to viser's private attributes, wrapped in functions, for what viser's public interface does not
+offer."""

@@ -1,4 +1,4 @@
-"""Messages of which viser need not look at every number before it sends them."""
+"""Message classes that viser sends without converting every number in them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 
 @cache
 def fast(kind: type[Any]) -> type[Any]:
-    """The same kind of message, all of whose fields are Python's own numbers, words and tuples of them. A
-    robot that moves sends some hundred in a second. viser names a message by its class."""
+    """Returns a subclass of a message class whose fields hold only Python numbers, strings and tuples of
+    them. A moving robot sends about a hundred such messages per second. viser identifies a message by its
+    class name."""
     names = tuple(field.name for field in fields(kind))
 
     def as_serializable_dict(self: Any, _: object = None) -> dict[str, Any]:

@@ -1,6 +1,6 @@
-"""viser's private names: no other file touches them. `self_test` looks at each before anything is served.
+"""All uses of viser's private names. `self_test` checks each of them before the server starts.
 
-A seam that is gone is one clear sentence and no server, never a server without its door.
+If one of them is missing, the server does not start and prints one clear sentence.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ except ImportError as error:
     ) from None
 
 Guard = Callable[[Mapping[str, Any]], dict[str, Any]]
-"""From the keywords viser gives to websockets' `serve` to those we give."""
+"""From the keywords viser gives to websockets' `serve` to those that we give instead."""
 
 _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
 
 _UNSENT = 32_000
-"""Bytes that may wait in the machine's own buffer; its usual megabytes are seconds of old pictures."""
+"""Bytes that may wait in the socket's send buffer; the usual megabytes would hold seconds of old pictures."""
 
 _OF_MODULES = (
     (_messages, ("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage")),
@@ -66,12 +66,12 @@ _OF_A_SERVER = (
 
 
 def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
-    """A viser server that listens behind `guard`, opens no tunnel to strangers and never falls asleep. Raises
-    InputError if it cannot be guarded; then nothing listens."""
+    """Starts a viser server whose connections pass `guard`. It opens no public tunnel, and its senders always
+    wake up. Raises InputError, and listens nowhere, if `guard` cannot be installed."""
     self_test(guard)
-    # What strangers send wrong is no news for the terminal.
+    # Malformed requests of strangers are not logged on the terminal.
     warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
-    # viser greets with a panel of its own; we promise exactly one line.
+    # viser prints a greeting of its own; we promise exactly one line.
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
@@ -79,7 +79,7 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
         for path in _OF_A_SERVER:
             require(reaches(server, path), path)
         handlers = server._websock_server
-        # Any client could ask for a public tunnel to this machine, button or not.
+        # Any client could request a public tunnel to this machine, even without the button.
         for tunnel in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             handlers.unregister_handler(tunnel)
         _keep_awake(server)
@@ -90,14 +90,14 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """Ends it, silently."""
+    """Stops the server without printing anything."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 def self_test(guard: Guard) -> None:
-    """Whether viser is still the one we know, and refuses what a guard that is not open yet refuses: on a
-    server of its own that nothing stands behind, on this machine only. Raises InputError."""
+    """Checks that viser has all private names used here, and that a guard which is not yet open refuses
+    requests. It uses a temporary server on this machine that serves no page. Raises InputError."""
     for module, names in _OF_MODULES:
         for name in names:
             require(hasattr(module, name), name)
@@ -113,13 +113,13 @@ def self_test(guard: Guard) -> None:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[list[bool]]:
-    """Whatever viser serves meanwhile is served through `guard`. Yields one entry for each time, False where
-    `guard` did not fit: then every request is refused."""
+    """Servers that viser starts within this context pass `guard`. Yields a list with one entry per server:
+    False where `guard` could not be installed and every request is refused."""
     served: list[bool] = []
     plain = web.serve
 
     def serve(*given: Any, **keywords: Any) -> Any:
-        # Nothing may be raised here: viser would wait for its server for ever.
+        # After an exception here viser would wait for its server forever.
         try:
             if missing := [name for name in _NEEDED if name not in keywords]:
                 raise KeyError(*missing)
@@ -139,8 +139,8 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
 
 
 def _keep_awake(server: viser.ViserServer) -> None:
-    """Before a sender first sleeps; viser makes one for all clients and one for each, which then waits for
-    nothing after what woke it: a picture comes in one piece."""
+    """Replaces the wake-up events of viser's senders before they first wait: one sender serves all clients,
+    and each client has its own, which then sends at once, so that a picture arrives in one piece."""
     websockets, loop = server._websock_server, server.get_event_loop()
     websockets._broadcast_buffer.message_event = ThreadSafeEvent(loop)
 
@@ -152,7 +152,7 @@ def _keep_awake(server: viser.ViserServer) -> None:
 
 
 def senders(server: viser.ViserServer) -> list[asyncio.Event]:
-    """What wakes each of them: of all clients together, then of each."""
+    """The wake-up events of the senders: first the one for all clients, then one per client."""
     websockets = server._websock_server
     each = [one.message_buffer for one in list(websockets._client_state_from_id.values())]
     return [buffer.message_event for buffer in (websockets._broadcast_buffer, *each)]
@@ -162,31 +162,31 @@ def senders(server: viser.ViserServer) -> list[asyncio.Event]:
 
 
 def connection_of(server: viser.ViserServer, client: viser.ClientHandle) -> ServerConnection | None:
-    """What carries a client; None if it has left."""
+    """The web socket of a client; None if the client has left."""
     return server._websock_server._live_connections.get(client.client_id)
 
 
 def give_workers(client: viser.ClientHandle, workers: ThreadPoolExecutor) -> None:
-    """This client's callbacks run on `workers` from now on, where they keep no other client's waiting."""
+    """Runs this client's callbacks on `workers` from now on, so that they do not block other clients."""
     client.gui._thread_executor = workers
     client.scene._thread_executor = workers
 
 
 def unfinished_uploads(client: viser.ClientHandle) -> int:
-    """Bytes that have come of files that are not complete."""
+    """Number of bytes received so far of files whose upload is not complete."""
     return sum(one["transferred_bytes"] for one in list(client.gui._current_file_upload_states.values()))
 
 
 def forget_upload(client: viser.ClientHandle, transfer: str) -> None:
-    """Drops what has come of a file; parts of it that still come are dropped, too."""
+    """Discards what was received of a file; viser then also ignores the parts that still arrive."""
     client.gui._current_file_upload_states.pop(transfer, None)
 
 
 async def read_storage(
     client: viser.ClientHandle, keys: Sequence[str], timeout: float
 ) -> tuple[str | None, ...]:
-    """What the browser keeps under each key; None where it keeps nothing, may not say, or does not answer in
-    so many seconds. Waits on the loop, where it keeps nobody else waiting."""
+    """The value that the browser stores under each key; None if there is no value, if the browser may not
+    tell, or if it does not answer within `timeout` seconds. Waits without blocking the event loop."""
     connection = client._websock_connection
     loop = asyncio.get_running_loop()
     asked: dict[str, asyncio.Future[str | None]] = {uuid.uuid4().hex: loop.create_future() for _ in keys}
@@ -213,30 +213,29 @@ def run_script(client: viser.ClientHandle, source: str) -> None:
 
 
 def waiting(client: viser.ClientHandle) -> int:
-    """Messages that its line has not taken yet."""
+    """Number of messages that are queued for this client."""
     return len(client._websock_connection.get_message_buffer().message_from_id)
 
 
 def keep_short(server: viser.ViserServer, client: viser.ClientHandle) -> None:
-    """Lets the line take no more than it soon delivers, so that what waits can still be replaced by what is
-    newer."""
+    """Limits the socket's send buffer, so that messages which still wait can be replaced by newer ones."""
     live = connection_of(server, client)
     if live is None or not hasattr(socket, "TCP_NOTSENT_LOWAT"):
         return
     line = live.transport.get_extra_info("socket")
-    with contextlib.suppress(OSError):  # gone already
+    with contextlib.suppress(OSError):  # the client has already left
         line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT)
 
 
 # ---------------------------------------------------------------- what a browser says
 
 Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
-"""Takes a message, and what hands one on to viser."""
+"""Receives a message, and a function that passes a message on to viser."""
 
 
 def intercept(client: viser.ClientHandle, take: Inlet) -> None:
-    """Every message of this browser goes to `take` first, and what its callbacks raise comes back there: of
-    those of the 3D view viser would print it."""
+    """Passes every message of this browser to `take` first. Exceptions of callbacks return to `take`, too;
+    viser would only print those of the 3D view."""
     connection, scene = client._websock_connection, client.scene
     plain = connection._handle_incoming_message
 
@@ -251,8 +250,8 @@ Kind = Literal["write", "upload", "other"]
 
 
 def kind_of(message: Any) -> Kind:
-    """Whether it changes a control (`uuid`, `updates`), begins a file (for `source_component_uuid`), or is
-    anything else."""
+    """The kind of a message: it writes to a control (`uuid`, `updates`), begins an upload (for the control
+    `source_component_uuid`), or does anything else."""
     match message:
         case _messages.GuiUpdateMessage():
             return "write"
@@ -266,7 +265,7 @@ def kind_of(message: Any) -> Kind:
 
 
 def control_of(client: viser.ClientHandle, uuid: object) -> viser.GuiInputHandle[Any] | None:
-    """A control of this page that is still there."""
+    """The control with this identifier; None if the page does not have it any more."""
     found = client.gui._gui_input_handle_from_uuid.get(uuid) if isinstance(uuid, str) else None
     return None if found is None or found._impl.removed else found  # pyright: ignore[reportReturnType]
 
@@ -277,24 +276,25 @@ def dom_id(handle: viser.GuiInputHandle[Any] | viser.GuiUploadButtonHandle) -> s
 
 
 def send_again(handle: viser.GuiInputHandle[Any]) -> None:
-    """The control's value once more; assigning it would send nothing, since viser knows it already."""
+    """Sends the control's present value again. An assignment would send nothing, as viser knows this
+    value."""
     control = handle._impl
     update = _messages.GuiUpdateMessage(control.uuid, {"value": control.value})
     control.gui_api._websock_interface.queue_message(update)
 
 
 def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> None:
-    """New curves for a chart, abscissas first, as they are; assigning them would send double precision."""
+    """Sends new curves to a chart, abscissas first, without conversion; an assignment would send float64."""
     chart._queue_update("data", tuple(np.ascontiguousarray(each) for each in arrays))
 
 
 def shift(node: viser.SceneNodeHandle, at: np.ndarray) -> None:
-    """Moves a node, (3,) m; assigning compares at length with what was."""
+    """Moves a node to `at`, (3,) m, without the slow comparison with its old position that viser makes."""
     node._impl.position[:] = at
     node._impl.api._queue_scene_message(fast(_messages.SetPositionMessage)(node.name, tuple(at.tolist())))
 
 
 def turn(node: viser.FrameHandle, to: np.ndarray) -> None:
-    """Turns a node, wxyz."""
+    """Sets the orientation of a node, a quaternion wxyz."""
     node._impl.wxyz[:] = to
     node._impl.api._queue_scene_message(fast(_messages.SetOrientationMessage)(node.name, tuple(to.tolist())))

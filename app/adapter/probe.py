@@ -1,4 +1,4 @@
-"""What the test of viser's seams asks."""
+"""Helpers with which `private.self_test` checks viser's private names."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from robots import InputError
 
 
 def answer(port: int) -> bytes:
-    """How a request to this machine is answered, from its beginning."""
+    """The first bytes of a server's response to an HTTP request from this machine."""
     with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
         stranger.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         return stranger.recv(100)
 
 
 def refuse(connection: ServerConnection, _: Request) -> Response:
-    """Lets nobody in."""
+    """Refuses every request with status 503."""
     return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
 
 
 def reaches(start: object, path: str) -> bool:
-    """Whether there is something at a dotted path."""
+    """Whether an object has the attribute at a dotted path."""
     for name in path.split("."):
         try:
             start = getattr(start, name)
@@ -35,7 +35,7 @@ def reaches(start: object, path: str) -> bool:
 
 
 def require(found: bool, what: str) -> None:
-    """Raises InputError unless a seam was found: nothing is served then."""
+    """Raises InputError if a check failed; the server does not start then."""
     if not found:
         raise InputError(
             f"viser {viser.__version__} is not the one this page was made for ({what} has changed): it is "

@@ -1,4 +1,5 @@
-"""What callbacks raise: a page may be built anew while one of its controls' still runs, and is late."""
+"""Exceptions of callbacks. A callback may still run while its page is rebuilt, and write to a removed
+control."""
 
 from __future__ import annotations
 
@@ -13,13 +14,13 @@ _LATE = " on a removed "
 
 
 def is_removed_handle_error(error: BaseException) -> bool:
-    """Whether an exception is viser's refusal of a write to a control or node that was removed. Nobody
-    sees it any more, so nothing is missed."""
+    """Whether an exception is viser's refusal to write to a removed control or node. It can be ignored, as
+    the page does not show that control or node any more."""
     return isinstance(error, RuntimeError) and _LATE in str(error)
 
 
 def unless_removed(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    """What a function gives; None if what it wrote to is gone meanwhile."""
+    """Calls a function and returns its result; None if the function wrote to a removed control or node."""
     try:
         return fn(*args, **kwargs)
     except RuntimeError as error:
@@ -29,13 +30,13 @@ def unless_removed(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
 
 
 def print_exception(future: Future[Any]) -> None:
-    """Done-callback: an exception in a thread of its own is not lost."""
+    """Callback for a finished future: prints the exception of a thread, which would otherwise be lost."""
     if not future.cancelled() and (error := future.exception()) is not None:
         traceback.print_exception(error, file=sys.stderr)
 
 
 async def call(back: Callable[[Any], Any], event: Any, threads: Executor) -> None:
-    """Calls a callback, on the loop if it is a coroutine's; what that raises is raised."""
+    """Calls a callback, on the event loop if it is a coroutine function. Exceptions are passed on."""
     if inspect.iscoroutinefunction(back):
         await back(event)
     else:

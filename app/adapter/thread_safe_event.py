@@ -1,4 +1,4 @@
-"""What wakes viser's sender, whichever thread writes."""
+"""An event that wakes viser's sender from any thread."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import contextlib
 
 
 class ThreadSafeEvent(asyncio.Event):
-    """An event that is set on its loop only.
+    """An asyncio event that is always set on its event loop.
 
-    asyncio's own may not be set elsewhere, and viser 1.1 sets its sender's from whatever thread writes, and
-    then asks the loop to set it, too. Once in hours that falls between the sender's last look and its sleep.
-    The event is set then, its sender asleep, and what is set already wakes nobody: the page stands still for
-    good. So what another thread sets is left to the loop; a picture of many messages then wakes it once.
+    asyncio's own event may only be set on its loop. viser 1.1 sets the event of its sender from any thread,
+    and then asks the loop to set it as well. Once in some hours this falls between the sender's last check
+    and its wait: the event is then set although the sender waits, setting it again wakes nobody, and the page
+    stands still for good. This class lets the loop do it whenever another thread sets the event. A picture of
+    many messages then wakes the sender once.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -20,6 +21,6 @@ class ThreadSafeEvent(asyncio.Event):
         self._home = loop
 
     def set(self) -> None:
-        with contextlib.suppress(RuntimeError):  # a thread without a loop
+        with contextlib.suppress(RuntimeError):  # the thread has no event loop
             if asyncio.get_running_loop() is self._home:
                 super().set()

@@ -1,1 +1,1 @@
-"""The page's side of a simulation: what it was told, a learner, a ghost."""
+"""The page's side of a simulation: its reports, its learner and its ghost."""

@@ -1,4 +1,4 @@
-"""Curves without the points that nobody would miss."""
+"""Reduces the number of points of curves without a visible change."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ _LEVELS = (2, 4, 8, 16, 32)
 
 
 def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
-    """Which points of some curves are needed to draw them all.
+    """Which points are needed to draw some curves within a tolerance.
 
-    Points lie at equal distances. Of a block of 2, 4, … 32 only the ends are kept where every curve is
-    as good as straight. Blocks are aligned to the points' numbers: of curves that slide past, the same points
-    are left out from picture to picture, and nothing shimmers.
+    The points are equally spaced. Of a block of 2, 4, … 32 points only the two ends are kept if every curve
+    is nearly straight within it. Blocks are aligned to the points' numbers, so that a scrolling curve loses
+    the same points in every picture and does not shimmer.
 
     Args:
         curves: (k, m), finite.
-        tolerance: how far a curve may then be from what it was, in the curves' unit.
+        tolerance: largest deviation from the original curve, in the curves' unit.
         phase: number of the first point.
 
     Returns:
@@ -34,7 +34,8 @@ def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray
             break
         end = start + blocks * size
         middle, ends = curves[:, start + half : end : size], curves[:, start : end + 1 : size]
-        # A curve is off its half's chord, and that off the block's, by most in the middle: at worst by both.
+        # A curve is farthest from the chord of its half, and this chord from the chord of the block, near the
+        # middle: at worst the two distances add up.
         halves = bent[:, (start - first) // half :][:, : 2 * blocks]
         bent = np.maximum(halves[:, ::2], halves[:, 1::2])
         bent += np.abs(middle - 0.5 * (ends[:, :-1] + ends[:, 1:]))
@@ -44,6 +45,6 @@ def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray
 
 
 def _straight(curves: np.ndarray, tolerance: float) -> bool:
-    """Whether all of them are as good as their chords."""
+    """Whether all curves are within the tolerance of their chords."""
     first, share = curves[:, :1], np.arange(curves.shape[1]) / max(1, curves.shape[1] - 1)
     return bool((np.abs(curves - first - (curves[:, -1:] - first) * share) <= tolerance).all())

@@ -1,4 +1,4 @@
-"""The last minute of telemetry, thinned for plots so that no spike is lost."""
+"""The last minute of telemetry, reduced for plots. Short peaks are kept."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ _AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
 _SLOTS = round((KEPT + WINDOW) / _SPAN)
 _HELD = round(
     1.0 / _SPAN
-)  # buckets without a row of their own that show the one before: a slow rate's period
+)  # buckets without a row that show the bucket before them: the period of a slow controller
 
 Take = Callable[[np.ndarray], None]
 
 
 class History:
-    """Per bucket of simulated time and per column: the least and the greatest value, in the order they came,
+    """For each bucket of simulated time: each column's minimum and maximum, in the order in which they came,
     and the bucket's last row.
 
-    A row counts until the next one comes: of a controller slower than the buckets there is none in between.
-    Buckets are aligned to simulated time, so that a curve slides instead of shimmering, and two robots on one
-    clock have the same buckets. Each row is looked at once, whatever the window. A reset, which turns the
-    time back, drops the curves: a jump in a curve would look like a motion.
+    A row is valid until the next one: a controller that is slower than the buckets leaves some without a row.
+    Buckets are aligned to simulated time, so that a curve scrolls without shimmering and two robots on one
+    clock have the same buckets. Each row is read once, whatever the window. A reset, which sets the time
+    back, clears the curves: otherwise a jump would look like a motion.
     """
 
     def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
-        """takers: are given every portion of rows of one run, too."""
+        """takers: objects that also receive each portion of rows of a run."""
         self.layout = layout
         self.latest = np.full(layout.size, np.nan)
         self.bound_ticks = np.zeros((layout.fields["at_bound"].stop - layout.fields["at_bound"].start, 3))
@@ -48,14 +48,14 @@ class History:
         self._t = layout.fields["t"].start
         self._before = self._count = 0
         self._numbers = np.full(_SLOTS, -1)
-        # Not filled, see `RowHistory`: a slot counts only under its number.
+        # The memory is not initialised, see `RowHistory`: a slot counts only under its own number.
         self._pairs = np.empty((_SLOTS, 2, layout.size))
         self._lasts = np.empty((_SLOTS, layout.size))
         self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
-        self._first = np.full(layout.size, np.nan)  # of the open bucket, for the order of the pair
+        self._first = np.full(layout.size, np.nan)  # the open bucket's first row
 
     def under(self, block: Block, layout: Layout, *takers: Take) -> History:
-        """The same curves as another layout has them: the run goes on under another stack."""
+        """The same curves in the layout of another stack; the run continues with that stack."""
         from himpc.telemetry import relaid
 
         def moved(rows: np.ndarray) -> np.ndarray:
@@ -73,11 +73,11 @@ class History:
 
     @property
     def count(self) -> int:
-        """Rows seen or lost so far."""
+        """Number of rows read or lost so far."""
         return self._before + self._count
 
     def pull(self) -> int:
-        """Takes over what was written since the last pull; returns how many rows."""
+        """Reads the rows that were written since the last call; returns their number."""
         start, rows = self._block.since(self._count)
         if not len(rows):
             return 0
@@ -90,7 +90,7 @@ class History:
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1].copy()  # not a view, which would keep all of them
+        self.latest = rows[-1].copy()  # a copy, since a view would keep all rows in memory
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         for k in range(3):
@@ -106,7 +106,8 @@ class History:
             take(rows)
 
     def _hold(self, until: int) -> None:
-        """Fills the buckets since the newest one up to another one, which is left out."""
+        """Fills the buckets from the newest one up to, not including, another one with the values of the
+        newest."""
         before = self.bucket % _SLOTS
         if self.bucket < 0 or until - self.bucket > _HELD:
             return
@@ -134,7 +135,7 @@ class History:
         return slot
 
     def window(self, until: float | None = None) -> PlotWindow:
-        """What the plots show when the clock reads `until` (s); None: now."""
+        """The curves for the plots at the simulated time `until` (s); None: the present time."""
         end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
         wanted = np.arange(end - BUCKETS + 1, end + 1)
         wanted[(wanted > self.bucket) & (wanted <= self.bucket + _HELD)] = self.bucket
@@ -144,20 +145,20 @@ class History:
         return PlotWindow(self.layout, 2 * (end - BUCKETS + 1), known, slots, self._pairs, self._bits)
 
     def at(self, t: float) -> np.ndarray:
-        """The row that was the newest one when the clock read t (s), as near as is known."""
+        """The newest row at the simulated time t (s), as precisely as the history stores it."""
         bucket = int(np.floor(t / _SPAN - 1e-6))
         slot = bucket % _SLOTS
         return self._lasts[slot].copy() if bucket >= 0 and self._numbers[slot] == bucket else self.latest
 
     def forget(self) -> None:
-        """Drops everything, for after a reset."""
+        """Deletes all data; used after a reset."""
         self._numbers[:] = -1
         self.bucket = -1
         self.bound_ticks[:] = 0
 
 
 class PlotWindow:
-    """What the plots show at one moment: BUCKETS pairs, oldest first."""
+    """The curves of the plots at one moment: BUCKETS pairs of values, oldest first."""
 
     def __init__(
         self,
@@ -168,7 +169,7 @@ class PlotWindow:
         pairs: np.ndarray,
         bits: np.ndarray,
     ) -> None:
-        """first: number of the oldest value since the run began; it may be negative."""
+        """first: number of the oldest bucket, counted from the start of the run; it may be negative."""
         self.layout = layout
         self.first = first
         self._known, self._slots = known, slots
@@ -180,17 +181,17 @@ class PlotWindow:
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        # A plot asks for ten columns: taken together they cost as much as two.
+        # A plot reads about ten columns; reading them together takes as long as reading two one by one.
         rows = self._pairs[self._slots]
         rows[~self._known] = np.nan
         return rows.reshape(2 * BUCKETS, -1)
 
     def at_bound(self, kind: int) -> np.ndarray:
-        """(2 · BUCKETS, n) whether a joint was at its torque (0), velocity (1) or position (2) bound."""
+        """(2 · BUCKETS, n) whether each joint was at its torque (0), velocity (1) or position (2) bound."""
         hit = (self._bits[self._slots] & (1 << kind) != 0) & self._known[:, None]
         return np.repeat(hit, 2, axis=0)
 
     @staticmethod
     def ages() -> np.ndarray:
-        """(2 · BUCKETS,) seconds before the window's end, ≤ 0."""
+        """(2 · BUCKETS,) times before the end of the window, s, ≤ 0."""
         return _AGES.copy()

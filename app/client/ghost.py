@@ -1,4 +1,4 @@
-"""The page's handle of a ghost: a second robot that does the same with other settings."""
+"""The page's handle of a ghost: a second robot that runs the same scene with other settings."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from app.link.process import Process
 from app.link.spares import Spares
 
 LEAD = 0.2
-"""s of simulated time that the robot may be ahead of its ghost. A ghost that cannot keep up slows both down,
-and the page says so: one that lagged behind would look like one that follows its target badly."""
+"""Simulated time, s, that the robot may be ahead of its ghost. If the ghost cannot keep up, both slow down,
+and the page says so: a ghost that lags would look like one that tracks its target badly."""
 
 
 @final
 class GhostClient(Simulation):
-    """A process that follows. It begins where the first script says, and what it tells of the time it has
-    come to tells its leader how far it may go."""
+    """The process of a ghost that follows a leader. The ghost starts where the first `Script` report says. It
+    reports the time that it has reached, which limits how far its leader may go ahead."""
 
     who = "The ghost"
 
@@ -31,23 +31,23 @@ class GhostClient(Simulation):
         reached: Callable[[float], None],
         lost: Callable[[GhostClient, str], None],
     ) -> None:
-        """words: what it is, for the legend; own: assignments "PATH=VALUE" on top of the leader's settings;
-        reached: told the time it has come to, s; lost: told why there is no ghost (any more). Both are called
-        on a thread of the process."""
+        """words: name for the legend; own: assignments "PATH=VALUE" on top of the leader's settings; reached:
+        called with the time that the ghost has reached, s; lost: called with a sentence when the ghost cannot
+        start or has ended. Both are called on a thread of the process."""
         self.words, self.own = words, own
         self._reached, self._lost = reached, lost
         self._told_at: float | None = None
         super().__init__(spares)
 
     def hear(self, script: Script) -> None:
-        """Passes on what the leader told."""
+        """Passes a report of the leader on to the ghost."""
         if self._told_at is None:
             self._told_at = time.monotonic()
         self.send(FollowLeader(script, self.own))
 
     @property
     def quiet(self) -> float:
-        """As `Simulation.quiet`; before it was told anything it has nothing to say."""
+        """As `Simulation.quiet`; 0 before the ghost has received its first command."""
         return 0.0 if self._told_at is None else min(super().quiet, time.monotonic() - self._told_at)
 
     def _heard(self, process: Process, report: Report) -> None:

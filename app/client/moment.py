@@ -1,4 +1,4 @@
-"""What the page shows: one instant of a run, now or up to a minute ago, with the ghost as it was then."""
+"""What the page shows: one instant of a run, now or up to a minute ago, with the ghost at that instant."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from app.client.simulation_client import SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
-_FAR = 0.5  # s: a ghost further behind is not waited for with the picture
+_FAR = 0.5  # s: the picture does not wait for a ghost that is further behind
 
 
 @dataclass(frozen=True, eq=False)
 class GhostState:
-    """The ghost at that instant; see `Moment`."""
+    """The ghost at an instant; see `Moment`."""
 
     poses: np.ndarray
     window: PlotWindow
@@ -27,7 +27,7 @@ class GhostState:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """One instant.
+    """One instant of a run.
 
     Attributes:
         t: s.
@@ -51,7 +51,7 @@ class Moment:
 
 
 def moment_of(learner: SimulationClient, past: float | None, curves: bool = True) -> Moment | None:
-    """The instant to show, after taking over what is new; None while nothing was reported yet.
+    """The instant that the page shows, after new data were read; None before the first report.
 
     Args:
         learner: whose.
@@ -63,15 +63,15 @@ def moment_of(learner: SimulationClient, past: float | None, curves: bool = True
     ghost = learner.ghost
     beside = None if ghost is None else ghost.look(curves)
     if ghost is not None and (ghost.ready is None or ghost.ready.choice != learner.choice):
-        beside = None  # still the ghost of another scene
+        beside = None  # the ghost still belongs to another scene
     status = learner.status
     if t is None or status is None:
         return None
     if past is not None:
         t = past
     elif beside is not None and 0.0 < t - beside < _FAR:
-        t = beside  # a ghost shown later than the robot would look like one that follows badly
-    # Within `read` no other scene can come between what belongs together.
+        t = beside  # a ghost shown later than the robot would look like one that tracks badly
+    # Within `read` no other scene can be loaded between data that belong together.
     shown = t
     found = learner.read(
         lambda _, history: (

@@ -1,4 +1,4 @@
-"""What the page has asked for and not yet heard back."""
+"""Edits that the page has sent and that the session has not yet confirmed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from lessons.events import Event
 
 HOLD = 0.8
-"""s during which a control that was just touched is not overwritten: the session's answer is on its way."""
+"""s during which a control that was just used keeps its value: the session's answer is still on its way."""
 
 Send = Callable[["Event"], None]
 """Puts an event into the session's mailbox."""
@@ -19,8 +19,8 @@ T = TypeVar("T")
 
 
 class PendingEdit(Generic[T]):
-    """What was last asked for, as long as the session's answer may be on its way. A second key press or
-    click in that time builds on the first instead of on what the page still shows."""
+    """The edit that was sent last, as long as the session's answer may be on its way. A second key press or
+    click within that time builds on this edit instead of on the old value that the page still shows."""
 
     def __init__(self) -> None:
         self._asked: tuple[float, T] | None = None
@@ -30,7 +30,7 @@ class PendingEdit(Generic[T]):
         return value
 
     def now(self, shown: T) -> T:
-        """The wish, or what is shown if it was long ago."""
+        """The last edit if it is recent, otherwise the value that is shown."""
         if self._asked is None or time.monotonic() - self._asked[0] > HOLD:
             return shown
         return self._asked[1]

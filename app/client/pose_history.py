@@ -1,4 +1,4 @@
-"""The last minute of a robot's motion, to look back at."""
+"""The last minute of a robot's motion, for looking back."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.client.decimated import KEPT
 from app.link.messages import Status
 
 RATE = 30.0
-"""Frames kept per simulated second."""
+"""Frames that are kept per simulated second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,21 +25,21 @@ class Frame:
 
 
 class PoseHistory:
-    """Frames in order of time, no older than a minute of simulated time. A reset empties it."""
+    """Frames in order of time, at most one minute of simulated time. A reset deletes them."""
 
     def __init__(self) -> None:
         self._frames: list[Frame] = []
 
     def add(self, frame: Frame) -> None:
-        """The newest moment. It takes the place of the one before if that is closer than 1/RATE to its own
-        predecessor, so that slow motion needs no more room."""
+        """Adds the newest frame. It replaces the previous frame if that one is closer than 1/RATE to its own
+        predecessor, so that slow motion needs no more memory."""
         frames = self._frames
         if frames and frame.t < frames[-1].t:
             frames.clear()
         if len(frames) > 1 and frames[-1].t - frames[-2].t < 1 / RATE - 1e-9:
             frames.pop()
         frames.append(frame)
-        # By time, not by number: a busy machine gives fewer frames a second.
+        # The limit is a time, not a number of frames: a busy machine gives fewer frames per second.
         del frames[: self._index(frame.t - KEPT)]
 
     def clear(self) -> None:
@@ -47,14 +47,15 @@ class PoseHistory:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Times of the first and the last frame that can be shown, s; (0, 0) if there is none."""
+        """Times of the first and the last frame that can be shown, s; (0, 0) if there are none."""
         if not self._frames:
             return 0.0, 0.0
         last = self._frames[-1].t
         return max(self._frames[0].t, last - KEPT), last
 
     def at(self, t: float) -> Frame | None:
-        """The moment t: poses between those of the two frames around it, the earlier one's report."""
+        """The frame at time t: poses interpolated between the two nearest frames, with the report of the
+        earlier one."""
         if not self._frames:
             return None
         k = self._index(t)
@@ -66,7 +67,7 @@ class PoseHistory:
         return Frame(t, _between(before.poses, after.poses, share), before.status)
 
     def between(self, start: float, end: float) -> Iterator[Frame]:
-        """Frames from `start` to `end`, s."""
+        """The frames from `start` to `end`, s."""
         return iter(self._frames[self._index(start) : self._index(end)])
 
     def _index(self, t: float) -> int:
@@ -74,7 +75,8 @@ class PoseHistory:
 
 
 def _between(before: np.ndarray, after: np.ndarray, share: float) -> np.ndarray:
-    # A quaternion and its negative are the same turn; frames are close, so a chord will do for the arc.
+    # q and −q are the same rotation. Frames are close, so linear interpolation is good enough for
+    # quaternions.
     near = np.where((before[:, 3:] * after[:, 3:]).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     there = np.hstack([after[:, :3], near * after[:, 3:]])
     found = (1 - share) * before + share * there

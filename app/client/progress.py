@@ -9,12 +9,12 @@ from lessons.replay.progress import HandedIn, LearnerProgress, kept, written
 
 
 class Notebook:
-    """The progress of the learner at this page, written down whenever it grows."""
+    """The progress of the learner at this page. It is stored in the browser whenever it grows."""
 
     def __init__(
         self, progress: LearnerProgress, save: Callable[[str], None], key: bytes | None = None
     ) -> None:
-        """key: of the lab, which signs what it writes."""
+        """key: the lab's key, which signs the progress."""
         self.progress = progress
         self._save, self._key = save, key
 
@@ -28,6 +28,7 @@ class Notebook:
             self._save(kept(progress, self._key))
 
     def to_hand_in(self, name: str, code: str) -> str:
-        """What was done so far as a text. code: of the setting on the page."""
+        """The progress so far as a text that can be handed in. code: state code of the setting on the
+        page."""
         now = datetime.now(UTC).isoformat(timespec="seconds")
         return written(HandedIn(name, now, self.progress, code), self._key)

@@ -1,4 +1,4 @@
-"""Rows kept for export: exact ones, but not every one."""
+"""Telemetry rows that are kept for export: exact values at a reduced rate."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from himpc.telemetry import Layout
 
 RATE = 100.0
-"""Rows kept per simulated second."""
+"""Rows that are kept per simulated second."""
 MOST = 12_000
-"""Rows kept of a whole run. One that is longer keeps every second, fourth, … of them."""
+"""Largest number of rows kept of a whole run. A longer run keeps every second, fourth, … of them."""
 
 
 class RowHistory:
@@ -38,7 +38,7 @@ class RowHistory:
         self._last = -np.inf
 
     def under(self, layout: Layout) -> RowHistory:
-        """The same rows as another layout has them: the run goes on under another stack."""
+        """The same rows in the layout of another stack; the run continues with that stack."""
         from himpc.telemetry import relaid
 
         new = RowHistory(layout)
@@ -52,7 +52,7 @@ class RowHistory:
         return new
 
     def take(self, rows: np.ndarray) -> None:
-        """Rows in order; a time that goes back begins a new run."""
+        """Takes rows in order of time; a time that is earlier than the last one begins a new run."""
         times = rows[:, self._t]
         if times[0] < self._last:
             self._clear()

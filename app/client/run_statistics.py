@@ -1,4 +1,4 @@
-"""How well a run has done since its last reset: running sums over every tick, none left out."""
+"""How well a run has gone since its last reset: running sums over every tick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunFigures:
-    """How well a run went.
+    """Figures of a run.
 
     Attributes:
         seconds: of the run.
@@ -36,7 +36,7 @@ _DECADES = 8  # from 1 µs
 
 
 class RunStatistics:
-    """Takes portions of rows in order; `clear` where a run begins."""
+    """Takes portions of rows in order; `clear` begins a new run."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
@@ -83,7 +83,7 @@ class RunStatistics:
         return float(finite.max()) if finite.size else 0.0
 
     def result(self) -> RunFigures | None:
-        """None before the first row."""
+        """The figures so far; None before the first row."""
         if not self._ticks:
             return None
         return RunFigures(
@@ -99,6 +99,6 @@ class RunStatistics:
         )
 
     def _quantile(self, share: float) -> float:
-        """ms below which this share of the control steps were."""
+        """The time in ms that the given share of the control steps stayed below."""
         index = int(np.searchsorted(np.cumsum(self._times), share * self._ticks))
         return 1e-3 * float(10 ** ((index + 0.5) / _PER_DECADE))

@@ -1,4 +1,4 @@
-"""A simulation process and what is known about it."""
+"""The page's handle of a simulation process, with everything that the process has reported."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _COMPLAIN = 2.0  # s between two notices that commands are lost
 
 
 class Simulation(ABC):
-    """Owns a process and knows what it told. Reports arrive on the process' thread; the page reads the fields
+    """Owns a process and stores its reports. Reports arrive on the process' thread; the page reads the fields
     from its own loop. `changed` counts scenes and restarts: the page rebuilds itself when it differs."""
 
     who: str
-    """Begins the sentences about it."""
+    """The words with which sentences about this simulation begin."""
 
     def __init__(self, spares: Spares) -> None:
         self.ready: Ready | None = None
@@ -68,7 +68,8 @@ class Simulation(ABC):
         return self._process.pid
 
     def send(self, command: Command) -> None:
-        """Never waits. A command for which there is no room is dropped, and a notice says so."""
+        """Sends a command without waiting. A command that does not fit into the queue is dropped, with a
+        notice."""
         process = self._process
         if process.send(command) or not process.alive or time.monotonic() < self._next_complaint:
             return
@@ -80,11 +81,11 @@ class Simulation(ABC):
 
     @property
     def quiet(self) -> float:
-        """s since the process said anything."""
+        """Time since the process last reported anything, s."""
         return time.monotonic() - self._process.heard_at
 
     def trouble(self) -> Trouble | None:
-        """What is the matter, if anything is."""
+        """The problem that the page should show; None if there is none."""
         if self.failure is not None:
             return Trouble("STOPPED", self.failure)
         return trouble_of(self._process, self._loading, self.quiet, self.who)
@@ -113,7 +114,7 @@ class Simulation(ABC):
 
     @abstractmethod
     def _heard(self, process: Process, report: Report) -> None:
-        """What else a report leads to, whichever process it came from; on the thread of that process."""
+        """Handles the other effects of a report, on the thread of the process that sent it."""
 
     def _enter(self, ready: Ready) -> None:
         record, history = self.record, self._history
@@ -138,34 +139,35 @@ class Simulation(ABC):
             block.close()
 
     def take_messages(self) -> tuple[list[str], list[str]]:
-        """(refusals, notices) since the last call."""
+        """(refusals, notices) that arrived since the last call."""
         with self._lock:
             refusals, self._refusals = self._refusals, []
             notices, self._notices = self._notices, []
             return refusals, notices
 
     def settings_of(self, ready: Ready) -> SceneSettings:
-        """The settings of a scene that came in: the newest ones, unless another scene came in since."""
+        """The settings of a loaded scene: the newest ones, unless another scene was loaded since."""
         with self._lock:
             return ready.settings if self.settings is None or self.ready is not ready else self.settings
 
     # ---------------------------------------------------------------- telemetry
 
     def read(self, look: Callable[[Block, History], T]) -> T | None:
-        """What `look` finds, while the memory cannot be freed under it; None before the first scene."""
+        """What `look` returns, with the shared memory locked against being freed; None before the first
+        scene."""
         with self._lock:
             if self._block is None or self._history is None:
                 return None
             return look(self._block, self._history)
 
     def look(self, rows: bool = True) -> float | None:
-        """Takes over what is new, keeps it for looking back, and returns the simulated time, s. rows: the
-        telemetry, too, which can wait for the next look but one."""
+        """Reads new data, stores them for looking back, and returns the simulated time, s. rows: whether to
+        read the telemetry as well, which may wait for one of the next calls."""
 
         def take(block: Block, history: History) -> float:
             t, poses = block.moment()
             if rows:
-                history.pull()  # after the moment: what is told of until then is in the telemetry
+                history.pull()  # read after the moment, so that the rows reach up to it
             self.tape.add(Frame(t, poses, self.status))
             return t
 
@@ -180,11 +182,11 @@ class Simulation(ABC):
 
 
 def aside(end: Callable[[], None]) -> None:
-    """Does on a thread of its own what may take a moment."""
+    """Runs a task that may take a moment on a thread of its own."""
     threading.Thread(target=end, daemon=True).start()
 
 
 def _discard(report: Report) -> None:
-    """Frees what came too late to be used."""
+    """Frees the memory of a scene that was loaded too late to be used."""
     if isinstance(report, Ready):
         os.close(report.block.number)

@@ -1,4 +1,4 @@
-"""One learner: a simulation process and perhaps its ghost. Outlives page reloads."""
+"""The simulations of one learner: a process and perhaps its ghost. They outlive page reloads."""
 
 from __future__ import annotations
 
@@ -49,28 +49,29 @@ class SimulationClient(Simulation):
         self.lecture: Lecture | None = None
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
-        """A scene (None: the one that is there) that was asked for and not heard of yet, and how often the
-        scene had been reset by then."""
+        """The scene that was requested and not yet reported (None: the present scene), and the number of
+        resets at the time of the request."""
         super().__init__(spares)
         self.send(Load(choice))
 
     def trouble(self) -> Trouble | None:
-        """What is the matter with the simulation or its ghost, if anything is."""
+        """The problem of the simulation or its ghost that the page should show; None if there is none."""
         ghost = self.ghost
         return super().trouble() or (None if ghost is None else ghost.trouble())
 
     def load(self, choice: SceneChoice) -> None:
-        """Another scene, in a new process if this one is in trouble."""
+        """Loads another scene, in a new process if the present one is in trouble."""
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
         self._begin_anew(Load(choice), choice)
 
     def reset_all(self) -> None:
-        """The scene from its beginning; in a new process if this one is in trouble."""
+        """Loads the scene again from its beginning, in a new process if the present one is in trouble."""
         self._begin_anew(ResetAll(), None)
 
     def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None) -> None:
-        """Also if the process has just died and nobody knows it yet."""
+        """Sends the command, or starts a new process if the present one is in trouble, also if that one has
+        just ended unnoticed."""
         with self._lock:
             if self.trouble() is not None:
                 self.restart(choice)
@@ -79,8 +80,8 @@ class SimulationClient(Simulation):
             self.send(command)
 
     def restart(self, choice: SceneChoice | None = None) -> None:
-        """A new process, for another scene or for the one that was last there. The one before ends, by force
-        if it does not answer. Waits for neither."""
+        """Starts a new process with another scene, or with the last one. The old process ends, by force if it
+        does not answer. Does not wait for either."""
         with self._lock:
             if self._closed:
                 return
@@ -97,18 +98,19 @@ class SimulationClient(Simulation):
             self._replace_ghost(ghost.words, ghost.own)
 
     def _enter(self, ready: Ready) -> None:
-        # First: who sees the new settings finds the choice they came with.
+        # The choice is stored first: a reader of the new settings then finds the choice that belongs to them.
         self.choice, self.lecture = ready.choice, None
         super()._enter(ready)
 
     def choice_of(self, ready: Ready) -> SceneChoice:
-        """What was chosen, as `settings_of`: perhaps a later step of the lesson than the one it came with."""
+        """The choice that belongs to a scene, as `settings_of`: it may be a later step of the lesson than the
+        one that was loaded."""
         with self._lock:
             return self.choice if self.ready is ready else ready.choice
 
     def lecture_of(self, ready: Ready) -> Lecture | None:
-        """How far the lesson of a scene is; None if another scene came in since. A page that is about to be
-        built anew must not show the next lesson first: what is pressed there would be lost with it."""
+        """The state of the lesson in a scene; None if another scene was loaded since. A page that will be
+        rebuilt must not show the next lesson first, as a button pressed there would have no effect."""
         with self._lock:
             return self.lecture if self.ready is ready else None
 
@@ -149,10 +151,10 @@ class SimulationClient(Simulation):
     # ---------------------------------------------------------------- questions
 
     def ask(self, timeout: float = 10.0) -> Told | None:
-        """What the run was; None if the simulation does not answer within so many seconds. Not to be called
-        on the page's loop or viser's: it waits."""
+        """The run so far; None if the simulation does not answer within `timeout` seconds. This call blocks:
+        do not call it on the page's loop or on viser's."""
         answer: Queue[Told | None] = Queue()
-        with self._lock:  # the answers come in the order of the questions
+        with self._lock:  # Answers arrive in the order of the questions.
             if not self._process.send(Tell()):
                 return None
             self._asking.append(answer)
@@ -168,9 +170,9 @@ class SimulationClient(Simulation):
     # ---------------------------------------------------------------- ghost
 
     def start_ghost(self, ghost: lesson.Ghost) -> None:
-        """A second robot, with `ghost.set` on top of whatever is set here, in the same scene: the scene
-        starts again so that both begin together. A ghost that is there already becomes the new one. If
-        `ghost.set` does not fit the scene, a notice says so and there is no ghost."""
+        """Starts a ghost: a second robot with `ghost.set` on top of the present settings, in the same scene.
+        The scene starts again, so that both begin together. An existing ghost is replaced. If `ghost.set`
+        does not fit the scene, a notice says so and there is no ghost."""
         self._replace_ghost(ghost.words, ghost.set)
 
     def _replace_ghost(self, words: str, own: tuple[str, ...]) -> None:
@@ -186,7 +188,7 @@ class SimulationClient(Simulation):
         self.send(Lead(True))
 
     def stop_ghost(self) -> None:
-        """The robot goes on alone."""
+        """Ends the ghost; the robot continues alone."""
         with self._lock:
             before, self.ghost = self.ghost, None
         self.send(Lead(False))

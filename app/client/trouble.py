@@ -1,4 +1,4 @@
-"""What a page says when its simulation does not run as it should, and what it offers."""
+"""What a page says and offers when its simulation does not run as it should."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from app.link.forkserver import FIRST_PATIENCE
 from app.link.process import Process
 
 SILENCE = 3.0
-"""s without a word after which a page says so: a simulation reports ten times a second."""
+"""Time without a report, s, after which a page says so: a simulation reports ten times per second."""
 DEADLINE = 30.0
-"""s that loading may take."""
+"""Time that loading may take, s."""
 
 
 @dataclass(frozen=True)
 class Trouble:
-    """state: a word for the badge; sentence: what is the matter; offer: what the button says that starts the
-    scene again, None if waiting is all there is to do."""
+    """state: a word for the badge; sentence: the problem; offer: label of the button that starts the scene
+    again, None if the learner can only wait."""
 
     state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING", "YOUR CODE"]
     sentence: str
@@ -25,7 +25,7 @@ class Trouble:
 
 
 def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The simulation") -> Trouble | None:
-    """What is the matter with a process that has not failed, if anything is.
+    """The problem of a process that has not failed; None if there is none.
 
     Args:
         process: which.

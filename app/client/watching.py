@@ -1,4 +1,4 @@
-"""What the page wants to see of the inside of a tick, and whether the simulation knows it."""
+"""Which internal data of a tick the page requests, and whether the simulation knows it."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from collections.abc import Callable
 from app.link.inside import Inside, InsideRequest
 
 _AGAIN = 0.4
-"""s after which a wish that is not answered is sent once more: a run that began anew has forgotten it."""
+"""s after which an unanswered request is sent again: a simulation that restarted has forgotten it."""
 
 
 class Watching:
-    """Sends a wish when it changes, and again while nothing comes of it."""
+    """Sends the request when it changes, and again while it is not answered."""
 
     def __init__(self, send: Callable[[InsideRequest], None]) -> None:
         self._send = send
         self._wish, self._sent_at = InsideRequest(), 0.0
 
     def ask(self, wish: InsideRequest, heard: Inside | None) -> None:
-        """heard: what the simulation told last."""
+        """heard: the simulation's last answer."""
         now = time.monotonic()
         mute = wish != InsideRequest() and heard is None and now - self._sent_at > _AGAIN
         if wish != self._wish or mute:

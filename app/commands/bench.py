@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 def bench(ticks: int = 300, json: str | None = None) -> int:
     """Time the control step: compiled route against the explicit one with DAQP and with ProxQP.
 
-    Times are the whole step, state in and torque out, kinematics included; the contenders take turns.
+    Each time is that of the whole step from state to torque, kinematics included; the routes take turns.
 
     Args:
-        ticks: timed ticks per contender.
+        ticks: number of timed ticks per route.
         json: write the result as JSON to this file, or to standard output for "-".
     """
     from lessons.experiments.bench import SCENES, Timing, ratios

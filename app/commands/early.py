@@ -1,7 +1,7 @@
-"""Imported before everything else: Ctrl-C while the first modules load ends without a traceback, too.
+"""Imported first, so that Ctrl-C during the import of the other modules also ends without a traceback.
 
-Nothing has been begun by then, so that nothing is left to be ended. What the interpreter itself does before
-it comes here is beyond our reach.
+Nothing has been started by then that would have to be ended. What the interpreter does before it imports this
+module cannot be handled here.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import signal
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
-# Nothing here draws with MuJoCo. Its import would look for a window library, in processes of its own: half a
-# second, and they hear of Ctrl-C before any code of ours could run in them.
+# Nothing here draws with MuJoCo. Its import would start processes that look for a window library. They take
+# half a second, and Ctrl-C reaches them before our code can handle it.
 os.environ.setdefault("MUJOCO_GL", "disable")
 
 
 def main() -> int:
-    """The console script."""
+    """The entry point of the console script."""
     from app.__main__ import main as run
 
     return run()

@@ -31,18 +31,19 @@ def grade(
 ) -> int:
     """Judge a solution of an exercise by what it does; without a file, list the exercises.
 
-    The name of an exercise instead of a file shows that one, with --hints N as many of its hints.
+    The name of an exercise instead of a file shows this exercise, with --hints N also its first N hints.
 
-    Every file is run in a process of its own, a minute at most. A folder of submissions gives one table;
-    stopped, the same command carries on. Exit code 0: all points; 1: some are missing; 2: it cannot be run.
+    Every file runs in a process of its own for at most a minute. A folder of submissions gives one table. If
+    the command was stopped, the same command continues it. Exit code 0: all points; 1: some are missing; 2:
+    it cannot be run.
 
     Args:
         file: Python file with the solution, or a folder of them; or the name of an exercise; or a text of
             what a learner did, as the page wrote it.
         exercise: name of the exercise; by default what the file says in EXERCISE.
-        hints: show so many hints of the exercise.
+        hints: number of hints of the exercise to show.
         seed: decides the disturbances.
-        out: table to write for a folder, and to carry on.
+        out: file for the table of a folder; an unfinished table is continued.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
             machine's cores.
         key: file with the key of your lab, to tell whether it signed what was handed in.
@@ -94,7 +95,7 @@ def _show(found: Grade, hints: int) -> None:
 
 
 def _kept(protection: tuple[str, ...]) -> str:
-    """What kept a submission to itself."""
+    """A sentence about what isolated a submission."""
     if not protection:
         return "files, network and processes were refused by Python alone, which is politeness and no prison"
     return f"files, network and processes were refused by {' and '.join(protection)}, and by Python"
@@ -164,7 +165,7 @@ def _short(row: Mapping[str, str]) -> list[str]:
 
 
 _TEXTS = (".txt", ".text", "")
-"""What a file is called in which somebody put what the page wrote."""
+"""Name of a file that contains the text which the page wrote."""
 
 
 def _handed_in(file: Path, key: str | None, json: str | None) -> int:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command soon, whatever it is doing, and without a traceback."""
+"""Ctrl-C and SIGTERM end a command soon and without a traceback, whatever it is doing."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 PATIENCE = 4.5
-"""s that a command has to come to its end by itself."""
-_AGAIN = 0.05  # s after which an interrupt that somebody swallowed comes back
+"""Time, s, that a command has to end by itself."""
+_AGAIN = 0.05  # s after which a swallowed interrupt is raised again
 
 Interrupted = threading.Event
-"""Set once a signal has come."""
+"""Set once a signal has arrived."""
 
 
 @contextmanager
 def interruptible() -> Iterator[Interrupted]:
-    """While it is open both signals raise KeyboardInterrupt in the main thread: what is done is kept, and no
-    process is left behind. A library that takes long or swallows the exception (a compiler does both) does
-    not hold it up: it comes again, and after PATIENCE the process ends at once. Children end with it.
+    """Within this context both signals raise KeyboardInterrupt in the main thread, so that results are kept
+    and no process is left behind. A library (e.g. a compiler) may take long or swallow the exception: it is
+    then raised again, and after PATIENCE the process ends at once, with its children.
 
-    Yields whether a signal has come: an import that is cut short may then fail in any way.
+    Yields a flag that says whether a signal has arrived: an interrupted import may then fail in any way.
     """
     interrupted = Interrupted()
     if threading.current_thread() is not threading.main_thread():
@@ -61,7 +61,7 @@ def interruptible() -> Iterator[Interrupted]:
 
 @contextmanager
 def _deadline() -> Iterator[None]:
-    """A thread that hears of signals even while the main one is deep in a library, and ends the process when
+    """A thread that receives signals even while the main thread is inside a library, and ends the process if
     that lasts too long."""
     heard, told = os.pipe()
     os.set_blocking(told, False)

@@ -23,8 +23,8 @@ def lessons(
     """List the lessons, or run them headless and judge every claim.
 
     The check runs each lesson through its script: every claim must hold, and must fail under the wrong
-    setting it names; every challenge must be missed at its start and met by its solutions. Exit code 1, and
-    one sentence per fault, if something is not as stated.
+    setting it names; every challenge must fail at its start and be met by its solutions. The exit code is 1,
+    with one sentence per fault, if anything differs.
 
     Args:
         check: names of the lessons to check, or Python files of your own; none after --check: all of them.
@@ -91,7 +91,7 @@ def _number(value: float) -> str:
 
 
 def _as_data(chosen: Sequence[Lesson], verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """JSON-ready: per lesson its verdicts; numbers that are not finite become null."""
+    """Data for JSON: the verdicts per lesson; numbers that are not finite become null."""
     return {
         "sound": not any(verdict.fault for verdict in verdicts),
         "lessons": [

@@ -15,9 +15,9 @@ def new(
     """Write a short, commented Python file that already runs, to be changed.
 
     Args:
-        kind: what the file is to be.
+        kind: the kind of file.
         file: where to write it.
-        start: begin with one there is: an example controller (pd, osf, one_level_qp, himpc_one_page) or the
+        start: copy an existing one: an example controller (pd, osf, one_level_qp, himpc_one_page) or the
             file of an exercise (himpc-lab grade lists them), a scene, a lesson, or a kind of task (com,
             plane_distance, …).
     """

@@ -1,4 +1,4 @@
-"""Where a command's result goes: a table for people, JSON for programs."""
+"""The output of a command: a table for people, JSON for programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robots import InputError
 
 
 def write_json(data: Any, target: str) -> None:
-    """Writes JSON to a file, or to standard output for "-". Raises InputError if it cannot."""
+    """Writes JSON to a file, or to standard output for "-". Raises InputError if that fails."""
     text = json.dumps(data, indent=2, allow_nan=False, default=float)
     if target == "-":
         print(text)
@@ -25,7 +25,7 @@ def write_json(data: Any, target: str) -> None:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Prints a table. Brackets in it are text: names may come from a stranger's file."""
+    """Prints a table. Square brackets are printed as text, since names may come from a stranger's file."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -39,7 +39,8 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 
 
 def print_list(title: str, column: str, lines: Mapping[str, str], json_target: str | None) -> int:
-    """A named list with one line of description each, as a table or as JSON; the exit code."""
+    """Prints a list of names, each with a line of description, as a table or as JSON; returns the exit
+    code."""
     if json_target is not None:
         write_json([{"name": name, "description": line} for name, line in lines.items()], json_target)
     else:

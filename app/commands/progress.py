@@ -1,4 +1,4 @@
-"""A progress bar on a terminal, nothing elsewhere."""
+"""A progress bar that is shown only on a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(title: str, shown: bool = True) -> Iterator[Callable[[float], None]]:
-    """Yields a function that takes the share done; the bar is on stderr, and only if that is a terminal."""
+    """Yields a function that sets the completed share. The bar is on stderr, and only if that is a
+    terminal."""
     if not shown or not sys.stderr.isatty():
         yield lambda share: None
         return

@@ -58,7 +58,7 @@ def reproduce(
         write(reports, out, quick)
     if store:
         keep(reports, quick)
-    # What was just stored is not held against what was stored before.
+    # Results that were just stored are not compared with those stored before.
     sound = (
         all(check.holds for report in reports for check in report.section.checks)
         if store
@@ -73,7 +73,7 @@ def reproduce(
 
 
 def _print(reports: Sequence[Report]) -> None:
-    """Every number with its verdict, the checks that hold by item, and what does not."""
+    """Prints every number with its verdict, the passed checks per item, and the failures."""
     from lessons.papers.words import number, tally
 
     for report in reports:

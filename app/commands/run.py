@@ -30,7 +30,7 @@ def run(
     json: str | None = None,
     npz: str | None = None,
 ) -> int:
-    """Run a scene headless, as fast as it goes.
+    """Run a scene headless, as fast as possible.
 
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file with a scene or task of your own. Not
@@ -55,7 +55,7 @@ def run(
     from lessons.runs.named import tasks_named
 
     spec = _given(scene, urdf, tip, state)
-    if controller is not None:  # instead of the code's
+    if controller is not None:  # replaces the seed of the state code
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
     seed = spec.seed if seed is None else seed
@@ -85,7 +85,7 @@ def run(
 
 
 def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> RunSpec:
-    """What to run: the scene that was named, or what a code holds."""
+    """The run to execute: the named scene, or the run of a state code."""
     from lessons.replay.state import decode
     from lessons.scenes.run_spec import RunSpec
 
@@ -153,7 +153,7 @@ def _show(result: dict[str, Any]) -> None:
 
 
 def _ranks(result: dict[str, Any]) -> dict[str, str]:
-    """Which level gets what, where the stack asks for more than the robot has."""
+    """The rank of each level, if the stack asks for more directions than the robot has."""
     levels = result.get("levels", ())
     if all(level["rank"] == level["rows"] for level in levels):
         return {}
@@ -169,7 +169,7 @@ def _leak(result: dict[str, Any]) -> str:
 
 
 def _mission(result: dict[str, Any]) -> dict[str, str]:
-    """What velocity-level scenes add."""
+    """The figures that only velocity-level scenes have."""
     found = {
         part["name"]: f"base error {_figure(part['normalised_base_error'])} of that at its start on average, "
         f"{_figure(part['final_base_error'])} at its end; hand {_figure(part['ee_error_mm']['mean'])} mm "

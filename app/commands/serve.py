@@ -1,4 +1,4 @@
-"""`himpc-lab` itself: the page."""
+"""`himpc-lab` without a subcommand: serves the page."""
 
 from __future__ import annotations
 

@@ -28,14 +28,15 @@ def sweep(
 ) -> int:
     """Run a grid of settings of a scene on all cores and draw it as a map.
 
-    Ctrl-C stops it; the same command carries on. A run that fails or loses control is a cell of the map.
+    Ctrl-C stops the sweep, and the same command continues it. Runs that fail or lose control are marked
+    in the map.
 
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file of your own.
         out: folder for cells.jsonl, results.json and map.png; by default one in out/sweeps, named by scene,
             settings and what tells this sweep from others.
         over: a setting and its range, e.g. --over M_bar_scale=0.2:4:20 --over horizon=1:20:20. Ranges of a
-            decade and more go in equal ratios; PATH=lo:hi:n:lin and :log decide it.
+            decade and more have logarithmic steps; PATH=lo:hi:n:lin or :log sets it.
         controller: which controller, the scene's own by default: a name (see himpc-lab controllers) or a
             Python file of your own.
         set: change a setting in all runs, e.g. --set plant.payload_kg=2.

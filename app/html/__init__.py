@@ -1,1 +1,1 @@
-"""Words, numbers and colours for people; whatever a user or a file named is escaped here."""
+"""Text, numbers and colours as HTML; everything that a user or a file named is escaped here."""

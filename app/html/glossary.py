@@ -1,4 +1,4 @@
-"""The words of the lab, and how a text explains them."""
+"""The glossary of the lab, and the explanation of its words within a text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ STYLE = (
     "<style>abbr.word{text-decoration:underline dotted;text-underline-offset:0.2em;cursor:help}"
     "abbr.word:focus::after{content:' (' attr(title) ') ';font-style:italic;opacity:0.8}</style>"
 )
-"""A hint appears under the mouse; where there is none, a tap or the Tab key writes it into the text."""
+"""A hint appears under the mouse pointer. On devices without a pointer, a tap or the Tab key inserts it into
+the text."""
 
 _TAG = re.compile(r"(<[^>]*>)")
 _CLOSED = ("math", "code", "pre", "abbr", "svg", "style")
@@ -20,7 +21,7 @@ _CLOSED = ("math", "code", "pre", "abbr", "svg", "style")
 
 @cache
 def words() -> dict[str, str]:
-    """Every word with its sentence."""
+    """Every word of the glossary with the sentence that explains it."""
     return {word: str(entry["means"]) for word, entry in _entries().items()}
 
 
@@ -31,7 +32,7 @@ def _entries() -> dict[str, dict[str, object]]:
 
 @cache
 def _forms() -> tuple[re.Pattern[str], dict[str, str]]:
-    """A pattern of all spellings, and the word each one means."""
+    """A pattern that matches all spellings, and the word that each spelling means."""
     of: dict[str, str] = {}
     for word, entry in _entries().items():
         forms = entry.get("forms", [word])
@@ -42,7 +43,7 @@ def _forms() -> tuple[re.Pattern[str], dict[str, str]]:
 
 
 def explained(html: str) -> str:
-    """HTML in which the first use of every known word carries its sentence."""
+    """HTML in which the first use of every known word has its explanation."""
     pattern, of = _forms()
     seen: set[str] = set()
 

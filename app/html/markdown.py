@@ -1,4 +1,4 @@
-"""Lesson texts as HTML: Markdown with equations in $…$ and $$…$$, and words explained."""
+"""Lesson texts as HTML: Markdown with equations in $…$ and $$…$$, and with explained words."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _PLACE = re.compile(r"\ue000(\d+)\ue001")
 
 @lru_cache(maxsize=256)
 def rendered(text: str) -> str:
-    """HTML of paragraphs. Markup in the text is shown, not obeyed."""
+    """HTML of paragraphs. HTML tags in the text are shown as text."""
     return _html(text, _MARKDOWN.render)
 
 
 @lru_cache(maxsize=256)
 def rendered_line(text: str) -> str:
-    """HTML of a text that stands within a line."""
+    """HTML of a text that is part of a line."""
     return _html(text, _MARKDOWN.renderInline)
 
 
@@ -34,11 +34,11 @@ def _html(text: str, render: Callable[[str], str]) -> str:
     equations: list[str] = []
 
     def keep(found: re.Match[str]) -> str:
-        # Markdown would take underscores and backslashes of an equation for its own.
+        # Markdown would interpret underscores and backslashes of an equation.
         display, inline = found[1], found[3]
         equations.append(formula(display.strip()) if display else convert(" ".join(inline.split())))
         return f"\ue000{len(equations) - 1}\ue001{found[2] or ''}"
 
     html = render(_EQUATION.sub(keep, text))
-    html = _ALONE.sub(r"\1", explained(html))  # a block may not stand in a paragraph
+    html = _ALONE.sub(r"\1", explained(html))  # HTML does not allow a block within a paragraph
     return _PLACE.sub(lambda found: equations[int(found[1])], html)

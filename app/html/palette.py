@@ -1,4 +1,4 @@
-"""Colours that are readable on light and dark alike, the same in the scene, the lists and the plots."""
+"""Colours that are readable on light and dark backgrounds, the same in the scene, the lists and the plots."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 RGB = tuple[int, int, int]
 
 LEVELS: tuple[RGB, ...] = (
-    (240, 130, 20),  # orange: what the first sentence of the page asks to drag
+    (240, 130, 20),  # orange: the colour that the first sentence of the page names
     (59, 130, 246),
     (22, 163, 104),
     (168, 85, 247),
@@ -45,8 +45,8 @@ def level_colours(names: Sequence[str]) -> dict[str, RGB]:
 
 
 def recoloured(names: Sequence[str], before: dict[str, RGB]) -> dict[str, RGB]:
-    """The colours of another stack: a level of before keeps its own, and so does one that shares a task with
-    it; others get colours that nobody has."""
+    """The colours of another stack: an existing level keeps its colour, and so does a level that shares a
+    task with it; the others get unused colours."""
     found: dict[str, RGB] = {}
     for name in names:
         tasks = set(name.split("+"))

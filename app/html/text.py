@@ -1,4 +1,4 @@
-"""Numbers and snippets of HTML for people. Whatever a user or a file named passes through `esc`."""
+"""Numbers and short pieces of HTML. Everything that a user or a file named passes through `esc`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ esc = html.escape
 
 
 def quantity(value: float, unit: str) -> str:
-    """A length in m or an angle in rad in the unit and with the digits a reader wants."""
+    """A length in m or an angle in rad, converted to a readable unit with a suitable number of digits."""
     if not math.isfinite(value):
         return "–"
     if unit == "m":
@@ -53,17 +53,17 @@ def badge(text: str, colour: RGB) -> str:
 
 
 def block(inner: str, style: str = "") -> str:
-    """A paragraph in the panel's own size."""
+    """A paragraph in the font size of the panel."""
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
 
 
 PHONE = '<style>@media (max-width: 36em) { div[style*="width: 20em"] { width: 100vw !important } }</style>'
-"""A style that makes viser's sheet on a phone as wide as the screen, not 20em with an empty strip beside it.
-It counts while an HTML element with it is shown."""
+"""A style that makes viser's bottom sheet on a phone as wide as the screen; by default it is 20em wide, with
+an empty strip beside it. It applies while an HTML element with it is shown."""
 
 
 def in_trouble(state: str, sentence: str) -> str:
-    """What a page shows about a simulation that died, hangs or takes long."""
+    """The text that a page shows for a simulation that died, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD
     return block(
         f"{badge(state, colour)} {esc(sentence)}",
@@ -72,7 +72,7 @@ def in_trouble(state: str, sentence: str) -> str:
 
 
 def bar(share: float, colour: RGB, mark: float | None = None) -> str:
-    """A horizontal gauge; `mark` draws a line across it. Both as shares of its width."""
+    """A horizontal gauge; `mark` draws a line across it. Both are shares of its width."""
     width = 100 * min(max(share, 0.0), 1.0)
     line = (
         ""
@@ -94,7 +94,7 @@ def formula(latex: str) -> str:
 
 
 def figure(value: float, unit: str = "") -> str:
-    """A number with three digits and its unit."""
+    """A number with three significant digits and its unit."""
     if not math.isfinite(value):
         return "–"
     size = abs(value)
@@ -106,7 +106,7 @@ def figure(value: float, unit: str = "") -> str:
 
 
 def readable(words: str) -> str:
-    """A sentence whose numbers and units are written as `figure` does."""
+    """A sentence with all numbers and units in the format of `figure`."""
     return _EXPONENT.sub(lambda found: figure(float(found[0])), _DEGREES.sub("°", words))
 
 
@@ -121,6 +121,6 @@ def _power(value: float) -> str:
 
 
 def free_name(wanted: str, taken: Sequence[str]) -> str:
-    """The name wanted, with a number if it is taken."""
+    """The requested name, with a number appended if it is taken."""
     numbered = (wanted if k == 1 else f"{wanted} {k}" for k in itertools.count(1))
     return next(name for name in numbered if name not in taken)

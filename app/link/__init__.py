@@ -1,1 +1,1 @@
-"""What crosses the boundary between page and simulation: messages, the scene chosen, ring, process."""
+"""The boundary between page and simulation: messages, the chosen scene, shared memory and processes."""

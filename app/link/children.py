@@ -1,4 +1,5 @@
-"""A child process as the page holds it: forked by the fork server, or spawned where that is not to be had."""
+"""A child process as the page sees it: forked by the fork server, or spawned where forking is not
+available."""
 
 from __future__ import annotations
 
@@ -15,48 +16,49 @@ from robots.processes.orphans import end_with_parent
 
 
 class Child(Protocol):
-    """One process."""
+    """The interface of a child process."""
 
     @property
     def pid(self) -> int | None:
-        """Its number; None if it is not yet born."""
+        """The process id; None before the process has started."""
         ...
 
     @property
     def exitcode(self) -> int | None:
-        """How it ended: minus the signal's number if by one; None if that is not known."""
+        """The exit code; −N if signal N ended the process; None if it is not known."""
         ...
 
     @property
     def doing(self) -> str:
-        """What must be done before it can be born."""
+        """What the fork server is doing before the process can start, as a sentence."""
         ...
 
     def fileno(self) -> int:
-        """Readable when `look` has news; another one after it had."""
+        """A descriptor that is readable when `look` has news; it may change after each `look`."""
         ...
 
     def look(self) -> bool:
-        """Takes news in; whether the process has ended."""
+        """Reads the news; returns whether the process has ended."""
         ...
 
     def kill(self) -> None:
-        """Ends it by force, if it is born."""
+        """Kills the process if it has started."""
         ...
 
     def close(self) -> None:
-        """Lets go of the handle, once it has ended."""
+        """Closes the handle of a process that has ended."""
         ...
 
 
 class Preparation(Protocol):
-    """What an unborn child waits for."""
+    """The preparation that a child waits for before it starts."""
 
     doing: str
 
 
 class Forked:
-    """A child of the fork server. Two numbers come over `status`: its own, and its exit code."""
+    """A child of the fork server. Two numbers arrive over `status`: its process id, and later its exit
+    code."""
 
     def __init__(self, status: socket.socket, server: Preparation) -> None:
         self._status, self._server = status, server
@@ -83,7 +85,7 @@ class Forked:
         told = self._status.recv(8, socket.MSG_WAITALL)
         number = int.from_bytes(told, "big", signed=True) if len(told) == 8 else None
         if number is None and self.pid is not None:
-            # The server has died. Its children go on, but nobody is left to tell how they end.
+            # The fork server has died. Its children continue, but their exit codes will never be reported.
             with contextlib.suppress(OSError):
                 self._alone = os.pidfd_open(self.pid)
             self._ended = self._alone is None
@@ -112,7 +114,7 @@ class Spawned:
     doing = ""
 
     def __init__(self, worker: str, theirs: socket.socket) -> None:
-        """worker: as of `ForkServer`."""
+        """worker: module name, as for `ForkServer`."""
         before = {name: os.environ.get(name) for name in one_thread_each()}
         os.environ.update(one_thread_each())
         try:
@@ -136,17 +138,18 @@ class Spawned:
         return True
 
     def kill(self) -> None:
-        with contextlib.suppress(ValueError):  # closed, because it has ended
+        with contextlib.suppress(ValueError):  # the process has ended and the handle is closed
             self._process.kill()
 
     def close(self) -> None:
-        with contextlib.suppress(ValueError):  # killed, but not yet gone
+        with contextlib.suppress(ValueError):  # the process was killed but has not ended yet
             self._process.close()
 
 
 def one_thread_each() -> dict[str, str]:
-    """Environment of a child. Threads of linear algebra on 7 × 7 matrices only fight for the page's core; the
-    variables count when numpy is first imported, which is before any code of ours runs."""
+    """Environment variables of a child. With matrices of 7 × 7, the threads of a linear algebra library only
+    take processor time from the page. The variables are read when numpy is first imported, before any of our
+    code runs."""
     return dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 

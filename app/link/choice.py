@@ -1,4 +1,4 @@
-"""What a page shows: a run, and where in a lesson it stands."""
+"""What a page shows: a run, and its place in a lesson."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True)
 class SceneChoice:
-    """A run, and what only a page has besides.
+    """A run, with the data that only a page needs.
 
     Attributes:
-        run: scene, robot, settings and seed; of a lesson its step's, script included, and no scene yet while
-            its file is not read. A controller is named by an assignment, so that only `files` are opened.
+        run: scene, robot, settings and seed; for a lesson those of the step, with its script; without a scene
+            until the lesson's file is read. A controller is named by an assignment, so that only `files` are
+            opened.
         urdf_text: an uploaded robot, instead of the run's.
-        exercise: the step of a lesson that it is.
-        mine: what the learner had changed of that step, as assignments; made anew once when it is loaded.
-        scenes: Python files that may be the scene. These and the run's `files` and `tasks` are what whoever
-            started the program named: no others are run.
-        within: the folder below which the URDF and its meshes have to lie, if the URDF was named on the page.
+        exercise: the step of a lesson, if the choice is one.
+        mine: the learner's changes to that step, as assignments; applied once when it is loaded.
+        scenes: Python files that may be the scene. Only these and the run's `files` and `tasks` are ever
+            run: the person who started the program named them.
+        within: the folder that must contain the URDF and its meshes, if the URDF was named on the page.
     """
 
     run: RunSpec
@@ -51,7 +52,7 @@ class SceneChoice:
         controller: str | None = None,
         tasks: tuple[str, ...] = (),
     ) -> SceneChoice:
-        """What the command line asks for: scene and controller by name, or by the path of a file; files of
+        """The choice that the command line makes: scene and controller by name or file path, and files of
         tasks."""
         files = (controller,) if controller is not None and is_file(controller) else ()
         begun = cls.of_run(RunSpec(scene, urdf, tip, controller, files=files, tasks=tasks))
@@ -59,7 +60,7 @@ class SceneChoice:
 
     @classmethod
     def opening(cls, lesson: str) -> SceneChoice:
-        """The first step of a lesson whose file is not read yet. Raises InputError if there is no such
+        """The first step of a lesson whose file has not been read yet. Raises InputError for an unknown
         lesson."""
         if lesson not in COURSE and not is_file(lesson):
             raise unknown_name("lesson", lesson, COURSE)
@@ -67,12 +68,12 @@ class SceneChoice:
 
     @classmethod
     def of_lesson(cls, exercise: LessonPlace) -> SceneChoice:
-        """A step of a lesson. Raises InputError if there is no such lesson."""
+        """A step of a lesson. Raises InputError for an unknown lesson."""
         return cls(exercise.run, exercise=exercise)
 
     @classmethod
     def of_run(cls, run: RunSpec) -> SceneChoice:
-        """What a run begins with; a page has no script and no end."""
+        """The start of a run; a page ignores the run's script and its end."""
         run = replace(run, events=None, duration=None)
         if run.controller is None:
             return cls(run)
@@ -83,7 +84,7 @@ class SceneChoice:
 
     @classmethod
     def of_state(cls, state: State) -> SceneChoice:
-        """What a state code holds. Raises InputError for what cannot be loaded."""
+        """The choice that a state code describes. Raises InputError if it cannot be loaded."""
         run = state.run
         if state.lesson is None:
             return cls.of_run(run)
@@ -105,14 +106,14 @@ class SceneChoice:
         return replace(step, run=replace(step.run, seed=self.run.seed)).admitting(self)
 
     def admitting(self, start: SceneChoice) -> SceneChoice:
-        """The same with the files of what the program was started with as well."""
+        """The same choice, also with the files that the program was started with."""
         files = _both(start.run.files, self.run.files)
         run = replace(self.run, files=files, tasks=_both(start.run.tasks, self.run.tasks))
         return replace(self, scenes=_both(start.scenes, self.scenes), run=run)
 
     def with_file(self, path: str) -> SceneChoice:
-        """What is shown when a file of one's own is opened by path, by what it defines: a lesson or a scene
-        instead of this one, a controller that drives it, a task that can be added to its stack.
+        """The choice after a file of one's own was opened by path. What the file defines decides: a lesson or
+        a scene replaces the present one, a controller drives the robot, a task can be added to its stack.
 
         Raises:
             InputError: the file cannot be used, with its line.
@@ -136,7 +137,7 @@ class SceneChoice:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Every file of the machine that it names."""
+        """All files of this machine that the choice names."""
         run, lesson = self.run, None if self.exercise is None else self.exercise.lesson
         set_to = (each.partition("=") for each in run.set)
         told = (value.strip().strip('"') for path, _, value in set_to if path == "controller")
@@ -146,20 +147,23 @@ class SceneChoice:
 
     @property
     def asked(self) -> frozenset[str]:
-        """The files that whoever chose it asks for: of a step the lesson's own, which may name others."""
+        """The files that the person who chose asks for: for a step of a lesson only the lesson's file, which
+        may name others."""
         if self.exercise is None:
             return self.paths
         return frozenset(filter(is_file, (self.exercise.lesson,)))
 
     def without_places(self, sentence: str) -> str:
-        """The sentence with its files by name alone: where they lie is their owner's business."""
+        """The sentence with file names instead of full paths, so that it does not reveal folders of the
+        machine."""
         for path in sorted(self.paths, key=len, reverse=True):
             sentence = sentence.replace(path, Path(path).name)
         return sentence
 
     @property
     def known(self) -> bool:
-        """Whether names alone tell that it can be loaded: no file, frame or setting of somebody's own."""
+        """Whether names alone show that the choice can be loaded: it has no file, frame or setting of the
+        user's own."""
         scene, seed = self.run.scene, self.run.seed
         if self.run.files or self.run.tasks or (self.exercise is not None and is_file(self.exercise.lesson)):
             return False
@@ -168,7 +172,8 @@ class SceneChoice:
         return self == SceneChoice(RunSpec(scene, seed=seed)) and scene in ALL_SCENES and scene != "hold"
 
     def resolved(self) -> SceneChoice:
-        """The same, with what a lesson's file says about its step. Raises InputError if there is none."""
+        """The same choice, completed by the lesson's file if it is a step. Raises InputError if there is no
+        such step."""
         if self.run.scene or self.exercise is None:
             return self
         return self.at(self.exercise)
@@ -179,9 +184,9 @@ class SceneChoice:
         return choice.run.applied_to(choice._bare())
 
     def fitted(self) -> tuple[SceneChoice, Scene, tuple[str, ...]]:
-        """The choice without those tasks of files that its robot cannot have, its scene, and why each is left
-        out: who opened a file for one robot is not kept from the others. Raises InputError for what cannot be
-        loaded; also if the stack names such a task."""
+        """Returns the choice without the tasks of files that its robot cannot have, its scene, and one reason
+        per omitted task. A file that was opened for one robot then does not prevent the use of others. Raises
+        InputError for what cannot be loaded; also if the stack names an omitted task."""
         from lessons.runs.named import misfits
 
         choice = self.resolved()
@@ -191,11 +196,11 @@ class SceneChoice:
         try:
             scene = kept.applied_to(bare)
         except InputError:
-            scene = run.applied_to(bare)  # which says what is the matter with the task
+            scene = run.applied_to(bare)  # raises the error that names the task's problem
         return replace(choice, run=kept), scene, tuple(out.values())
 
     def _bare(self) -> Scene:
-        """The scene before anything is set."""
+        """The scene without any settings applied."""
         from lessons.runs.named import scene_named
         from lessons.scenes.catalog import load_scene
 

@@ -1,4 +1,4 @@
-"""Which step of which lesson is on, and what is known about its run: frozen and picklable data."""
+"""The step of a lesson that is active, and the state of its run: frozen and picklable data."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from lessons.teaching.prediction import PredictionResult
 
 Answer = int | float | tuple[tuple[float, float], ...]
-"""A prediction: place of an option, a value, or the points (t in s, value) of a sketch."""
+"""A prediction: the index of an option, a value, or the points (t in s, value) of a sketch."""
 
 Phase = Literal["waiting", "preparing", "running", "done"]
-"""Before the run; the ghost is still being computed; the scripted run goes on; it is over and the robot is
-free."""
+"""Before the run ("waiting"); while the ghost is computed ("preparing"); while the script runs; after the run
+("done"), when the robot can be moved freely."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class LessonPlace:
 
     @classmethod
     def at(cls, lesson: str, step: int) -> LessonPlace:
-        """The step (1 being the first) of a lesson. Raises InputError if there is no such lesson or step."""
+        """A step by its number, 1 being the first. Raises InputError if there is no such lesson or step."""
         count = len(parts_of(_lesson(lesson)))
         if not 1 <= step <= count:
             raise InputError(f"lesson '{lesson}' has no step {step}: choose one from 1 to {count}")
@@ -48,33 +48,33 @@ class LessonPlace:
 
     @property
     def whole(self) -> Lesson:
-        """The lesson. Raises InputError if there is none of that name."""
+        """The whole lesson. Raises InputError for an unknown lesson."""
         return _lesson(self.lesson)
 
     @property
     def part(self) -> Step | Challenge:
-        """What is to be done."""
+        """The step or challenge at this place."""
         lesson = self.whole
         parts = parts_of(lesson)
         return parts[min(max(self.place, 0), len(parts) - 1)]
 
     @property
     def run(self) -> RunSpec:
-        """What is run."""
+        """The run of this step or challenge."""
         return self.whole.run_of(self.part)
 
 
 @dataclass(frozen=True)
 class Predict:
-    """A command: what the learner says the run of a step will show."""
+    """Command: the learner's prediction of what the run of a step will show."""
 
     answer: Answer
 
 
 @dataclass(frozen=True)
 class RunStep:
-    """A command: a step's script from its start. own: with the lesson's settings (a challenge always takes
-    the learner's); fast: as fast as it goes."""
+    """Command: run a step's script from its start. own: use the lesson's settings (a challenge always uses
+    the learner's); fast: run as fast as possible."""
 
     own: bool = True
     fast: bool = False
@@ -89,12 +89,12 @@ def _lesson(name: str) -> Lesson:
 
 
 def parts_of(lesson: Lesson) -> tuple[Step | Challenge, ...]:
-    """A lesson's steps, and its challenge if it has one."""
+    """The steps of a lesson, and its challenge if it has one."""
     return lesson.steps if lesson.challenge is None else (*lesson.steps, lesson.challenge)
 
 
 def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
-    """What to look at while it runs."""
+    """The signals to plot during the run."""
     from lessons.teaching.lesson import Step
 
     if isinstance(part, Step):
@@ -104,7 +104,8 @@ def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
 
 @dataclass(frozen=True, eq=False)
 class SignalCurve:
-    """A signal over the run so far: t (k,) s, values (k,) in its unit, thinned so that no spike is lost."""
+    """A signal over the run so far: t (k,) s, values (k,) in its unit, decimated so that every peak is
+    kept."""
 
     t: np.ndarray
     values: np.ndarray
@@ -112,19 +113,20 @@ class SignalCurve:
 
 @dataclass(frozen=True, eq=False)
 class Lecture:
-    """How far an exercise is.
+    """The state of an exercise.
 
     Attributes:
-        exercise: which.
+        exercise: the exercise.
         phase: see `Phase`.
         attempt: counts runs since the exercise was opened.
-        t: s, how much of the run is judged; duration: s, how long it is.
+        t: time up to which the run is judged, s; duration: length of the run, s.
         answer: the learner's prediction.
-        changed: one sentence if the run is not the lesson's own: settings differ, or a hand interfered.
+        changed: one sentence if the run is not the lesson's own: settings differ, or the learner
+            interfered.
         values: measured, per claim or goal; NaN while there is nothing to measure.
         holds: whether each claim or goal holds so far; None while there is nothing to measure.
-        truth: what the prediction is about, as measured.
-        grade: how the prediction did, after the run.
+        truth: the measured value of the predicted quantity.
+        grade: the grade of the prediction, after the run.
         curves: per signal of the step; ghosts: the same of the second robot, where it was computed.
         sketched: what a sketch is about.
         result, points_for: of a challenge, after the run: the result and the number that gives its points.

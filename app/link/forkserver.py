@@ -1,7 +1,7 @@
-"""A process with everything imported that forks simulations: each starts at once and shares its memory.
+"""A process that has imported everything and forks simulations: each starts at once and shares its memory.
 
-The page asks over a socket and never waits. Whatever happens to the page, the kernel ends this process and
-all its children with it: they are one process group, tied to a pipe that only the page can write to.
+The page asks over a socket and never waits. The server and all its children are one process group, tied to a
+pipe that only the page can write to: if the page's process ends for any reason, the kernel ends them too.
 """
 
 from __future__ import annotations
@@ -28,16 +28,17 @@ from robots.processes.isolation import is_stopped, threads, waited
 from robots.processes.orphans import end_with
 
 PATIENCE = 3.0
-"""s after which a server that is ready but does not fork counts as stuck, and any that somebody has stopped;
-what it waits for a core on a busy machine does not count."""
+"""Time, s, after which a server that is ready but does not fork counts as stuck, and also any server that was
+stopped (SIGSTOP). Time that it waits for a core of a busy machine does not count."""
 FIRST_PATIENCE = 120.0
-"""s it may say nothing while it gets ready, compiling included, before it counts as stuck."""
-_LOOK = 0.25  # s between two looks whether it is stuck
+"""Time without a message, s, while the server imports and compiles; after that it counts as stuck."""
+_LOOK = 0.25  # s between two checks whether the server is stuck
 
 
 @dataclass(frozen=True)
 class Fork:
-    """A request. wire: the child's end of its socket; status: where its number and its exit code go."""
+    """A request for a child. wire: the child's end of its socket; status: the socket for its process id and
+    exit code."""
 
     wire: Handle
     status: Handle
@@ -45,18 +46,18 @@ class Fork:
 
 @dataclass(frozen=True)
 class Preparing:
-    """What the server is doing before it can fork, for the page."""
+    """What the server is doing before it can fork; the page shows the sentence."""
 
     sentence: str
 
 
 @dataclass(frozen=True)
 class ForkReady:
-    """It can fork."""
+    """The server can fork now."""
 
 
 class ForkServer:
-    """The page's handle. Raises OSError where processes cannot be forked."""
+    """The page's handle of the fork server. Raises OSError where processes cannot be forked."""
 
     def __init__(self, worker: str) -> None:
         """worker: a module with `warm(say)`, which loads all that a simulation needs and may say what it is
@@ -86,11 +87,11 @@ class ForkServer:
             os.close(life)
         self.ready = False
         self.stopped = False
-        """Whether it was given up because somebody had stopped it (SIGSTOP)."""
+        """Whether the server was given up because it had been stopped (SIGSTOP)."""
         self.doing = ""
         self._heard_at = time.monotonic()
         self._ended = False
-        self._asked: list[tuple[float, float, Forked]] = []  # when, what it had waited for a core, for what
+        self._asked: list[tuple[float, float, Forked]] = []  # (time, time waited for a core, child)
         self._wire = Wire(ours)
         self._lock = threading.Lock()
         self._listening = threading.Thread(target=self._hear, daemon=True)
@@ -122,13 +123,13 @@ class ForkServer:
 
     @property
     def stuck(self) -> bool:
-        """Whether it was asked for a child and gave none for too long."""
+        """Whether the server has not answered a request for a child for too long."""
         with self._lock:
             self._asked = [each for each in self._asked if each[2].unborn]
             if not self._asked:
                 return False
             now, starved = time.monotonic(), waited(self.pid)
-            # A server that was stopped while it got ready says nothing, and never will.
+            # A server that was stopped while it was getting ready sends no message.
             patience = PATIENCE if self.ready or is_stopped(self.pid) else FIRST_PATIENCE
             return any(
                 now - max(since, self._heard_at) - (starved - before) > patience
@@ -136,13 +137,14 @@ class ForkServer:
             )
 
     def _end_if_stuck(self) -> None:
-        """Who waits for a child then hears at once that this one gives none."""
+        """Ends a stuck server: those who wait for a child then learn at once that it gives none."""
         if self.stuck:
             self.stopped = is_stopped(self.pid)
             self.give_up()
 
     def fork(self, theirs: socket.socket) -> Forked:
-        """A child with this end of its socket. Raises OSError if the server is gone or does not read."""
+        """Requests a child that gets this end of its socket. Raises OSError if the server has ended or does
+        not read."""
         status, other = socket.socketpair()
         child = Forked(status, self)
         try:
@@ -157,12 +159,12 @@ class ForkServer:
         return child
 
     def give_up(self) -> None:
-        """Ends the server alone: its children go on."""
+        """Ends the server alone; its children continue."""
         self._ended = True
         self._process.kill()
 
     def close(self) -> None:
-        """Ends the server and every child that is left."""
+        """Ends the server and all its remaining children."""
         self._process.kill()
         self._listening.join()
         self._wire.close()
@@ -173,13 +175,14 @@ class ForkServer:
 
 
 def serve(control: int, life: int, worker: str) -> NoReturn:
-    """The server's process: gets everything ready, then forks when asked until the page is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's to answer
+    """The server's process: imports everything, then forks on request until the page ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page handles Ctrl-C
     end_with(life, group=True)
     wire = Wire(socket.socket(fileno=control))
     module = import_module(worker)
     module.warm(lambda sentence: wire.send(Preparing(sentence)))
-    # What is there now is shared by all children as long as nobody touches it: the collector must not.
+    # Children share the memory that exists now until somebody writes to it, so the garbage collector must not
+    # touch it.
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -216,7 +219,7 @@ class _Nest:
 
     def _fork(self, theirs: socket.socket, status: int) -> None:
         if threads() != 1:
-            # What another thread holds at this moment would stay locked in the child for ever.
+            # A lock that another thread holds at this moment would stay locked in the child forever.
             print("himpc-lab: a second thread runs in the fork server; it ends", file=sys.stderr)
             self._end()
         report = socket.socket(fileno=status)
@@ -263,5 +266,5 @@ class _Nest:
 
 
 def _tell(report: socket.socket, number: int) -> None:
-    with contextlib.suppress(OSError):  # the page has forgotten this child
+    with contextlib.suppress(OSError):  # the page has closed this child's handle
         report.sendall(number.to_bytes(8, "big", signed=True))

@@ -1,4 +1,4 @@
-"""What a page asks of the inside of a tick, and what it is told."""
+"""Data about the inside of a tick: what the page requests, and what the simulation answers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InsideRequest:
-    """What of the inside of a tick the page shows; the answers come with every `Status`.
+    """The internal data of a tick that the page shows; the answer comes with every `Status`.
 
     plane: the two joints whose plane is cut, None: no plane; through: name of the level whose solution the
-    cut goes through, "" for what is applied; shift: N·m of the other joints' increments from there; matrix:
-    name of the level whose QP is shown as a picture, None: no picture; spectrum: eigenvalues of I − M⁻¹M̄.
+    cut goes through, "" for the applied solution; shift: offset of the other joints' increments from that
+    solution, N·m; matrix: name of the level whose QP is shown as a picture, None: no picture; spectrum:
+    whether to send the eigenvalues of I − M⁻¹M̄.
     """
 
     plane: tuple[int, int] | None = None
@@ -30,9 +31,9 @@ class InsideRequest:
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """The inside of the last tick, as far as it was asked for; see `InsideRequest`.
+    """The requested internal data of the last tick; see `InsideRequest`.
 
-    why_not: a sentence, where there is no tick to show; spectrum: (n,).
+    why_not: a sentence if there is no tick to show; spectrum: (n,).
     """
 
     plane: Plane | None = None

@@ -1,4 +1,4 @@
-"""What the page and its simulation process say to each other. Everything here is frozen and picklable."""
+"""The messages between the page and its simulation process. All are frozen and picklable."""
 
 from __future__ import annotations
 
@@ -32,41 +32,41 @@ class Post:
 
 @dataclass(frozen=True)
 class Play:
-    """Run or pause."""
+    """Run (True) or pause."""
 
     running: bool
 
 
 @dataclass(frozen=True)
 class StepTicks:
-    """Pause, then run so many ticks."""
+    """Pause, then run this number of ticks."""
 
     ticks: int = 1
 
 
 @dataclass(frozen=True)
 class Speed:
-    """Simulated seconds per second that are asked for."""
+    """The requested speed: simulated seconds per second."""
 
     factor: float
 
 
 @dataclass(frozen=True)
 class ResetAll:
-    """The scene as it was first loaded, settings included."""
+    """Reset the scene to the state in which it was first loaded, settings included."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """Another scene or robot."""
+    """Load another scene or robot."""
 
     choice: SceneChoice
 
 
 @dataclass(frozen=True)
 class Lead:
-    """Whether a ghost, another process, follows this one. On: the scene is reset, so that both begin
-    together, and `Script` reports tell what happens from there on."""
+    """Whether a ghost (another process) follows this one. When it is switched on, the scene is reset so that
+    both begin together, and `Script` reports describe what happens from then on."""
 
     on: bool
 
@@ -80,7 +80,7 @@ class WaitAt:
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """Where a ghost begins: the leader's scene, and its settings at its last reset."""
+    """The start of a ghost: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
     settings: SceneSettings
@@ -88,8 +88,8 @@ class Begin:
 
 @dataclass(frozen=True, eq=False)
 class FollowLeader:
-    """What a ghost hears of its leader. own: assignments "PATH=VALUE" on top of the leader's settings;
-    they count where the script begins anew."""
+    """A message of the leader to its ghost. own: assignments "PATH=VALUE" on top of the leader's settings;
+    they take effect when the script begins again."""
 
     script: Script
     own: tuple[str, ...]
@@ -97,7 +97,7 @@ class FollowLeader:
 
 @dataclass(frozen=True)
 class Tell:
-    """Tell what the run was; the answer is `Told`."""
+    """Request a description of the run; the answer is `Told`."""
 
 
 @dataclass(frozen=True)
@@ -128,12 +128,12 @@ Command = (
 
 @dataclass(frozen=True, eq=False)
 class TaskView:
-    """What the page must know about a task to draw it.
+    """The data of a task that the page needs to draw it.
 
-    kind: the word of himpc.tasks.KINDS; frame: a link's name (tasks on frames only); axes: the axes under
-    control; raw: where the hand put a draggable target, None for other references; path: (k, 3) closed curve
-    in space that a position goes round, m; speed_cap: of the filtered target, m/s or rad/s; root: the link
-    that sees the frame, of relative tasks; normal, offset: of the plane, for a distance to one.
+    kind: a key of himpc.tasks.KINDS; frame: name of a link (tasks on frames only); axes: the controlled
+    axes; raw: the raw value of a draggable target, None for other references; path: (k, 3) closed curve of
+    a position reference, m; speed_cap: speed limit of the filtered target, m/s or rad/s; root: the link to
+    which the frame of a relative task is relative; normal, offset: the plane of a distance task.
     """
 
     name: str
@@ -153,8 +153,8 @@ class TaskView:
 @dataclass(frozen=True, eq=False)
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
-    besides the robot; again: it is the same run as before, under another stack; left_out: why tasks of one's
-    own are not offered, a sentence each."""
+    besides the robot; again: the same run continues with another stack; left_out: a sentence for each of
+    the user's own tasks that is not offered."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -217,19 +217,19 @@ class Status:
 
 @dataclass(frozen=True)
 class Loading:
-    """The command to load a scene was heard: the next word may take a while."""
+    """The simulation has received the command to load a scene; its next report may take a while."""
 
 
 @dataclass(frozen=True)
 class LoadRefused:
-    """A scene or robot could not be loaded; the one before goes on."""
+    """A scene or robot could not be loaded; the previous scene continues."""
 
     sentence: str
 
 
 @dataclass(frozen=True)
 class SimulationFailed:
-    """The simulation stopped with an exception; `died`: its process ended without a word of its own."""
+    """The simulation stopped with an exception; `died`: its process ended without sending a report."""
 
     sentence: str
     died: bool = False
@@ -237,10 +237,10 @@ class SimulationFailed:
 
 @dataclass(frozen=True, eq=False)
 class Script:
-    """What a leader's ghost must hear.
+    """Data that a leader sends to its ghost.
 
-    events: what the leader's log gained; t: the time the leader has come to, s; begin: begin anew from there
-    before taking the events.
+    events: new events in the leader's log; t: the time that the leader has reached, s; begin: if given,
+    the ghost starts again from there before it applies the events.
     """
 
     events: tuple[tuple[float, Event], ...]
@@ -250,14 +250,14 @@ class Script:
 
 @dataclass(frozen=True)
 class Reached:
-    """The time a ghost has come to, s."""
+    """The time that a ghost has reached, s."""
 
     t: float
 
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What a run was, so that it can be repeated.
+    """A description of a run with which it can be repeated.
 
     choice: the scene, as it was loaded; settings: in force now; log: (time, event) of every event that took
     effect since it was loaded; t: s since the last reset.

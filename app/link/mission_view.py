@@ -1,4 +1,4 @@
-"""What the page must know about a mission to show it."""
+"""The data of a mission that the page shows."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class MissionRow:
-    """A task of a mission. goal: m, or x y z w of an orientation; None for a given trajectory; hold: s at the
-    goal, None: until released; there_s: for how long it has been at its goal; done_at: s, when it was
-    completed."""
+    """A task of a mission. goal: m, or x y z w of an orientation; None for a given trajectory; hold: time
+    to stay at the goal, s, None: until released; there_s: time at the goal so far, s; done_at: time of its
+    completion, s."""
 
     name: str
     role: str
@@ -26,7 +26,8 @@ class MissionRow:
 
 @dataclass(frozen=True)
 class Person:
-    """hand: m, where a ball is handed over; place: m on the floor; balls: how many were received."""
+    """hand: point at which a ball is handed over, m; place: position on the floor, m; balls: number of
+    balls received."""
 
     hand: tuple[float, float, float]
     place: tuple[float, float]
@@ -35,7 +36,7 @@ class Person:
 
 @dataclass(frozen=True, eq=False)
 class MissionView:
-    """How far a mission is. paths: per role the predicted path, (N + 1, 3) m."""
+    """The state of a mission. paths: predicted path per role, (N + 1, 3) m."""
 
     rows: tuple[MissionRow, ...]
     done: bool

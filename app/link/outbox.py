@@ -1,4 +1,4 @@
-"""Commands on their way to a simulation: whoever gives one never waits, and nothing piles up without end."""
+"""A queue of commands to a simulation. Adding a command never waits, and the queue is bounded."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections import deque
 from app.link.wire import Parcel, Wire, packed
 
 MOST = 256
-"""Commands that may wait."""
+"""Largest number of commands in the queue."""
 MOST_BYTES = 24_000_000
-"""Bytes that may wait; one command is always taken."""
+"""Largest number of bytes in the queue; a single command is always accepted."""
 
 
 class Outbox:
-    """A bounded queue and the one thread that writes to the wire."""
+    """A bounded queue, and the one thread that writes from it to the wire."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
@@ -26,7 +26,7 @@ class Outbox:
         self._writer.start()
 
     def put(self, message: object) -> bool:
-        """Whether there was room."""
+        """Adds a command; returns whether there was room for it."""
         parcel = packed(message)
         with self._news:
             full = len(self._waiting) >= MOST or self._bytes + len(parcel.content) > MOST_BYTES
@@ -38,14 +38,15 @@ class Outbox:
             return True
 
     def close(self) -> None:
-        """What still waits is forgotten."""
+        """Discards all commands that still wait."""
         with self._news:
             self._closed = True
             self._waiting.clear()
             self._news.notify()
 
     def join(self) -> None:
-        """Waits until nothing is written any more: after `close`, and once the wire hangs up."""
+        """Waits until the thread has stopped writing; to be called after `close`, when the wire has been
+        closed."""
         self._writer.join()
 
     def _write(self) -> None:
@@ -59,4 +60,4 @@ class Outbox:
             try:
                 self._wire.post(parcel)
             except OSError:
-                return  # nobody reads any more; whoever listens hears of it
+                return  # the receiver has closed its end, which the receiving thread notices

@@ -1,4 +1,4 @@
-"""What a page is told of a controller of its learner's own."""
+"""What a page is told about a controller from the learner's own file."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OwnCode:
-    """The controller is a file of one's own.
+    """The state of a controller from the user's own file.
 
     Attributes:
         file: its path.
         fault: one sentence if it does not run as it is.
-        saves: how often a saved text took over.
-        at: s, when the last one did.
+        saves: number of times that a saved text took effect.
+        at: simulated time of the last one, s.
     """
 
     file: str

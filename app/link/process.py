@@ -1,4 +1,4 @@
-"""The page's handle of a simulation process. Nothing here waits for the process, but `close`."""
+"""The page's handle of a simulation process. Only `close` waits for the process."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from app.link.messages import Command, Quit, Report, SimulationFailed
 from app.link.outbox import Outbox
 from app.link.wire import Wire
 
-_END = 1.0  # s a process gets to end by itself
+_END = 1.0  # s that a process gets to end by itself
 
 Start = Callable[[socket.socket], Child]
-"""Starts a child with its end of the socket."""
+"""Starts a child that gets this end of the socket."""
 
 
 class Process:
-    """A child. Reports arrive on a thread of this handle and go to the `listen`er."""
+    """A child process. Reports arrive on a thread of this handle, which passes them to the `listen`er."""
 
     def __init__(self, start: Start, *instead: Start) -> None:
-        """instead: other ways, one after the other, for a child that was never born."""
+        """instead: other ways to start the child, tried in order if it ended before it had started."""
         ours, self._theirs = socket.socketpair()
         self._wire = Wire(ours)
         self._instead = list(instead)
@@ -35,7 +35,7 @@ class Process:
         self._closed = False
         self._ended = threading.Event()
         self.heard_at = time.monotonic()
-        """When it last said something, or was born."""
+        """Time of its last report or of its start."""
         self._hearing = threading.Thread(target=self._hear, daemon=True)
         self._hearing.start()
 
@@ -45,7 +45,7 @@ class Process:
 
     @property
     def preparing(self) -> str | None:
-        """What it waits for before it is born; None afterwards."""
+        """What the child waits for before it starts; None afterwards."""
         child = self._child
         return child.doing if child.pid is None and not self._ended.is_set() else None
 
@@ -62,23 +62,23 @@ class Process:
             self._listener = listener
 
     def send(self, command: Command) -> bool:
-        """Whether the command was taken: it waits to be read. False if too many wait already, or nobody will
-        ever read it."""
+        """Queues a command; returns whether it was accepted. False if too many commands wait already, or the
+        process has ended."""
         return not self._closed and self._outbox.put(command)
 
     def kill(self) -> None:
-        """Ends the child by force, without waiting for that."""
+        """Kills the child without waiting for its end."""
         self._closed = True
         self._child.kill()
-        self._wire.hang_up()  # a child that is born later finds nobody
+        self._wire.hang_up()  # a child that starts later finds the socket closed
 
     def close(self, patience: float = _END) -> None:
-        """Ends the child: by itself within `patience`, s, else by force."""
+        """Ends the child: it may end by itself within `patience`, s; otherwise it is killed."""
         if self._child.pid is not None and patience and self.send(Quit()):
             self._closed = True
             self._ended.wait(patience)
         self.kill()
-        # What the child said last is still heard: it may bring memory that must be freed.
+        # The last reports of the child are still read: they may name shared memory that must be freed.
         if self._hearing is not threading.current_thread():
             self._hearing.join(2 * _END)
 
@@ -97,7 +97,7 @@ class Process:
         self._child.close()
 
     def _follow(self) -> bool:
-        """Until the child has ended; whether the last it said is that it failed."""
+        """Reads reports until the child has ended; returns whether the last one was a failure."""
         failed, over = False, 0.0
         while True:
             there, news = self._wait(None if not over else over - time.monotonic())
@@ -105,7 +105,7 @@ class Process:
                 try:
                     report: Report = self._wire.recv()
                 except (EOFError, OSError):
-                    over = time.monotonic() + _END  # its exit code is on the way
+                    over = time.monotonic() + _END  # the exit code will arrive shortly
                 else:
                     failed = isinstance(report, SimulationFailed)
                     self._pass_on(report)
@@ -118,7 +118,7 @@ class Process:
                 return failed
 
     def _wait(self, timeout: float | None) -> tuple[bool, bool]:
-        """(whether the wire, whether the child has news)."""
+        """(whether the wire can be read, whether the child has news)."""
         watched = select.poll()
         if timeout is None:
             watched.register(self._wire, select.POLLIN)
@@ -129,7 +129,7 @@ class Process:
     def _look(self) -> bool:
         ended = self._child.look()
         if self._child.pid is not None:
-            self._theirs.close()  # from now on the child's death is the end of what it says
+            self._theirs.close()  # once the child ends, its socket is now closed
         elif ended and self._instead and not self._closed:
             self._child.close()
             self._child = self._instead.pop(0)(self._theirs)
@@ -155,7 +155,7 @@ def _obituary(exitcode: int | None) -> str:
 
 
 def wait_until(condition: Callable[[], bool], timeout: float, period: float = 0.01) -> bool:
-    """Polls; for start-up and tests."""
+    """Polls until a condition is true; for start-up and tests."""
     end = time.monotonic() + timeout
     while not condition():
         if time.monotonic() > end:

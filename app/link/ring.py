@@ -1,7 +1,7 @@
 """Shared memory between the simulation (one writer) and the page (readers): telemetry rows and poses.
 
-Nothing is pickled and nobody waits: the writer fills a row, then raises the count; readers look only at
-rows behind the count and not so old that they might be overwritten meanwhile.
+Data are not pickled, and no process waits: the writer fills a row, then increments the count; readers read
+only rows below the count that are recent enough not to be overwritten meanwhile.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MAX_ROWS = 8192
 MIN_ROWS = 1024
-"""A second of ticks: with fewer, a page that is late for a moment would miss some."""
+"""Rows of one second of ticks: with fewer, a page that is briefly late would miss some."""
 _MAX_BYTES = 12_000_000  # of each session
 _MARGIN = 256  # rows the writer may add while a reader copies
 _HEAD = 64  # bytes
@@ -57,12 +57,12 @@ class Block:
 
     @property
     def handle(self) -> Handle:
-        """For the other process; of the one who created it."""
+        """The handle for the other process; only the process that created the memory has it."""
         return Handle(self._file)
 
     @property
     def count(self) -> int:
-        """Rows ever written."""
+        """Number of rows written so far."""
         return int(self._head[0])
 
     def write(self, row: np.ndarray) -> None:
@@ -72,18 +72,18 @@ class Block:
 
     def write_poses(self, poses: np.ndarray, t: float = 0.0) -> None:
         """t: the simulated time of the poses, s."""
-        self._head[1] += 1  # odd: being written
+        self._head[1] += 1  # odd: a write is in progress
         self._poses[:] = poses
         self._time[0] = t
         self._head[1] += 1
 
     def poses(self) -> np.ndarray:
-        """A copy of the poses written last."""
+        """A copy of the latest poses."""
         return self.moment()[1]
 
     def moment(self) -> tuple[float, np.ndarray]:
-        """(simulated time in s, poses), not torn between two instants (or, in the unlikely fourth try, may
-        be)."""
+        """(simulated time in s, poses) of one instant. After three failed attempts the result may mix two
+        instants, which is unlikely."""
         t, copy = float(self._time[0]), self._poses.copy()
         for _ in range(3):
             before = int(self._head[1])
@@ -93,13 +93,14 @@ class Block:
         return t, copy
 
     def since(self, count: int) -> tuple[int, np.ndarray]:
-        """(index of the first row, copies of the rows) from `count` on, as far as they are still there."""
+        """(index of the first row, copies of the rows) from row `count` on, as far as they have not been
+        overwritten."""
         end = self.count
         first = max(count, end - self.rows + _MARGIN, 0)
         return first, self._ring[np.arange(first, end) % self.rows]
 
     def close(self) -> None:
-        """Detaches."""
+        """Detaches from the memory."""
         del self._head, self._time, self._ring, self._poses
         self._memory.close()
         self._close_file()
@@ -111,8 +112,8 @@ class Block:
 
 
 def _allocated(row: int, rest: int) -> int:
-    """An unnamed file in memory with room for as many rows as there is memory for, all of it set aside now:
-    memory that is missing only when it is written to would end the process."""
+    """Creates an unnamed file in memory for as many rows as there is memory for, and allocates all of it now:
+    if memory ran out at a later write, the process would end."""
     rows = max(MIN_ROWS, min(MAX_ROWS, _MAX_BYTES // row))
     file = _unnamed()
     while True:

@@ -1,4 +1,5 @@
-"""Where simulations come from: the fork server, and the spare that waits warm for the next browser."""
+"""Sources of simulation processes: the fork server, and a spare process that is ready for the next
+browser."""
 
 from __future__ import annotations
 
@@ -12,13 +13,13 @@ from app.link.process import Process
 
 
 class Spares:
-    """Keeps one child started ahead."""
+    """Keeps one child process started in advance."""
 
     def __init__(self, worker: str, lent: ForkServer | None = None) -> None:
         """
         Args:
             worker: the module that a child runs, see `ForkServer`.
-            lent: a fork server of that worker that others use, too. Who made it ends it.
+            lent: a fork server of that worker that is shared with others; its creator ends it.
         """
         self._worker = worker
         self._lent = lent
@@ -31,17 +32,17 @@ class Spares:
 
     @property
     def server(self) -> ForkServer | None:
-        """The fork server, if there is one."""
+        """The fork server; None if there is none."""
         return self._server
 
     def refill(self) -> None:
-        """Starts a spare unless there is one."""
+        """Starts a spare if there is none."""
         with self._lock:
             if not self._closed and (self._spare is None or not self._spare.alive):
                 self._spare = self._make()
 
     def take(self) -> Process:
-        """The spare, or a new child."""
+        """Returns the spare, or a new child."""
         with self._lock:
             spare, self._spare = self._spare, None
             return spare if spare is not None and spare.alive else self._make()
@@ -50,7 +51,8 @@ class Spares:
         return Process(self._start, self._start_again, self._spawn)
 
     def _start_again(self, theirs: socket.socket) -> Child:
-        """For a child whose fork server ended before it was born."""
+        """Starts another fork server and a child, for a child whose fork server ended before the child had
+        started."""
         with self._lock:
             return self._start(theirs)
 
@@ -62,7 +64,7 @@ class Spares:
         return self._spawn(theirs)
 
     def _mind_the_server(self) -> None:
-        """A server that has died or hangs is replaced; one that never came to be ready is not tried again."""
+        """Replaces a fork server that died or hangs. A server that was never ready is not replaced."""
         server = self._server
         if server is not None and (not server.alive or server.stuck):
             self._forks = server.ready or server.stopped
@@ -79,7 +81,7 @@ class Spares:
         return Spawned(self._worker, theirs)
 
     def close(self) -> None:
-        """Ends the spare, the fork server unless it is lent, and every child that is left of what it ends."""
+        """Ends the spare, the fork server unless it is lent, and all remaining children of what it ends."""
         with self._lock:
             self._closed = True
             spare, self._spare = self._spare, None

@@ -1,4 +1,4 @@
-"""Whole messages over a socket between two processes of one machine, open files among them."""
+"""Whole messages, with open files, over a socket between two processes of one machine."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-_HEAD = struct.Struct("!QB")  # bytes that follow, open files that come along
+_HEAD = struct.Struct("!QB")  # number of bytes and of open files that follow
 _MOST_FILES = 8
 
 
 @dataclass(frozen=True)
 class Handle:
-    """An open file, by its number in this process. In a message it arrives as a file of the receiver's own,
-    who closes it."""
+    """An open file, by its descriptor in this process. The receiver of a message gets a descriptor of its
+    own, which it must close."""
 
     number: int
 
 
 @dataclass(frozen=True, eq=False)
 class Parcel:
-    """A message as it is sent."""
+    """A serialised message."""
 
     content: bytes
     files: tuple[int, ...]
@@ -53,14 +53,14 @@ class _Unpickler(pickle.Unpickler):
 
 
 def packed(message: object) -> Parcel:
-    """A message ready to be sent: what it says cannot change any more."""
+    """Serialises a message; later changes of the object do not change what is sent."""
     target, files = io.BytesIO(), list[int]()
     _Pickler(target, files).dump(message)
     return Parcel(target.getvalue(), tuple(files))
 
 
 class Wire:
-    """One end of a socket. One thread may send and one other may receive."""
+    """One end of a socket. One thread may send while another one receives."""
 
     def __init__(self, end: socket.socket) -> None:
         self._end = end
@@ -71,15 +71,17 @@ class Wire:
         return self._end.fileno()
 
     def send(self, message: object) -> None:
-        """Waits while the other end does not read. Raises OSError if there is no other end."""
+        """Sends a message; waits while the other end does not read. Raises OSError if the other end is
+        closed."""
         self.post(packed(message))
 
     def post(self, parcel: Parcel, wait: bool = True) -> None:
-        """As `send`. Without `wait`, for small messages only, raises BlockingIOError when nobody reads."""
+        """As `send`. With `wait` False, which is for small messages only, raises BlockingIOError if the
+        socket is full."""
         head = _HEAD.pack(len(parcel.content), len(parcel.files))
         flags = 0 if wait else socket.MSG_DONTWAIT
         if parcel.files:
-            # Files travel with the first byte.
+            # The files are sent with the first byte.
             sent = socket.send_fds(self._end, [head, parcel.content], list(parcel.files), flags)
         else:
             sent = self._end.sendmsg([head, parcel.content], [], flags)
@@ -87,11 +89,13 @@ class Wire:
             self._end.sendall((head + parcel.content)[sent:])
 
     def poll(self, timeout: float | None = 0.0) -> bool:
-        """Whether a message, or the end, can be received within so many seconds; None: wait for it."""
+        """Whether a message, or the end of the connection, can be received within `timeout` seconds; None: no
+        limit."""
         return bool(self._poll.poll(None if timeout is None else 1e3 * timeout))
 
     def recv(self) -> Any:
-        """The next message; waits for it. Raises EOFError or OSError if there is no other end."""
+        """Waits for the next message and returns it. Raises EOFError or OSError if the other end is
+        closed."""
         head, files = self._head()
         try:
             size, count = _HEAD.unpack(head)
@@ -125,7 +129,7 @@ class Wire:
             view = view[count:]
 
     def hang_up(self) -> None:
-        """Wakes whoever sends or receives here, and tells the other end that this was all."""
+        """Ends sending and receiving on both ends, which wakes the threads that wait there."""
         try:
             self._end.shutdown(socket.SHUT_RDWR)
         except OSError:

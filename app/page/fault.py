@@ -1,4 +1,5 @@
-"""A fault of one's own code in sight wherever the panel is scrolled to, and on a phone above its sheet."""
+"""A notification about an error in the user's own code. It is visible however far the panel is scrolled, and
+above the sheet of a phone."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import viser
 
 
 class FaultNotice:
-    """At the top of the page, until the code is mended or the learner closes it."""
+    """A notification at the top of the page until the code is corrected or the learner closes it."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
@@ -14,11 +15,12 @@ class FaultNotice:
         self._shown: viser.NotificationHandle | None = None
 
     def show(self, sentence: str | None) -> None:
-        """The fault, or None if there is none."""
+        """Shows the sentence of a fault; None removes the notification."""
         if sentence == self._said:
             return
         self._said = sentence
-        # Not updated: one that was closed would stay so, and the new fault unseen.
+        # Replaced, not updated: a notification that the learner closed would stay closed and hide the new
+        # fault.
         if self._shown is not None:
             self._shown.remove()
         self._shown = None

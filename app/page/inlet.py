@@ -1,4 +1,4 @@
-"""Everything a page says that `app.server.words` knows passes here before viser applies it."""
+"""Checks every message of a page, as described in `app.server.words`, before viser applies it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _GONE = "What you just pressed or changed was replaced meanwhile: if it is still
 
 
 class Inlet:
-    """Of one page. A value that a control cannot have is refused with a notice, and the control put back; a
-    press on a control that is gone is not lost in silence; and neither is a callback's exception."""
+    """The inlet of one page. It refuses a value that a control cannot have with a notice, and resets the
+    control. It also shows a notice for a press on a removed control and for an exception in a callback."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
@@ -61,7 +61,7 @@ class Inlet:
             private.send_again(handle)
 
     def say(self, title: str, sentence: str) -> None:
-        """A notice; of many, one now and then."""
+        """Shows a notice; if there are many, only one every few seconds."""
         now = time.monotonic()
         if now >= self._next_notice:
             self._next_notice = now + _OFTEN

@@ -1,4 +1,4 @@
-"""What one scene looks like in one page: the 3D view, the panels, and how they follow the session."""
+"""The view of one scene in one page: the 3D view, the panels, and their updates from the session."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
 class Stage:
-    """Built once per scene. `follow` is called by the page's loop; callbacks only post."""
+    """The view of one scene, built once per scene. The page's loop calls `follow`; callbacks only post
+    events."""
 
     def __init__(
         self,
@@ -63,7 +64,8 @@ class Stage:
         notebook: Notebook,
         phone: bool,
     ) -> None:
-        """phone: a panel at the side is not shown there, so that plots go among the other tabs."""
+        """phone: a phone does not show the panel at the side, so that the plots become tabs of the other
+        panel."""
         self._client, self._learner, self._ready = client, learner, ready
         self._theme = theme
         self._colours = level_colours([task.level for task in in_order(ready)])
@@ -122,7 +124,7 @@ class Stage:
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
         with tabs.add_tab("Help"):
             self._help = HelpPanel(gui)
-        for place, key in enumerate(_HOTKEYS):  # a stack may grow
+        for place, key in enumerate(_HOTKEYS):  # a stack may get more levels
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):
@@ -137,7 +139,7 @@ class Stage:
             self._post(event)
 
     def _build_scene(self, scene: viser.SceneApi, dark: bool) -> None:
-        # Shadows triple the cost of a frame, which decides on a laptop or a phone.
+        # Shadows triple the rendering time of a frame, which matters on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
         self._floor = _floor(scene, self._ready.room)
         self._paint_floor(dark)
@@ -149,7 +151,7 @@ class Stage:
         self._paint_floor(dark)
 
     def _paint_floor(self, dark: bool) -> None:
-        """Lines that stay behind the robot, whatever the background."""
+        """Draws the grid lines of the floor, which stay behind the robot on every background."""
         cell, section = (70, 105) if dark else (215, 175)
         self._floor.cell_color = (cell, cell, cell)
         self._floor.section_color = (section, section, section)
@@ -163,7 +165,7 @@ class Stage:
         self._learner.send(Post(event))
 
     def recompose(self, ready: Ready) -> None:
-        """The same run goes on under another stack: what shows levels and tasks is built anew."""
+        """Rebuilds what shows levels and tasks when the run continues with another stack."""
         self._ready = ready
         colours = recoloured([task.level for task in in_order(ready)], self._colours)
         self._colours.clear()
@@ -173,22 +175,22 @@ class Stage:
     # ---------------------------------------------------------------- following
 
     def refuse(self, sentence: str) -> bool:
-        """Whether it was told where it was asked for."""
+        """Shows a refusal in the panel that asked; returns whether there was one."""
         return self._robot_panel.refuse(sentence)
 
     def show_trouble(self, trouble: Trouble | None) -> None:
         self._playback.show_trouble(trouble)
 
     def follow(self, plots: bool, texts: bool) -> None:
-        """Shows the newest poses, and now and then plots and texts. A page that nobody sees gets texts only,
-        and a browser that still waits for what was sent last gets no more for now: later it will be newer."""
+        """Shows the newest poses, and at times plots and texts. A page in a hidden tab gets texts only. A
+        browser that has not received the last messages yet gets nothing for now, and newer data later."""
         learner = self._learner
         if learner.status is not None:
             self._time_line.update(learner.status.running)
         due, plots = plots, plots and not self._in_view.asleep
         moment = moment_of(learner, self._time_line.past, curves=due)
         if moment is None or learner.ready is not self._ready:
-            return  # nothing yet, or already another scene, which the page will build
+            return  # no report yet, or already a report of another scene, which the page will build
         if not self._in_view.asleep:
             self._draw(moment, plots)
         if texts and learner.failure is None:
@@ -254,7 +256,7 @@ class Stage:
 
 
 def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
-    """A floor below the robot and the points (k, 3) it will go to, m."""
+    """Draws a floor below the robot and the points (k, 3) that it will reach, m."""
     far = float(np.abs(room[:, :2]).max(initial=0.0))
     if far == 0.0:
         return scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)

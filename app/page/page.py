@@ -41,7 +41,7 @@ _NOT_ITS_FILE = "This page may not open files of the machine that himpc-lab runs
 
 
 class Page:
-    """A thread that looks at the learner. It builds a `Stage` whenever the learner has another scene."""
+    """A thread that follows a learner. It builds a `Stage` whenever the learner has another scene."""
 
     def __init__(
         self,
@@ -54,8 +54,9 @@ class Page:
         on_dark: Callable[[bool], None],
         greet: Callable[[viser.GuiApi], None],
     ) -> None:
-        """own_files: where files may lie that this page names; None: it may name none; loop: viser's event
-        loop; on_dark: hears which theme is shown; greet: writes at the panel's top whenever it is built."""
+        """own_files: folder of the files that this page may name; None: it may name none; loop: viser's event
+        loop; on_dark: called with whether the dark theme is shown; greet: adds elements at the top of the
+        panel whenever it is built."""
         self.learner = learner
         self._on_dark = on_dark
         self._greet = greet
@@ -66,7 +67,7 @@ class Page:
         self._event_loop = loop
         self._notebook = notebook
         self._phone = False
-        self._seen: tuple[str | None, ...] | None = None  # what the camera was last turned to
+        self._seen: tuple[str | None, ...] | None = None  # names of what the camera was turned to
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
@@ -78,7 +79,7 @@ class Page:
         self._thread = threading.Thread(target=self._loop, daemon=True)
 
     def start(self) -> None:
-        # Told now, because docked panels will leave a desktop's scene as narrow as a phone's.
+        # Sent now, because docked panels will later make a desktop's scene as narrow as a phone's.
         camera = self._client.camera
         self._phone = camera.image_width < camera.image_height
         gui = self._client.gui
@@ -118,14 +119,14 @@ class Page:
         learner = self.learner
         ready = learner.ready
         if ready is not None and ready is not self._built:
-            before, self._built = self._built, ready  # also of one that cannot be built: once is enough
+            before, self._built = self._built, ready  # a scene that cannot be built is tried only once
             same = ready.again and before is not None and before.choice == ready.choice
             try:
                 self._show(ready, same)
             except Exception:
                 if learner.ready is ready:
                     raise
-                self._drop_stage()  # another scene came in meanwhile: it is built at the next look
+                self._drop_stage()  # another scene was loaded meanwhile; it is built in the next cycle
                 return
         self._pass_on()
         stage = self._stage
@@ -137,17 +138,17 @@ class Page:
             self._trouble = trouble
             stage.show_trouble(trouble)
         if private.waiting(self._client) > 0:
-            learner.look()  # the line is slow: what happens meanwhile is kept, and the next picture is newer
+            learner.look()  # the connection is slow: data are stored, and the next picture is newer
             return
         try:
             stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
         except Exception:
-            # Another scene may come in at any moment: its rows and poses do not fit this stage.
+            # Another scene may be loaded at any moment; its rows and poses do not fit this stage.
             if learner.ready is self._built:
                 raise
 
     def _show(self, ready: Ready, same: bool) -> None:
-        """Builds a scene; same: it is the run on show, under another stack."""
+        """Builds a scene; same: it is the run that is shown, with another stack."""
         if same and self._stage is not None:
             with self._client.atomic():
                 self._stage.recompose(ready)
@@ -155,7 +156,8 @@ class Page:
             self._build(ready)
 
     def _own_trouble(self) -> Trouble | None:
-        """What is wrong with the learner's own code; says also when a saved text took over."""
+        """The fault of the learner's own code, if there is one; also shows a notice when saved code took
+        effect."""
         status = self.learner.status
         own = None if status is None else status.own
         fault = None if own is None or own.fault is None else self.learner.choice.without_places(own.fault)
@@ -177,12 +179,12 @@ class Page:
         now = time.perf_counter()
         if now < self._next_plots:
             return False
-        # Frames come a little too late or too early; on average the rate is kept.
+        # Frames arrive slightly early or late; this keeps the average rate.
         self._next_plots = max(self._next_plots, now - 1 / RATE) + 1 / PLOTS_RATE
         return True
 
     def _show_early_trouble(self) -> None:
-        """The simulation died or hangs before there was anything to show."""
+        """Shows that the simulation died or hangs before there was anything to show."""
         trouble = self.learner.trouble()
         if trouble == self._trouble or self._waiting is None:
             return
@@ -198,7 +200,7 @@ class Page:
         self._again.visible = trouble is not None and trouble.offer is not None
 
     def _load(self, choice: SceneChoice) -> None:
-        """Another scene. Whatever panel asks for it: no file that this page may not name."""
+        """Loads another scene for any panel. Refuses files that this page may not name."""
         asked = choice.asked - self.learner.choice.paths
         if asked and (self._own_files is None or not all(map(self._own_files.holds, asked))):
             self._client.add_notification("Not loaded", _NOT_ITS_FILE, color="red")
@@ -209,7 +211,7 @@ class Page:
         self.learner.restart()
 
     def _build(self, ready: Ready) -> None:
-        # Not above: a page can be opened, and say what it waits for, before all of this is loaded.
+        # Imported here, so that the page can open and show a waiting message before all of this is loaded.
         from app.page.layout import Stage
         from app.view.robot import aim
 
@@ -234,7 +236,7 @@ class Page:
             add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
-            if seen != self._seen:  # a restart leaves the learner's view as it was
+            if seen != self._seen:  # after a restart the camera stays as the learner left it
                 ways = [task.path for task in ready.tasks if task.path is not None]
                 aim(self._client.camera, ready.robot, self._phone, ready.room, ways)
                 self._seen = seen
@@ -248,20 +250,21 @@ class Page:
             before.close()
 
     def _frame(self) -> None:
-        """The robot as it stands now into the middle of the picture, seen from where it is seen."""
+        """Moves the robot into the middle of the picture, seen from the present direction."""
         from app.view.camera import look
 
         poses = self.learner.read(lambda block, _: block.poses())
         ready = self._built
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
-        base = np.zeros((0 if len(ready.room) else 1, 3))  # of a robot on wheels it is not where it began
+        base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot has left its initial place
         look(self._client.camera, np.vstack([base, poses[:, :3]]), self._phone, None)
 
     def _break(self, error: Exception) -> None:
-        """Something of the page does not work: a sentence and a way on, instead of what no longer moves."""
+        """Shows an error of the page with a sentence and a button to continue, in place of the broken
+        view."""
         if self._closed.is_set():
-            return  # the tab is gone, and its panels with it
+            return  # the tab was closed, and its panels with it
         traceback.print_exc()
         before, self._stage = self._stage, None
         self._waiting = self._again = None
@@ -275,7 +278,7 @@ class Page:
                 before.close()
 
     def _pass_on(self) -> None:
-        """Sentences of the session go where they belong."""
+        """Shows the sentences of the session where they belong."""
         refusals, notices = self.learner.take_messages()
         for sentence in map(self.learner.choice.without_places, refusals):
             if self._stage is None or not self._stage.refuse(sentence):

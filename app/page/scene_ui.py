@@ -1,4 +1,4 @@
-"""What a stage asks of the kind of scene it shows."""
+"""The interface between a stage and the user interface of a kind of scene."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from lessons.events import Event
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """Where a face lives. in_view: what its browser shows; bindings: of the kind's settings; theme: called
-    with a new theme, dark or not."""
+    """What a face needs from its page. in_view: what the browser shows; bindings: for the settings of this
+    kind; theme: called with each new theme, True for dark."""
 
     client: viser.ClientHandle
     in_view: InView
@@ -37,73 +37,75 @@ class Context:
     theme: Callable[[bool], None]
 
     def post(self, event: Event) -> None:
-        """An event for the session's mailbox."""
+        """Puts an event into the session's mailbox."""
         self.learner.send(Post(event))
 
     @property
     def settings(self) -> Any:
-        """The settings in force, of the scene's kind."""
+        """The present settings, of this kind of scene."""
         return self.learner.settings_of(self.ready)
 
     def poses(self) -> np.ndarray | None:
-        """Poses of joints 1 … n and the tip, (n + 1, 7); None if they are another scene's by now, whose robot
-        may have other joints."""
+        """Poses of joints 1 … n and the tip, (n + 1, 7); None if another scene was loaded meanwhile, whose
+        robot may have another number of joints."""
         learner = self.learner
         return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
 
     def poses_or_still(self) -> np.ndarray:
-        """The same, for what is built now and follows later; where nothing is known, frames at the origin."""
+        """As `poses`, for objects that are built now and updated later; identity poses if none are known."""
         poses = self.poses()
         still = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
         return np.tile(still, (self.ready.robot.n + 1, 1)) if poses is None else poses
 
 
 class Face(Protocol):
-    """Built in this order: first plot, tabs, plots, scene. `follow` comes with every frame."""
+    """The user interface of a kind of scene, built in this order: first plot, tabs, plots, scene. `follow` is
+    called for every frame."""
 
     fastest: ClassVar[float]
-    """The highest speed of the simulation that makes sense, simulated seconds per second."""
+    """The highest useful speed of the simulation, simulated seconds per second."""
 
     def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
-        """The kind's tabs, the first one first."""
+        """Adds the tabs of this kind, beginning with the first tab."""
         ...
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """The tab of the panel on the left that comes before the lesson's, if any does."""
+        """Adds the tab of the left panel that precedes the lesson's, if there is one."""
         ...
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """The kind's tabs of the panel on the left."""
+        """Adds the tabs of this kind to the left panel."""
         ...
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
-        """What the 3D view shows besides robot and floor."""
+        """Adds to the 3D view what it shows besides robot and floor."""
         ...
 
     def recompose(self, ready: Ready) -> None:
-        """The same run goes on under another stack."""
+        """Updates the interface when the run continues with another stack."""
         ...
 
     def toggle(self, place: int) -> Event | None:
-        """The event that switches the level at a place (0-based) on or off; None if there is none."""
+        """The event that switches the level at an index (0-based) on or off; None if there is no such
+        level."""
         ...
 
     def follow(self, moment: Moment) -> None:
-        """A new frame."""
+        """Updates everything that changes with every frame."""
         ...
 
     def after_reset(self, status: Status) -> None:
-        """The robot was put back to its start."""
+        """Called when the robot was reset to its start."""
         ...
 
     def draw(self, moment: Moment) -> None:
-        """Curves and plots, about ten times a second."""
+        """Updates curves and plots, about ten times per second."""
         ...
 
     def write(self, now: SessionSnapshot[Any]) -> None:
-        """Texts, a few times a second."""
+        """Updates texts, a few times per second."""
         ...
 
     def close(self) -> None:
-        """The scene is about to go."""
+        """Called before the scene is removed."""
         ...

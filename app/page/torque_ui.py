@@ -1,4 +1,5 @@
-"""The face of a torque-level scene: one draggable target, a stack of levels, M̄, and a plant with dynamics."""
+"""The user interface of a torque-level scene: one draggable target, a stack of levels, M̄, and a dynamic
+plant."""
 
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ class TorqueFace:
         self._context = context
         self._inside_tab: viser.GuiTabHandle | None = None
         self._stale: Status | None = None
-        """What was told last under the stack before."""
+        """Last report under the previous stack."""
 
     # ---------------------------------------------------------------- building
 
@@ -72,7 +73,7 @@ class TorqueFace:
         self._start.on_recall = self._recall
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        # A QP of one knot is small enough to be looked at first.
+        # A QP of one knot is small enough to be looked at first, so its tab precedes the others.
         if self._context.settings.horizon == 1:
             self._inside_tab = plots.add_tab("Inside")
 
@@ -102,7 +103,7 @@ class TorqueFace:
             )
 
     def recompose(self, ready: Ready) -> None:
-        """The same run goes on under another stack."""
+        """Updates the interface when the run continues with another stack."""
         context = self._context = replace(self._context, ready=ready)
         self._stale = context.learner.status
         self._tasks.rebuild()
@@ -117,7 +118,7 @@ class TorqueFace:
         context, ready = self._context, self._context.ready
         tip = self._tip()
         self._frames = TargetFrames(scene)
-        self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until there is a tick to tell
+        self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until the first tick is reported
         self._add_targets(scene)
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
@@ -132,7 +133,7 @@ class TorqueFace:
         return self._context.poses_or_still()[-1]
 
     def _targets_now(self) -> dict[str, np.ndarray]:
-        """Where the hand put each target that can be moved, whatever instant is shown."""
+        """The present raw targets, also while a past instant is shown."""
         ready, status = self._context.ready, self._context.learner.status
         targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
         return targets if status is None or status is self._stale else targets | status.targets
@@ -204,7 +205,7 @@ class TorqueFace:
     def write(self, now: SessionSnapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:
             fields = now.ready.layout.fields
-            # The snapshot's row is its own copy.
+            # The row in the snapshot is a copy.
             now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
         self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
         self._start.update(now, self._context.colours)

@@ -1,4 +1,4 @@
-"""What each kind of scene brings to the page: its panels, plots and things in the 3D view."""
+"""The user interface for each kind of scene: its panels, plots and objects in the 3D view."""
 
 from __future__ import annotations
 
@@ -20,5 +20,5 @@ _FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
 
 
 def face_for(context: Context) -> Face:
-    """The face of the kind of scene that is loaded."""
+    """The user interface for the kind of scene that is loaded."""
     return _FACES[type(context.ready.settings)](context)

@@ -1,4 +1,4 @@
-"""What a browser may write into the page's controls: their values, of the right kind, and nothing else."""
+"""The values that a browser may write into the page's controls."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Any
 import viser
 
 LONGEST = 200_000
-"""Characters of a text."""
+"""Largest number of characters of a text."""
 
 
 class NotAllowed(Exception):
-    """Carries a sentence that says what is refused and why."""
+    """Raised with a sentence that says what is refused and why."""
 
 
 def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
-    """The value that an update brings, on a slider's scale if it was typed beyond it. Raises NotAllowed for
-    every other update: of anything but the value, or to a value the control cannot have."""
+    """The value of an update, limited to a slider's range if a larger one was typed. Raises NotAllowed if the
+    update changes anything but the value, or if the control cannot have the value."""
     label = str(getattr(handle, "label", "") or "A control")
     if not isinstance(updates, dict) or list(updates) != ["value"]:
         raise NotAllowed(f"{label}: a page may write its value and nothing else.")
@@ -38,7 +38,7 @@ def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
 
 
 def _like(present: Any, value: Any, label: str) -> Any:
-    """The value, if it is of the kind of the present one."""
+    """The value, if it has the type of the present one."""
     match present:
         case bool():
             if isinstance(value, bool):
@@ -60,7 +60,7 @@ def _like(present: Any, value: Any, label: str) -> Any:
 
 def _number(value: Any, label: str) -> int | float:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    # A whole number may be too long for a float.
+    # A whole number may be too large for a float.
     if number and abs(value) <= 1e300 and math.isfinite(value):
         return value
     raise NotAllowed(f"{label}: give a number.")

@@ -1,4 +1,5 @@
-"""The face of a velocity-level scene: goals of hand and base, a mission, two predictions, surroundings."""
+"""The user interface of a velocity-level scene: goals of hand and base, a mission, two predictions,
+obstacles."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ from lessons.settings.velocity import VelocitySettings
 from robots.stretch import horizontal_reach
 
 _AHEAD, _RADIUS = 0.7, 0.2
-"""m: where a new obstacle appears in front of the hand, and its radius."""
+"""Distance in front of the hand at which a new obstacle appears, and its radius, m."""
 
 
 class VelocityFace:
@@ -96,7 +97,7 @@ class VelocityFace:
             )
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
-        del robot  # velocity servos do not feel a pull
+        del robot  # velocity servos do not react to a pull
         context, ready = self._context, self._context.ready
         size = gizmo_size(ready.robot)
         self._frames = TargetFrames(scene)
@@ -124,7 +125,7 @@ class VelocityFace:
             self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
 
     def recompose(self, ready: Ready) -> None:
-        """Never happens: the stack of a velocity-level scene is its mission's."""
+        """Does nothing: the stack of a velocity-level scene is given by its mission and never changes."""
 
     # ---------------------------------------------------------------- events out
 
@@ -146,7 +147,8 @@ class VelocityFace:
         self._context.post(Set(f"obstacles.{name}", centre))
 
     def _add_obstacle(self) -> None:
-        """A ball, in front of the hand as seen from the base: near enough to be felt, not yet in the way."""
+        """Adds a ball in front of the hand, as seen from the base: close enough to have an effect, but not
+        yet in the way."""
         poses = self._context.poses()
         if poses is None:
             return
@@ -182,7 +184,7 @@ class VelocityFace:
         self._carried.follow(tip[:3], carries)
 
     def _at(self, task: TaskView, poses: np.ndarray) -> np.ndarray:
-        """Where a task's point is, (3,) m: the tip, or the base on the floor."""
+        """The position of a task's point, (3,) m: the tip, or the base on the floor."""
         if "z" in task.axes or not self._base:
             return poses[-1, :3]
         return np.array([*poses[len(self._base) - 1, :2], 0.01])
@@ -212,7 +214,7 @@ class VelocityFace:
         self._joint_plots.draw(moment.window, beside)
 
     def _draw_desired(self, latest: np.ndarray) -> None:
-        """What the hand is to do now: the point of its reference, turned as its orientation's is."""
+        """Draws the present reference of the hand, position and orientation."""
         hand, turned = next((task for task in self._points if "z" in task.axes), None), self._turned
         if hand is not None:
             fields = self._context.ready.layout.fields

@@ -1,1 +1,1 @@
-"""Controls and plots of one page; each file one thing."""
+"""Controls and plots of one page, one panel per file."""

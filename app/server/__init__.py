@@ -1,1 +1,1 @@
-"""Who may come in: the server, sessions, the classroom."""
+"""The web server: access control, sessions and the classroom."""

@@ -1,4 +1,4 @@
-"""What one connection may cost: messages, bytes, and files that are not complete."""
+"""Limits for one connection: rates of messages and bytes, and the size of incomplete uploads."""
 
 from __future__ import annotations
 
@@ -6,28 +6,29 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 MESSAGES = 200.0
-"""1/s. A page sends each group of controls, each gizmo and the camera at most 20 to 50 times a second; one
-that is dragged and turned with everything at once stays below 100."""
+"""Messages per second, 1/s. A page sends each group of controls, each gizmo and the camera at most 20 to 50
+times per second; one on which everything is dragged and turned at once stays below 100."""
 BURST = 400.0
 BYTES = 4e6
-"""B/s, and so many at once:"""
+"""Bytes per second, B/s, and the largest burst, B:"""
 BYTES_BURST = 24e6
 UPLOADS = 10_000_000
-"""B of files that are not complete."""
+"""Largest total size of incomplete uploads, B."""
 MESSAGE = 12 * 2**20
-"""B, the longest message."""
+"""Length of the longest message, B."""
 PATIENCE = 10.0
-"""s without a pause in which a connection asks for more than it may."""
+"""Time, s, for which a connection may exceed its limits without a pause."""
 CONTROL_FRAMES = 20.0
-"""1/s: pings and the like. Pages send none; a program sends one in 20 s."""
+"""Control frames such as pings per second, 1/s. Pages send none; a program sends one every 20 s."""
 WAITING = 2000
-"""Frames that wait to be taken."""
-_ENTRY = 1024  # B that an upload costs beside what it holds
+"""Largest number of frames that wait to be processed."""
+_ENTRY = 1024  # B of memory that each part of an upload needs in addition to its content
 
 
 @dataclass
 class Bucket:
-    """Fills at `rate`, holds `size`. What is taken is there at once or owed; debts are paid by waiting."""
+    """A token bucket that fills at `rate` and holds `size`. An amount that exceeds the content is owed, and
+    `take` says how long to wait until the debt is paid."""
 
     rate: float
     size: float
@@ -39,7 +40,7 @@ class Bucket:
         self.left, self.at = self.size, self.now()
 
     def take(self, amount: float) -> float:
-        """s to wait until what was taken is paid for."""
+        """Takes an amount; returns the time in s until the bucket has paid for it."""
         now = self.now()
         self.left = min(self.size, self.left + self.rate * (now - self.at)) - amount
         self.at = now
@@ -47,7 +48,7 @@ class Bucket:
 
 
 class Budget:
-    """Of one connection. Nothing in here looks into a message."""
+    """The limits of one connection. The content of messages plays no role here."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
@@ -58,7 +59,8 @@ class Budget:
         self._calm = now()
 
     def wait(self, size: int) -> float:
-        """s before a message of so many bytes may be handled: who sends too much is read more slowly."""
+        """Time, s, to wait before a message of `size` bytes is processed: a connection that sends too much is
+        read more slowly."""
         waiting = max(self._messages.take(1.0), self._bytes.take(float(size)))
         if not waiting:
             self._calm = self._now()
@@ -66,7 +68,7 @@ class Budget:
 
     @property
     def spent(self) -> bool:
-        """It has been asking for too much for too long."""
+        """Whether the connection has exceeded its limits for too long."""
         return self._now() - self._calm > PATIENCE
 
     def controls(self) -> bool:
@@ -74,9 +76,10 @@ class Budget:
         return not self._control.take(1.0)
 
     def uploads(self, size: int, unfinished: Callable[[], int]) -> bool:
-        """Whether a part of so many bytes may be taken. unfinished: what files hold that are not complete."""
+        """Whether a part of `size` bytes may be accepted. unfinished: returns the bytes held by incomplete
+        files."""
         if self._held + size + _ENTRY > UPLOADS:
-            self._held = unfinished()  # files that were complete since then hold nothing more
+            self._held = unfinished()  # files that were completed since then no longer count
         if self._held + size + _ENTRY > UPLOADS:
             return False
         self._held += size + _ENTRY

@@ -1,4 +1,4 @@
-"""One session for everybody: all pages show it, and who has the instructor's token steers it."""
+"""The classroom: all pages show one session, and only pages with the instructor's token control it."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ T = TypeVar("T")
 
 
 class Watcher:
-    """A learner as a page sees it that only watches: everything can be looked at, nothing changes it. It has
-    all that pages use of a `SimulationClient`, and nothing of it can be set."""
+    """The view of the session for a page that only watches. It offers everything that pages use of a
+    `SimulationClient`; commands have no effect and are refused."""
 
     token = ""
     attached = True
 
     def __init__(self, shown: SimulationClient, refuse: Refuse) -> None:
-        """refuse: says on the page why nothing happens."""
+        """refuse: shows a sentence on the page that says why a command was refused."""
         self._shown = shown
         self._refuse = refuse
 
@@ -114,7 +114,7 @@ class Watcher:
         return self._shown.ask(timeout)
 
     def take_messages(self) -> tuple[list[str], list[str]]:
-        """None: they answer what the instructor did."""
+        """Returns no messages: they answer the instructor's commands."""
         return [], []
 
     def send(self, command: Command) -> None:
@@ -137,7 +137,8 @@ class Watcher:
 
 
 class Classroom:
-    """In place of `Sessions`: nobody is turned away, and the session lasts as long as the server."""
+    """Replaces `Sessions` in a classroom: every visitor is admitted, and the session lasts as long as the
+    server."""
 
     def __init__(self, choice: SceneChoice) -> None:
         self.token = secrets.token_urlsafe(16)
@@ -150,19 +151,19 @@ class Classroom:
         return (self._learner,)
 
     def is_right(self, token: str) -> bool:
-        """Whether this is the instructor's; takes as long for every wrong one."""
+        """Whether this is the instructor's token, compared in constant time."""
         return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())
 
     def enter(self, tokens: Sequence[str], refuse: Refuse) -> SimulationClient:
-        """The session itself for who has the token, else a view of it."""
+        """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
         if any(map(self.is_right, tokens)):
             return self._learner
         return cast(SimulationClient, Watcher(self._learner, refuse))
 
     def leave(self, learner: SimulationClient) -> None:
-        """A page was closed: nothing changes."""
+        """Called when a page was closed; the session continues."""
 
     def close(self) -> None:
-        """Ends the process."""
+        """Ends the simulation process."""
         self._learner.close()
         self._spares.close()

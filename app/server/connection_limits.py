@@ -1,4 +1,5 @@
-"""How many connections there may be. Whoever has not said a word makes room for who comes after."""
+"""Limits on the number of connections. If there is no room, the oldest connection that has not sent anything
+is closed for a new one."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ from dataclasses import dataclass
 
 TOTAL = 256
 PER_ADDRESS = 96
-"""A class behind one address, twice."""
+"""Largest number of connections from one address: enough for two per learner of a class behind one
+address."""
 
 
 @dataclass
@@ -18,7 +20,7 @@ class _Guest:
 
 
 class ConnectionLimits:
-    """Those who are connected, oldest first, by whatever identifies a connection."""
+    """The open connections, oldest first, by a key that identifies each."""
 
     def __init__(self, total: int = TOTAL, per_address: int = PER_ADDRESS) -> None:
         self._total, self._per_address = total, per_address
@@ -28,7 +30,8 @@ class ConnectionLimits:
         return len(self._guests)
 
     def enter(self, key: object, address: str | None, leave: Callable[[], object]) -> bool:
-        """Whether there is room. address: None if it says nothing (a proxy's). leave: ends the connection."""
+        """Adds a connection; returns whether there is room. address: None if unknown (behind a proxy). leave:
+        closes the connection."""
         if not self._room(self._total, lambda _: True):
             return False
         self._guests[key] = _Guest(None, leave)
@@ -38,7 +41,8 @@ class ConnectionLimits:
         return False
 
     def comes_from(self, key: object, address: str | None) -> bool:
-        """The address became known; whether there is room for one more from there."""
+        """Stores the address of a connection; returns whether there is room for one more from this
+        address."""
         guest = self._guests.get(key)
         if guest is None:
             return False
@@ -61,7 +65,8 @@ class ConnectionLimits:
         return False
 
     def spoke(self, key: object) -> None:
-        """This one is somebody."""
+        """Notes that this connection has sent a valid message, so that it is no longer closed to make
+        room."""
         guest = self._guests.get(key)
         if guest is not None:
             guest.spoke = True

@@ -1,4 +1,4 @@
-"""Who may come in, judged by a request's headers before anything is answered and before any upgrade."""
+"""Access control: decides from a request's headers before any response is sent and before any upgrade."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ON_EVERY_ANSWER = {
 
 @dataclass(frozen=True)
 class Answer:
-    """In place of what was asked for. `headers` on top of those of every answer."""
+    """A response that replaces the requested one. `headers` are added to those of every response."""
 
     status: HTTPStatus
     title: str
@@ -39,11 +39,13 @@ class Answer:
 
 @dataclass(frozen=True)
 class Door:
-    """Attributes:
-    local: whether only this machine can connect.
-    trusted: origins beside our own, as a browser writes them: a reverse proxy's.
-    passes: what a visitor must bring, in the URL or in the cookie.
-    names: what this machine is called by others.
+    """The access rules of a server.
+
+    Attributes:
+        local: whether only this machine can connect.
+        trusted: further allowed origins, as browsers write them, e.g. a reverse proxy's.
+        passes: the secrets that a visitor must send in the URL or in the cookie.
+        names: the names under which other machines know this one.
     """
 
     local: bool = True
@@ -52,8 +54,9 @@ class Door:
     names: frozenset[str] = frozenset()
 
     def judge(self, request: Request, who: str = "") -> Answer | None:
-        """None: may come in. A request is one of ours if it names us as its host and, where a browser says
-        which page it comes from, that page is ours too. who: sends it, see `app.server.peers`."""
+        """Returns None if the request is admitted, else the response to send. An admitted request names this
+        server as its host and, if the browser says which page sent it, that page is one of ours. who:
+        identifies the sender, see `app.server.peers`."""
         headers = request.headers
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
@@ -72,7 +75,7 @@ class Door:
         return self._ask_token(request, hosts[0], who)
 
     def is_owner(self, request: Request, who: str = "") -> bool:
-        """Whether an upgrade that may come in was sent by who started the server."""
+        """Whether the person who started the server sent this upgrade, which must have been admitted."""
         passes = self.passes
         return "owner" in (passes.in_address(request.path), passes.in_cookies(request.headers, who)) and not (
             came_through_a_proxy(request.headers)
@@ -88,7 +91,7 @@ class Door:
         try:
             address = ipaddress.ip_address(name)
         except ValueError:
-            # A name that merely resolves to us may be anybody's (DNS rebinding).
+            # Any name may resolve to this machine (DNS rebinding), so names that are not ours are refused.
             return name == "localhost" or (not self.local and name in self.names)
         return address.is_loopback or not self.local
 
@@ -107,14 +110,14 @@ class Door:
         return Answer(HTTPStatus.FORBIDDEN, "A token is needed", text, _NOT_KEPT)
 
     def _keep(self, request: Request, host: str, role: Role, who: str) -> Answer:
-        """The secret goes out of the address, and what proves it into the cookie."""
+        """A response that removes the secret from the address and puts a proof of it into the cookie."""
         secure = "; Secure" if f"https://{host.lower()}" in self.trusted else ""
         cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict; Path=/{secure}"
         kept = (("Set-Cookie", cookie), *_NOT_KEPT)
         rest = urlencode({name: values for name, values in _query(request).items() if name != QUERY}, True)
         page = f"./?{rest}" if rest else "./"
         if request.headers.get("Referer") or request.headers.get("Sec-Fetch-Site") == "cross-site":
-            # The browser would leave a strict cookie out of a redirect that a link elsewhere began.
+            # A browser does not send a strict cookie with a redirect that began with a link on another site.
             return Answer(HTTPStatus.OK, "himpc-lab", "Opening …", (*kept, ("Refresh", f"0; url={page}")))
         return Answer(HTTPStatus.SEE_OTHER, "himpc-lab", "Opening …", (*kept, ("Location", page)))
 
@@ -136,14 +139,14 @@ _WRONG = (
 
 
 def names_of_this_machine() -> frozenset[str]:
-    """What others on its network may call it."""
+    """The names under which other machines on the network know this one."""
     name = socket.gethostname().lower()
     short = name.partition(".")[0]
     return frozenset({name, short, f"{short}.local"})
 
 
 def as_origin(text: str) -> str:
-    """An origin as browsers write it. Raises InputError for what is none."""
+    """The origin as browsers write it. Raises InputError if it is not a valid origin."""
     try:
         parts = urlsplit(text.strip())
         port = parts.port
@@ -161,12 +164,13 @@ def as_origin(text: str) -> str:
 
 
 def is_upgrade(request: Request) -> bool:
-    """Whether a web socket is asked for, as viser sees it."""
+    """Whether a request asks for a web socket, by the same test as viser's."""
     return request.headers.get_all("Upgrade") == ["websocket"]
 
 
 def secured(headers: Headers) -> None:
-    """What every answer says: nobody shows us in a frame or guesses at types."""
+    """The headers of every response: other sites may not show it in a frame, and browsers may not guess its
+    type."""
     for name, value in _ON_EVERY_ANSWER.items():
         if name not in headers:
             headers[name] = value
@@ -177,13 +181,13 @@ def _query(request: Request) -> dict[str, list[str]]:
 
 
 def _leads_away(request: Request) -> bool:
-    """viser's page takes from its address which server it speaks with, or whose recording it plays: what
-    they say, scripts included, would run as a part of our page."""
+    """Whether the address tells viser's page to use another server or another recording. Their messages,
+    which may contain scripts, would run as a part of our page."""
     return not _ELSEWHERE.isdisjoint(_query(request))
 
 
 def _is_embedded(headers: Headers) -> bool:
-    """Another site's page asks for a part of its own; following a link from there is welcome."""
+    """Whether a page of another site loads a part of its content from here. A link from there is allowed."""
     site, mode, dest = (headers.get_all(f"Sec-Fetch-{name}") for name in ("Site", "Mode", "Dest"))
     if dest and set(dest) & {"iframe", "frame", "embed", "object"}:
         return True

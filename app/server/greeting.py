@@ -1,4 +1,4 @@
-"""What is printed once the page can be opened."""
+"""The text that is printed when the page can be opened."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _INSTRUCTOR = "instructor's token:"
 
 
 def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
-    """One line for who works alone; for all others a block of addresses, each for whom it is."""
+    """One line for a user who works alone; otherwise a block of addresses that says for whom each one is."""
     yield f"himpc-lab ready at {server.link}"
     shared = server.public or isinstance(server.sessions, Classroom)
     if shared:

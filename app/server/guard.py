@@ -1,4 +1,4 @@
-"""The door, the crowd and the budgets around viser's web server."""
+"""The guard around viser's web server: access control, connection limits and rate limits."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
 
 HANDSHAKE = 5.0
-"""s for a request to be complete."""
+"""Time, s, within which a request must be complete."""
 FIRST_WORD = 45.0
-"""s for a page to say something: drawing the first picture may take long without a graphics card."""
-_SLICE = 4096  # B that are parsed before anybody looks whether it was too much
+"""Time, s, within which a page must send a message: the first picture may take long without a graphics
+card."""
+_SLICE = 4096  # B that are parsed between two checks of the limits
 _PAGE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     "<title>{title}</title><body style='font:16px/1.5 sans-serif;max-width:40em;margin:3em auto'>"
@@ -37,25 +38,25 @@ _PAGE = (
 
 
 class ConnectionGuard:
-    """Given to `open_server`. Refuses everybody until it is opened."""
+    """The guard that `open_server` installs. It refuses every request until it is opened."""
 
     def __init__(self, door: Door) -> None:
         self.crowd = ConnectionLimits()
         self.refused = 0
         self.taken = 0
-        """Messages that reached viser."""
+        """Number of messages that were passed on to viser."""
         self._door = door
         self._open = False
 
     def open(self, door: Door) -> None:
-        """From now on `door` decides."""
+        """Admits requests according to `door` from now on."""
         self._door, self._open = door, True
 
     def close(self) -> None:
         self._open = False
 
     def __call__(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """The keywords of websockets' `serve`."""
+        """The changed keywords for websockets' `serve`."""
         files: Callable[[ServerConnection, Request], Response | None] = given["process_request"] or _nothing
 
         def request(connection: ServerConnection, request: Request) -> Response | None:
@@ -95,12 +96,12 @@ class ConnectionGuard:
         return answer
 
     def _is_owners(self, connection: ServerConnection, request: Request) -> bool:
-        """Whether who started the server opens this page, on the machine where it runs."""
+        """Whether this page was opened by the person who started the server, on the machine where it runs."""
         ends = ends_of(connection.transport)
         return ends is not None and ends.near and self._door.is_owner(request, ends.user)
 
     def address(self, connection: ServerConnection, request: Request | None) -> str | None:
-        """Who connects. None if a proxy on this machine does not say for whom."""
+        """The address of the client. None if a proxy on this machine does not name it."""
         peer = connection.remote_address
         address = str(peer[0]) if isinstance(peer, tuple) and peer else None
         if address is None or not self._door.trusted or not ipaddress.ip_address(address).is_loopback:
@@ -110,9 +111,12 @@ class ConnectionGuard:
 
 
 class GuardedConnection(ServerConnection):
-    """Counts before it decodes, and hands on only what a page says. `uploads` are those of the page it
-    serves, `refuse` tells its user what was not taken, `is_owners` says whether who started the server
-    opened it."""
+    """A connection that counts messages before decoding them, and passes on only messages that a page may
+    send.
+
+    `uploads` are those of the page that it serves, `refuse` tells the user what was refused, and `is_owners`
+    says whether the person who started the server opened the page.
+    """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
         super().__init__(*of, **more)
@@ -125,7 +129,7 @@ class GuardedConnection(ServerConnection):
         self._expecting: asyncio.TimerHandle | None = None
 
     def expect_word(self, patience: float) -> None:
-        """Who is silent for so many seconds is gone."""
+        """Closes the connection if it has sent no valid message after `patience` seconds."""
         self._expecting = self.loop.call_later(patience, self._end_if_silent)
 
     def _end_if_silent(self) -> None:
@@ -139,7 +143,7 @@ class GuardedConnection(ServerConnection):
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._expecting is not None:
-            self._expecting.cancel()  # it would keep all of a page that is gone
+            self._expecting.cancel()  # the timer would keep the closed page in memory
         self._guard.crowd.leave(self)
         super().connection_lost(exc)
 
@@ -163,7 +167,8 @@ class GuardedConnection(ServerConnection):
         super().process_event(event)
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """As of websockets: but what is too much is read more slowly, and at last no more."""
+        """As websockets' `recv`, but a client that sends too much is read more slowly, and disconnected in
+        the end."""
         while True:
             raw = await super().recv(decode)
             self._waiting = len(self.recv_messages.frames)
@@ -184,12 +189,12 @@ class GuardedConnection(ServerConnection):
             return raw
 
     async def _may_upload(self, raw: bytes) -> bool:
-        await asyncio.sleep(0)  # what came before has been taken
+        await asyncio.sleep(0)  # let viser process the messages that came before
         return self.uploads is not None and self.uploads.takes(raw, self._budget)
 
     async def _end(self, code: CloseCode, reason: str) -> NoReturn:
         await self.close(code, reason)
-        raise ConnectionClosedError(None, None)  # what viser takes for an end
+        raise ConnectionClosedError(None, None)  # viser treats this exception as the end of the connection
 
 
 def _user(connection: ServerConnection) -> str:
@@ -198,7 +203,7 @@ def _user(connection: ServerConnection) -> str:
 
 
 def _nothing_said(_: str) -> None:
-    """Nobody is there yet."""
+    """Used while no page is attached that could show the sentence."""
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:
@@ -215,7 +220,7 @@ def _response(answer: Answer) -> Response:
 
 
 def _log() -> logging.Logger:
-    """What strangers send wrong is no news for the terminal."""
+    """A silent logger: malformed requests of strangers are not reported on the terminal."""
     log = logging.getLogger("himpc-lab.connections")
     log.propagate = False
     log.setLevel(logging.CRITICAL)

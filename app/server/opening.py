@@ -1,4 +1,4 @@
-"""The page in the browser of whoever started the server."""
+"""Opens the page in the browser of the person who started the server."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ _LEADING = (
 
 @contextlib.contextmanager
 def opened_in_a_browser(link: str) -> Iterator[None]:
-    """A browser begins with a file that leads to the link, which only this user may read and which is gone
-    afterwards: what a program is started with is shown to every user of the machine."""
+    """Opens the link in a browser. The browser first loads a temporary file that leads to the link. Only this
+    user may read the file, and it is deleted afterwards: every user of the machine can see the arguments of a
+    program."""
     with tempfile.TemporaryDirectory(prefix="himpc-lab-", ignore_cleanup_errors=True) as folder:  # mode 0700
         file = Path(folder) / "open.html"
         with open(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as text:

@@ -1,4 +1,4 @@
-"""What a visitor brings: the token or the owner's secret in the address, afterwards a cookie made of them."""
+"""Proofs of access: the token or the owner's secret in the address, and later a cookie derived from them."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 from websockets.datastructures import Headers
 
 QUERY = "himpc-token"
-"""In the address. Jupyter, behind which a lab may stand, takes `token` for itself."""
+"""The name of the parameter in the address. Jupyter, which may serve a lab, uses `token` for itself."""
 Role = Literal["guest", "owner"]
 _ROLES: tuple[Role, ...] = ("owner", "guest")
 
 
 def new_token() -> str:
-    """128 bits, as text that fits into an address."""
+    """A random token of 128 bits, as text that can be part of an address."""
     return secrets.token_urlsafe(16)
 
 
 @dataclass(frozen=True)
 class Passes:
-    """Of one server, from its start to its end.
+    """The secrets of one server; they are valid until it ends.
 
     Attributes:
-        token: lets in; None: nobody needs one.
-        owner: lets in, too, and proves that who brings it started the server; None: nobody can prove it.
-        cookie: the cookie's name. Cookies of one host are sent to all its ports, so each server has a name of
-            its own for it.
-        key: what cookies are made with. They do not contain what is in the address.
+        token: admits a visitor; None: no token is needed.
+        owner: admits a visitor as the person who started the server; None: no page has this role.
+        cookie: the cookie's name. Browsers send cookies to all ports of a host, so each server uses
+            another name.
+        key: the key from which cookies are derived. They do not contain the secrets of the address.
     """
 
     token: str | None = field(default=None, repr=False)
@@ -41,31 +41,32 @@ class Passes:
     key: bytes = field(default_factory=lambda: secrets.token_bytes(32), repr=False)
 
     def link(self, address: str, role: Role) -> str:
-        """An address of the page as it is handed to somebody of that role."""
+        """The address of the page for a visitor with this role."""
         secret = (role == "owner" and self.owner) or self.token
         return f"{address}/?{urlencode({QUERY: secret})}" if secret else address
 
     def in_address(self, path: str) -> Role | None:
-        """Whose secret an address carries."""
+        """The role whose secret is in an address; None if there is none."""
         given = parse_qs(urlsplit(path).query).get(QUERY, [])
         known = (self.owner, self.token)
         return _first(any(_same(each, right) for each in given) for right in known)
 
     def in_cookies(self, headers: Headers, who: str) -> Role | None:
-        """Whose cookie a request carries that comes from `who`, see `app.server.peers`."""
+        """The role whose cookie is in a request from `who`, see `app.server.peers`; None if there is none."""
         given = list(self._cookies(headers))
         return _first(any(_same(each, self._value(role, who)) for each in given) for role in _ROLES)
 
     def keep(self, role: Role, who: str) -> str:
-        """The cookie of a visitor, name and value. From anybody but `who` it is worth nothing: browsers show
-        it to all servers of the same host, whoever they belong to."""
+        """The name and value of a visitor's cookie. It is only valid for `who`: browsers send it to all
+        servers of the same host, whoever runs them."""
         return f"{self.cookie}={self._value(role, who)}"
 
     def _value(self, role: Role, who: str) -> str:
         return hmac.new(self.key, f"{role} {who}".encode(), hashlib.sha256).hexdigest()
 
     def _cookies(self, headers: Headers) -> Iterable[str]:
-        # By hand: the library gives up the whole line where another server's cookie of this host is odd.
+        # Parsed by hand: the library rejects the whole header if another server of this host has set an
+        # unusual cookie.
         for part in ";".join(headers.get_all("Cookie")).split(";"):
             name, _, value = part.strip().partition("=")
             if name == self.cookie:
@@ -73,7 +74,7 @@ class Passes:
 
 
 def _first(brought: Iterable[bool]) -> Role | None:
-    """The first role whose secret or cookie was brought; all are looked at, whichever it is."""
+    """The first role whose secret or cookie was sent. All are compared in any case."""
     found: list[Role] = [role for role, there in zip(_ROLES, list(brought), strict=True) if there]
     return found[0] if found else None
 

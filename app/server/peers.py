@@ -1,4 +1,4 @@
-"""Who is at the other end of a connection: on which machine, and on this one, which user."""
+"""The other end of a connection: whether it is on this machine, and which of its users it belongs to."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 def came_through_a_proxy(headers: Headers) -> bool:
-    """Whether somebody says to pass it on for somebody else."""
+    """Whether a proxy has forwarded the request for another client."""
     names = [name.lower() for name, _ in headers.raw_items()]
     return any(name in _BY_PROXIES or name.startswith("x-forwarded-") for name in names)
 
 
 @dataclass(frozen=True)
 class Ends:
-    """Of a connection: address and port here, and there."""
+    """The two ends of a connection: address and port here and at the other end."""
 
     ours: tuple[Address, int]
     theirs: tuple[Address, int]
@@ -37,8 +37,8 @@ class Ends:
 
     @property
     def user(self) -> str:
-        """The number of the user whose process is at the other end; "" where that is another machine, or the
-        system does not tell (Linux does)."""
+        """The id of the user whose process is at the other end; "" if it is on another machine or the system
+        does not tell. Linux does."""
         if sys.platform != "linux" or not self.near:
             return ""
         table = Path("/proc/net/tcp6" if self.theirs[0].version == 6 else "/proc/net/tcp")
@@ -51,13 +51,13 @@ class Ends:
 
 
 def ends_of(transport: asyncio.BaseTransport) -> Ends | None:
-    """None for a connection that has no addresses."""
+    """The ends of a connection; None if it has no addresses."""
     ours, theirs = (_end(transport.get_extra_info(name)) for name in ("sockname", "peername"))
     return None if ours is None or theirs is None else Ends(ours, theirs)
 
 
 def _end(found: object) -> tuple[Address, int] | None:
-    """Address and port; an IPv4 address that a socket of IPv6 shows is one of IPv4."""
+    """Address and port; an IPv4 address that is mapped to IPv6 is converted back."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
     address = ipaddress.ip_address(str(found[0]).partition("%")[0])
@@ -66,7 +66,7 @@ def _end(found: object) -> tuple[Address, int] | None:
 
 
 def _listed(address: Address, port: int) -> str:
-    """As Linux lists it: 32-bit words in the machine's own order of bytes."""
+    """The form in which Linux lists an address: 32-bit words in native byte order."""
     packed = address.packed
     words = struct.unpack(f"={len(packed) // 4}I", packed)
     return "".join(f"{word:08X}" for word in words) + f":{port:04X}"

@@ -1,4 +1,4 @@
-"""The web server: one page per browser tab, each with a session of its own."""
+"""The web server: one page per browser tab, each with its own session."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from robots import InputError
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
-"""What the page shows if nothing else is asked for."""
+"""The scene that the page shows by default."""
 
 
 def serve(
@@ -51,10 +51,10 @@ def serve(
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
 
-    With `classroom` all pages show one session; who types the printed token into the page steers it.
-    The page asks for a token unless `ask_token` is False. Files below `own_files` are opened by path, and
-    run, from the page whose address carries the owner's secret; with None from no page.
-    `key` signs what learners hand in.
+    With `classroom` all pages show one session, and pages on which the printed token was typed control it.
+    The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
+    secret may open and run files below `own_files` by path; with None no page may. `key` signs the
+    learners' progress.
     """
     server = PageServer(
         choice,
@@ -79,7 +79,7 @@ def serve(
     finally:
         server.close()
     if server.loading:
-        # A library half imported does not survive the interpreter's own end.
+        # A module that is only partly imported could make the interpreter fail when it exits.
         sys.stdout.flush()
         os._exit(0)
     return 0
@@ -87,7 +87,7 @@ def serve(
 
 @contextlib.contextmanager
 def _ended_by_signals(stop: threading.Event) -> Iterator[None]:
-    """Ctrl-C and SIGTERM set `stop`; the handlers before come back afterwards."""
+    """Lets Ctrl-C and SIGTERM set `stop`; the previous signal handlers are restored afterwards."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -116,7 +116,7 @@ class PageServer:
         own_files: Folder | None = None,
         key: bytes | None = None,
     ) -> None:
-        """As of `serve`; grace: s that a session outlives its tab."""
+        """Arguments as for `serve`; grace: time, s, that a session outlives its tab."""
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         trusted = frozenset(map(as_origin, trusted_origins))
@@ -124,11 +124,11 @@ class PageServer:
         _check_address(host, port)
         few_arenas()
         large_arrays_apart()
-        # A tab may close between two lines of ours; that is no news for the terminal.
+        # A tab may close at any moment, which is not reported on the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         local = host in _LOOPBACK
         self.public = not local or bool(trusted)
-        """Whether others than this machine's users can come to the page."""
+        """Whether other people than the users of this machine can reach the page."""
         self.guard = ConnectionGuard(Door())
         self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
         self._own_files, self._key = own_files, key
@@ -159,17 +159,18 @@ class PageServer:
 
     @property
     def loading(self) -> bool:
-        """Whether what pages are built with is still being loaded."""
+        """Whether modules and meshes for the pages are still being loaded."""
         return self._loading.is_alive()
 
     @property
     def link(self) -> str:
-        """The address for who started the server: with the owner's secret, or else as `guest_link`."""
+        """The link for the person who started the server, with the owner's secret; without a secret,
+        `guest_link`."""
         return self.passes.link(self.url, "owner")
 
     @property
     def guest_link(self) -> str:
-        """The address for everybody else: with the token, if one is needed."""
+        """The link for everybody else, with the token if one is needed."""
         return self.passes.link(self.url, "guest")
 
     # ---------------------------------------------------------------- clients, on viser's loop
@@ -187,7 +188,7 @@ class PageServer:
             visit.leave()
 
     def close(self) -> None:
-        """Ends pages, processes and the server."""
+        """Closes the pages, ends the processes and stops the server."""
         self.guard.close()
         with self._lock:
             visits, self._visits = list(self._visits.values()), {}
@@ -200,8 +201,9 @@ class PageServer:
 
 
 def _check_choice(choice: SceneChoice) -> None:
-    """So that a wrong name or file is one sentence on the terminal, not in a page. What names alone do not
-    tell is loaded for it, which takes a second before anybody can connect."""
+    """Checks a choice, so that a wrong name or file gives one sentence on the terminal, not on a page. If
+    names alone are not enough, the scene is loaded for this check, which takes a second before anybody can
+    connect."""
     if not choice.known:
         from app.worker.reports.start import start
 
@@ -209,8 +211,8 @@ def _check_choice(choice: SceneChoice) -> None:
 
 
 def _load(choice: SceneChoice) -> None:
-    """What pages are built with, while the first one is on its way: panels, then meshes, which take a moment
-    to thin."""
+    """Loads what pages need while the first page connects: the panels, then the meshes, whose simplification
+    takes a moment."""
     import_module("app.page.layout")
     from robots.shapes import link_shapes
 

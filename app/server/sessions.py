@@ -1,4 +1,5 @@
-"""Who is here: one learner per browser tab, resumed after a reload, ended some seconds after a tab closed."""
+"""The learners: one per browser tab. A page that reloads gets its learner back; a learner is removed some
+seconds after its tab closed."""
 
 from __future__ import annotations
 
@@ -14,18 +15,18 @@ from app.link.spares import Spares
 from app.server.malloc_tuning import give_back
 
 WORKER = "app.worker.entry"
-"""What a simulation's process runs; by name, because the server never loads it."""
+"""The module that a simulation process runs; it is given by name, as the server never imports it."""
 Refuse = Callable[[str], object]
-"""Says a sentence on the page that asked for what it may not."""
+"""Shows a sentence on the page that asked for something that is not allowed."""
 
-GRACE = 10.0  # s a session outlives its tab: the time of a reload
+GRACE = 10.0  # s that a session outlives its tab: enough for a reload
 _PERIOD = 0.5  # s between looks at who has left
 _TIDY = 10.0
-"""s between two times that free memory is given back, if scenes came and went meanwhile."""
+"""Time, s, between two times that free memory is returned to the system, if scenes were changed meanwhile."""
 
 
 class Sessions:
-    """At most `max_sessions` learners, and one warm process ahead while there is room."""
+    """At most `max_sessions` learners, and one spare process as long as there is room for another learner."""
 
     def __init__(self, choice: SceneChoice, max_sessions: int, grace: float = GRACE) -> None:
         self.max_sessions = max_sessions
@@ -45,8 +46,8 @@ class Sessions:
             return tuple(self._learners.values())
 
     def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> SimulationClient | None:
-        """The learner this browser left behind (its tokens, latest last) or a new one; None if all places
-        are taken. A place is kept for who left it a moment ago: only its token gets it."""
+        """The learner that this browser left (its tokens, latest last) or a new one; None if all places are
+        taken. A place that was left a moment ago is reserved for the browser with its token."""
         with self._lock:
             if self._closed.is_set():
                 return None
@@ -63,7 +64,7 @@ class Sessions:
         return learner
 
     def leave(self, learner: SimulationClient) -> None:
-        """The tab was closed or reloaded."""
+        """Called when a tab was closed or reloaded."""
         learner.left_at = time.monotonic()
         learner.attached = False
 
@@ -90,7 +91,7 @@ class Sessions:
                 self._spares.refill()
 
     def close(self) -> None:
-        """Ends every process."""
+        """Ends all simulation processes."""
         self._closed.set()
         self._keeper.join()
         with self._lock:

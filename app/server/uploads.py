@@ -1,4 +1,4 @@
-"""Files that one page sends: each is taken whole or refused in one sentence."""
+"""Uploads of one page: each is accepted as a whole or refused with one sentence."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import msgspec
 from app.server.budget import UPLOADS, Budget
 
 TRANSFER = b"FileTransfer"
-"""In every message that begins or carries a file."""
-_REMEMBERED = 64  # refused files whose parts may still come
+"""Every message that begins or carries a file contains this."""
+_REMEMBERED = 64  # number of refused uploads that are remembered, since parts of them may still arrive
 
 
 class _Transfer(msgspec.Struct):
-    """What is read of such a message; its bytes are skipped."""
+    """The decoded fields of an upload message; the file's bytes are skipped."""
 
     transfer_uuid: str = ""
     size_bytes: int = 0
 
 
 class Uploads:
-    """Of one page.
+    """The uploads of one page.
 
     Args:
         unfinished: bytes of its files that are not complete.
@@ -37,7 +37,7 @@ class Uploads:
         self._refused: deque[str] = deque(maxlen=_REMEMBERED)
 
     def takes(self, raw: bytes, budget: Budget) -> bool:
-        """Whether a message that begins or carries a file may go on."""
+        """Whether a message that begins or carries a file may be passed on."""
         try:
             part = msgspec.msgpack.decode(raw, type=_Transfer)
         except msgspec.DecodeError:

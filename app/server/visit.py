@@ -1,4 +1,4 @@
-"""One browser tab, from its first word until it is closed."""
+"""One browser tab, from its first message until it is closed."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from lessons.replay.progress import LearnerProgress
 from lessons.replay.progress import found as found_progress
 
 STORAGE = 5.0
-"""s a browser gets to say what it keeps."""
+"""Time, s, within which a browser must say what it has stored."""
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
-_LONGEST = 100_000  # characters of any of them that we read
+_LONGEST = 100_000  # characters that we read of each stored value
 
 
 class Visit:
-    """Its steps (admitting, closing) come one after the other on a thread of its own, its callbacks run on a
-    few others. viser's loop waits for none of them."""
+    """One visit. Its steps (admitting, closing) run one after the other on a thread of its own, and its
+    callbacks run on a few other threads, so that they never block viser's loop."""
 
     def __init__(
         self,
@@ -47,7 +47,8 @@ class Visit:
         own_files: Folder | None,
         key: bytes | None = None,
     ) -> None:
-        """own_files: where files may lie that the owner's page names; key: signs what learners did."""
+        """own_files: folder of the files that the owner's page may name; key: signs the learners'
+        progress."""
         self._server = server
         self._client = client
         self._sessions = sessions
@@ -74,7 +75,7 @@ class Visit:
             )
 
     async def arrive(self) -> None:
-        """On viser's loop. A browser that does not answer is a new one."""
+        """Starts the visit, on viser's loop. A browser that does not answer is treated as a new one."""
         keys = (_TOKENS, _DARK, _PROGRESS)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
@@ -89,7 +90,7 @@ class Visit:
         self._then(_tokens(tokens))
 
     def leave(self) -> None:
-        """The tab was closed. Returns at once."""
+        """Ends the visit after the tab was closed. Returns at once."""
         if not self._left:
             self._left = True
             if self._asking is not None:
@@ -98,14 +99,14 @@ class Visit:
             self._steps.shutdown(wait=False)
 
     def close(self) -> None:
-        """As `leave`, and waits until it is done."""
+        """As `leave`, and waits until the visit has ended."""
         self.leave()
         self._steps.shutdown(wait=True)
 
     # ---------------------------------------------------------------- steps, on a thread of their own
 
     def _then(self, tokens: Sequence[str]) -> None:
-        """Another attempt to come in."""
+        """Tries to admit the page, for the first time or again."""
         if not self._left:
             self._steps.submit(self._admit, tokens).add_done_callback(print_exception)
 
@@ -113,7 +114,7 @@ class Visit:
         if self._left:
             return
         before, self._page = self._page, None
-        if before is not None:  # it has only watched
+        if before is not None:  # the page has only watched so far
             before.close()
         learner = self._sessions.enter(tokens, self._refuse)
         if learner is None:
@@ -150,7 +151,7 @@ class Visit:
         self._keep(_DARK, "1" if on else "0")
 
     def _greet(self, gui: viser.GuiApi) -> None:
-        """For a page that only watches, until it has the instructor's token."""
+        """Adds the input for the instructor's token to a page that only watches."""
 
         def take(token: str) -> bool:
             right = isinstance(self._sessions, Classroom) and self._sessions.is_right(token)
@@ -192,11 +193,11 @@ class Visit:
 
 
 def _no_greeting(_: viser.GuiApi) -> None:
-    """A page that steers."""
+    """Adds nothing: this page already controls the session."""
 
 
 def _tokens(stored: str | None) -> list[str]:
-    """Tokens from the browser's storage, which anybody may have written."""
+    """Reads tokens from the browser's storage, whose content is not trusted."""
     try:
         found = json.loads(stored or "[]")
     except (ValueError, RecursionError):

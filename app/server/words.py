@@ -1,4 +1,4 @@
-"""What a browser may say: each message's fields, their kinds and their bounds. Nothing else reaches viser."""
+"""The messages that a browser may send: their fields, types and bounds. Other messages never reach viser."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import msgspec
 from msgspec import Meta
 
 LONGEST = 2_000_000
-"""B of a message that carries no part of a file; a text of the page has at most 200,000 characters."""
+"""Largest size, B, of a message without a part of a file; a text of the page has at most 200,000
+characters."""
 _FILE = b"FileTransfer"  # in every message that begins or carries a file
-_CAMERA = b"ViewerCamera"  # in every message that nobody sends on purpose
+_CAMERA = b"ViewerCamera"  # in messages that pages send by themselves
 _LEAST = 1e-9  # m, or of a quaternion: below it there is no direction
 
 Name = Annotated[str, Meta(max_length=1000)]
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
-"""What is dragged further has left every scene. Not a number is neither above nor below."""
+"""A coordinate of a dragged object; beyond these bounds it is outside every scene. NaN does not satisfy
+them."""
 Share = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Place = tuple[Metres, Metres, Metres]
 Turn = tuple[Share, Share, Share, Share]
@@ -29,7 +31,7 @@ Modifier = (
 
 
 class ViewerCameraMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """Where the page is looked at from. A canvas that is not laid out yet has no size."""
+    """The camera of the page. A canvas without a layout has no size."""
 
     wxyz: Turn
     position: Place
@@ -48,7 +50,7 @@ class ViewerCameraMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, 
 
 
 class TransformControlsUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """Arrows or rings were moved."""
+    """The gizmo (arrows or rings) was moved."""
 
     name: Name
     wxyz: Turn
@@ -62,21 +64,21 @@ class TransformControlsUpdateMessage(msgspec.Struct, forbid_unknown_fields=True,
 class TransformControlsDragStartMessage(
     msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"
 ):
-    """A hand takes hold of arrows or rings."""
+    """A drag of the gizmo begins."""
 
     name: Name
     owner: Name
 
 
 class TransformControlsDragEndMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """It lets go."""
+    """A drag of the gizmo ends."""
 
     name: Name
     owner: Name
 
 
 class SceneNodeClickMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A click on a thing in the 3D view."""
+    """A click on an object in the 3D view."""
 
     name: Name
     instance_index: Whole | None
@@ -88,7 +90,7 @@ class SceneNodeClickMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True
 
 
 class SceneNodeDragMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A thing in the 3D view is pulled."""
+    """An object in the 3D view is dragged."""
 
     phase: Literal["start", "update", "end"]
     name: Name
@@ -103,14 +105,14 @@ class SceneNodeDragMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True,
 
 
 class GuiUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A control was written or pressed. What may be written depends on the control, see `app.page.values`."""
+    """A control was changed or pressed. The allowed values depend on the control, see `app.page.values`."""
 
     uuid: Name
     updates: Annotated[dict[str, Any], Meta(max_length=16)]
 
 
 class CommandTriggerMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A key, or a command of the palette."""
+    """A key of a command was pressed, or the command was chosen in the palette."""
 
     uuid: Name
 
@@ -118,7 +120,7 @@ class CommandTriggerMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True
 class LocalStorageGetItemResponseMessage(
     msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"
 ):
-    """What the browser keeps."""
+    """A value from the browser's storage."""
 
     value: str | None
     error: str | None
@@ -126,7 +128,7 @@ class LocalStorageGetItemResponseMessage(
 
 
 class FileTransferStartUpload(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A file will come."""
+    """An upload begins."""
 
     source_component_uuid: Name
     transfer_uuid: Name
@@ -137,7 +139,7 @@ class FileTransferStartUpload(msgspec.Struct, forbid_unknown_fields=True, tag=Tr
 
 
 class FileTransferPart(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A part of it."""
+    """A part of an upload."""
 
     source_component_uuid: Name | None
     transfer_uuid: Name
@@ -162,8 +164,8 @@ _SMALL, _FILES = msgspec.msgpack.Decoder(Small | File), msgspec.msgpack.Decoder(
 
 
 def refusal(raw: bytes) -> str | None:
-    """Why a message is not taken, a sentence, empty where nobody need be told; None if it is a word that a
-    page says."""
+    """Why a message is refused: a sentence, or "" if the user need not be told. None if the message is
+    valid."""
     decoder = _SMALL if len(raw) <= LONGEST else _FILES if _FILE in raw else None
     if decoder is None:
         return f"A page says at most {LONGEST // 1000} kB at once."

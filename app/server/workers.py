@@ -1,4 +1,4 @@
-"""Threads of one page: what keeps them busy keeps nobody else waiting."""
+"""The threads of one page: its callbacks run here, so that they do not block other pages."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from app.adapter.removed_handle_errors import unless_removed
 
 THREADS = 4
 WAITING = 64
-"""Calls that wait for a thread; whatever comes beside them is dropped."""
+"""Largest number of calls that wait for a thread; further calls are dropped."""
 
 
 class Workers(ThreadPoolExecutor):
-    """Drops what is too much, and everything once it is shut down."""
+    """A thread pool that drops calls beyond its limit, and all calls after its shutdown."""
 
     def __init__(self, threads: int = THREADS, waiting: int = WAITING) -> None:
         super().__init__(threads, thread_name_prefix="page")
         self._room = threading.Semaphore(threads + waiting)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """A future of None for what is dropped."""
+        """Submits a call; returns a future with the result None if the call is dropped."""
         if not self._room.acquire(blocking=False):
             return _dropped()
         try:
             future = super().submit(unless_removed, fn, *args, **kwargs)
-        except RuntimeError:  # shut down: its page has been closed
+        except RuntimeError:  # the pool was shut down when its page closed
             self._room.release()
             return _dropped()
         future.add_done_callback(lambda _: self._room.release())

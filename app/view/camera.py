@@ -1,4 +1,4 @@
-"""Where to look from, so that all of something is seen."""
+"""Camera poses from which all given points are visible."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ import numpy as np
 import viser
 
 _SHARE = 0.74
-"""Of the picture's width and height that what is looked at may take: a target has to be dragged somewhere."""
+"""Share of the picture's width and height that the points may take; the rest is room for dragging a
+target."""
 _NARROW = 0.75
-"""Width over height of a desktop's scene once the panels are docked beside it, as a rule."""
+"""Usual ratio of width to height of the scene on a desktop, with the panels docked beside it."""
 _SLIM = 0.2
-"""Width over height below which no more is made of it: the camera would go far away."""
+"""Smallest ratio of width to height that is used: with a smaller one the camera would be too far away."""
 _ASIDE = np.array([1.0, 0.75, 0.55])
-"""From where to look if nothing else is known."""
+"""Default direction from the points to the camera."""
 _THICK = 0.07
-"""How far links reach around their joints, as a share of the robot's size."""
+"""Distance that links extend around their joints, as a share of the robot's size."""
 _SHEET = 0.6
-"""Of a phone's height that viser's sheet covers, from below."""
+"""Share of a phone's height, from below, that viser's sheet covers."""
 
 
 def fit(
     points: np.ndarray, direction: np.ndarray, fov: float, aspect: float, phone: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(position, look_at) of a camera that sees all points in the middle of what is free of its picture.
+    """(position, look_at) of a camera that shows all points in the middle of the free part of its picture.
 
     Args:
         points: (k, 3) m.
@@ -52,16 +53,17 @@ def fit(
 
 
 def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction: np.ndarray | None) -> None:
-    """Turns the camera to all points (k, 3), m; direction: from there to it, None: as it is now."""
+    """Turns the camera to all points (k, 3), m; direction: from the points to the camera, None: the present
+    one."""
     if direction is None:
         here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
         level = float(np.linalg.norm(here[:2]))
-        # Straight from above there is no up; so far down it is nearly the same.
+        # A vertical viewing direction has no up; this steep direction looks nearly the same.
         below = np.array([0.0, 0.05 * abs(here[2]), 0.0])
         direction = here if level > 0.02 * abs(float(here[2])) else here - below
     if not np.linalg.norm(direction) > 0.0:
         direction = _ASIDE
-    # A page that is folded away, or not laid out yet, has no height or no width.
+    # The canvas of a folded page, or of one without a layout, has zero height or width.
     aspect = max(max(camera.image_width, 1) / max(camera.image_height, 1), _SLIM)
     eye, at = fit(points, np.asarray(direction), camera.fov, aspect if phone else min(aspect, _NARROW), phone)
     camera.up_direction = (0.0, 0.0, 1.0)
@@ -69,13 +71,13 @@ def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction:
 
 
 def turn(camera: viser.CameraHandle, eye: np.ndarray, at: np.ndarray) -> None:
-    """Puts the camera to `eye` and lets it look at `at`, two places, (3,) m."""
+    """Moves the camera to `eye` and turns it to `at`, both (3,) m."""
     for share in (1.0, 2.0, 3.0):
         with contextlib.suppress(ValueError):
             camera.position = eye
             camera.look_at = at
             return
-        # viser moves one after the other, and refuses a camera that looks at where it is between the two;
-        # what the browser tells of its own camera may come in at any moment.
+        # viser changes position and look_at one after the other and raises an error if they coincide in
+        # between. The browser's own messages about its camera may arrive at any moment.
         with contextlib.suppress(ValueError):
             camera.look_at = np.asarray(camera.position, float) + share * (eye - at)

@@ -1,4 +1,4 @@
-"""Which tasks a hand can drag, and their coordinates as points and rotations in space."""
+"""The tasks whose targets can be dragged, and the conversion of their coordinates to points and rotations."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def raw(task: TaskView) -> np.ndarray:
 
 
 def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
-    """A point in space from the coordinates under control. Values that have other coordinates, from before
-    the task's axes were changed, say nothing about it."""
+    """A point in space from the controlled coordinates. Values with another number of coordinates, from
+    before the task's axes were changed, are ignored."""
     point = np.array(else_, float)
     if values is not None and values.shape == (len(task.axes),):
         point[["xyz".index(axis) for axis in task.axes]] = values
@@ -41,8 +41,8 @@ def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.nda
 
 
 def of_task(task: TaskView, targets: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Where a draggable task's target is; None if there is none, or one of other coordinates: what is shown
-    may be from before its axes, its kind or the stack were changed."""
+    """The position or rotation of a draggable task's target; None if there is no target, or if it has other
+    coordinates because the task's axes, its kind or the stack were changed."""
     found = targets.get(task.name)
     return None if found is None or found.shape != raw(task).shape else found
 

@@ -1,4 +1,4 @@
-"""The learner's hand in the scene: the gizmo, the judge of what can be reached, and what is posted of it."""
+"""Dragging the target: the gizmo, the check of reachability, and the events that are posted."""
 
 from __future__ import annotations
 
@@ -22,21 +22,23 @@ from lessons.events import MoveTarget
 from lessons.settings.torque import TorqueSettings
 
 _OWN = 1.0
-"""s after a drag in which targets that change are taken to be the hand's own."""
+"""Time, s, after a drag during which changes of targets are attributed to this drag."""
 _PATIENCE = 0.05
-"""s that a drag waits for the judge: within reach it answers in a millisecond."""
+"""Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
 _PAUSED, _LESSON_PAUSED = "paused: Space, or Run, goes on", "paused: P, or Run this step, goes on"
 Later = Callable[[float, Callable[[], None]], object]
-"""Calls something after so many seconds."""
+"""Calls a function after a time, s."""
 
 
 class Hand:
-    """Gives the controller position and orientation of the target together.
+    """Gives the controller the position and orientation of the dragged target together.
 
-    Kept within reach, they wait for the judge, so that the controller gets one answer, not two; after
-    `_PATIENCE` the orientation goes on with the position that the controller has already, which is as good as
-    the last that was accepted, and the judge's follows when it answers. Not kept within reach, nothing waits.
-    A scene without a draggable position target has no gizmo; then every method does nothing.
+    With the option to keep targets within reach, both wait for the reachability check, so that the controller
+    gets one event, not two. After `_PATIENCE` the orientation is sent with the position that the controller
+    already has, which was accepted before; the checked position follows when it is known. Without the option,
+    nothing waits.
+
+    If a scene has no draggable position target, there is no gizmo, and all methods do nothing.
     """
 
     def __init__(
@@ -52,9 +54,9 @@ class Hand:
         dragged: Callable[[], None],
         later: Later,
     ) -> None:
-        """targets: raw targets by task, where the session has them; tip (7,): pose of the hand, position
-        (m) and quaternion wxyz; size: of the gizmo, m; clamp: whether the controller gets only what can be
-        reached; dragged: called at every move; later: of viser's loop, on which the hand moves."""
+        """targets: raw targets by task of the session; tip (7,): pose of the robot's hand, position (m) and
+        quaternion wxyz; size: of the gizmo, m; clamp: whether the controller gets only reachable targets;
+        dragged: called at every move; later: schedules a call on viser's loop, on which drags arrive."""
         self.verdict: Reachability | None = None
         self._post, self._clamp, self._dragged = post, clamp, dragged
         self._targets = targets
@@ -63,7 +65,7 @@ class Hand:
         self._go_on = _LESSON_PAUSED if ready.choice.exercise is not None else _PAUSED
         self._gizmo: TargetGizmo | None = None
         self._judge: ReachabilityWorker | None = None
-        self._lock = threading.Lock()  # the hand moves on viser's loop, the judge answers on its own thread
+        self._lock = threading.Lock()  # drags arrive on viser's loop, the check answers on its own thread
         self._moves = self._given = self._turned = self._forgotten = 0
         position, orientation = draggable(ready.tasks)
         if position is None:
@@ -88,7 +90,7 @@ class Hand:
     def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         gizmo, judge = self._gizmo, self._judge
         if gizmo is None or judge is None:
-            return  # a drag that arrives while the gizmo makes room for another stack's
+            return  # a drag that arrives while the gizmo is replaced for another stack
         self._dragged()
         self._moved_at = time.monotonic()
         waits = self._clamp()
@@ -102,8 +104,8 @@ class Hand:
             self._later(_PATIENCE, partial(self._wait_no_longer, question))
 
     def _give(self, gizmo: TargetGizmo, question: Question, place: np.ndarray) -> None:
-        """Posts a place (3,), m, and the orientation that the hand had in that moment, unless a later one is
-        posted already."""
+        """Posts a position (3,), m, and the orientation at the same moment of the drag, unless a later one
+        was already posted."""
         self._given, self._place = max(self._given, question.number), place
         axes = ["xyz".index(axis) for axis in gizmo.position.axes]
         self._post(MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes)))
@@ -114,11 +116,11 @@ class Hand:
     def _wait_no_longer(self, question: Question) -> None:
         with self._lock:
             gizmo = self._gizmo
-            # Where nothing is turned there is nothing to go on with.
+            # Without an orientation there is nothing to send in the meantime.
             if gizmo is not None and question.number > self._turned and question.rotation is not None:
                 before = self._given
                 self._give(gizmo, question, self._place)
-                self._given = before  # the judge's answer still counts
+                self._given = before  # the answer of the check is still used
 
     def _placed(self, question: Question, accepted: np.ndarray) -> None:
         with self._lock:
@@ -131,7 +133,7 @@ class Hand:
             self.verdict = verdict
 
     def recall(self, tip: np.ndarray) -> None:
-        """Brings the target to the robot's hand, whose pose is tip (7,)."""
+        """Moves the target to the robot's hand, whose pose is tip (7,)."""
         gizmo = self._gizmo
         if gizmo is not None:
             rotation = vtf.SO3(tip[3:]).as_matrix()
@@ -139,7 +141,7 @@ class Hand:
             self._moved(tip[:3], rotation if gizmo.orientation is not None else None)
 
     def after_reset(self, targets: dict[str, np.ndarray]) -> None:
-        """The session put its raw targets back: so does the gizmo."""
+        """Resets the gizmo after the session has reset its raw targets."""
         gizmo = self._gizmo
         if gizmo is not None:
             turned = None if gizmo.orientation is None else of_task(gizmo.orientation, targets)
@@ -152,7 +154,7 @@ class Hand:
         self.verdict = None
 
     def follow(self, targets: dict[str, np.ndarray]) -> None:
-        """Where a script, not the hand, moves the session's targets, the gizmo goes along."""
+        """Moves the gizmo along when a script, not the user, moves the session's targets."""
         before, self._targets = self._targets, targets
         by_hand = time.monotonic() - self._moved_at < _OWN
         if not by_hand and any(not np.array_equal(before.get(name, at), at) for name, at in targets.items()):
@@ -166,8 +168,11 @@ class Hand:
         fields: dict[str, slice],
         running: bool,
     ) -> None:
-        """The filtered target of the last telemetry row, rings while they turn something, and the verdict.
-        running: whether time passes, or the past is looked at."""
+        """Shows the filtered target of the last telemetry row, rings if an orientation can be dragged, and
+        the verdict.
+
+        running: whether simulated time passes, or the past is shown.
+        """
         gizmo = self._gizmo
         if gizmo is None:
             return
@@ -182,16 +187,17 @@ class Hand:
             gizmo.show_accepted(self.verdict.accepted, self.verdict.missing)
 
     def look_back(self, targets: dict[str, np.ndarray] | None) -> None:
-        """Raw targets of a moment of the past, where a ball shows the one that is dragged now; None: now."""
+        """Shows the dragged target as a ball at its place in the past, from the raw targets of that moment;
+        None: now."""
         gizmo = self._gizmo
         if gizmo is not None:
             then = None if targets is None else of_task(gizmo.position, targets)
             gizmo.look_back(None if then is None else full(gizmo.position, then, gizmo.raw))
 
     def remove(self) -> None:
-        """Takes the gizmo out of the scene."""
+        """Removes the gizmo from the scene."""
         self.close()
-        gizmo, self._gizmo = self._gizmo, None  # a drag may still be on its way
+        gizmo, self._gizmo = self._gizmo, None  # a drag may still arrive
         if gizmo is not None:
             gizmo.remove()
 

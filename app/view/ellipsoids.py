@@ -1,4 +1,4 @@
-"""Manipulability ellipsoids of the levels, about the frames they move."""
+"""Manipulability ellipsoids of the levels, drawn at the frames that they move."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from lessons.geometry.ellipsoids import Ellipsoid, ellipsoids
 from robots import Robot
 
 _SIZE = {False: 0.3, True: 0.1}
-"""m in the picture per m/s of a frame, and per rad/s of its turning, with joints of unit speed."""
-_THIN = 0.004  # m: what cannot move is drawn this thick
+"""Length in the picture, m, per m/s of a frame and per rad/s of its rotation, for joints of unit speed."""
+_THIN = 0.004  # m: thickness of directions without motion
 _STILL = 2e-3  # m: changes that nobody would see
 
 
 class EllipsoidView:
-    """Made when they are first wanted."""
+    """The ellipsoids; they are created when they are first shown."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, colours: dict[str, RGB]) -> None:
         self._scene, self._robot, self._colours = scene, robot, colours
@@ -28,7 +28,7 @@ class EllipsoidView:
         self._shown: dict[str, np.ndarray] = {}
 
     def draw(self, on: bool, q: np.ndarray, stack: Stack) -> None:
-        """on: whether they are wanted; q: of the instant, (n,)."""
+        """on: whether they are shown; q: joint positions of the instant, (n,)."""
         found: list[Ellipsoid] = []
         if on and np.isfinite(q).all():
             found = ellipsoids(Configuration(self._robot, self._data, q, np.zeros_like(q)), stack)

@@ -1,4 +1,4 @@
-"""The camera goes along with a mobile base, so that a robot that drives off stays in the picture."""
+"""The camera follows a mobile base, so that a moving robot stays in the picture."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ import viser
 from app.view.camera import turn
 
 _STEP = 0.02
-"""m: a base that moved less is not followed yet; a camera that trembles with it is hard to look through."""
+"""Motion of the base, m, below which the camera stays: a trembling camera is unpleasant."""
 _REST = 30
-"""Calls while the base stands, after which the browser has long told where the learner looks."""
+"""Number of calls with the base at rest after which the browser's camera message is certainly up to date."""
 
 
 class FollowBase:
-    """Moves a page's camera by what the base moved; from where it looks stays the learner's choice.
+    """Moves a page's camera along with the base; the viewing direction remains the learner's choice.
 
-    What a browser tells of its camera is late: while the base moves, it is from a few pictures ago, and what
-    is added to that loses what came meanwhile. Only how the camera looks at its point, which following leaves
-    as it is, is taken from there; the point itself once the base stands.
+    A browser's camera message is late: while the base moves, it is some pictures old, and a motion that is
+    added to it would lose the motion since then. While the base moves, only the direction and distance of the
+    camera, which following does not change, are taken from the message; the point that it looks at is taken
+    only while the base is at rest.
     """
 
     def __init__(self, camera: viser.CameraHandle) -> None:
@@ -28,7 +29,8 @@ class FollowBase:
         self._rests = 0
 
     def follow(self, base: np.ndarray, on: bool) -> None:
-        """base: where it is, (3,) m; on: whether it is followed, from where it is when that begins."""
+        """base: its position, (3,) m; on: whether the camera follows the base, beginning with its position at
+        that time."""
         if not on:
             self._at = None
             return

@@ -15,7 +15,7 @@ _OPACITY = 0.38
 
 
 class GhostView:
-    """Exists while there is a ghost."""
+    """The 3D view of the ghost; it exists while there is a ghost."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, words: str) -> None:
         self._root = scene.add_frame("/ghost", show_axes=False)
@@ -30,7 +30,7 @@ class GhostView:
             self._label.position = at
 
     def draw(self, ghost: GhostState) -> None:
-        """The trace, about ten times a second."""
+        """Draws the trace, about ten times per second."""
         self._trace.points = trace(ghost.way[:, -1, :3]) if len(ghost.way) else NOTHING
 
     def remove(self) -> None:

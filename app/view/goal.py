@@ -1,4 +1,4 @@
-"""A goal, of the robot's hand in space or of its base on the floor, that may be one a hand can drag."""
+"""A goal of the robot's hand in space or of its base on the floor. Some goals can be dragged."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _LIFT = 0.01  # m above the floor
 
 
 class Goal:
-    """A ball, or a disc for what stays on the floor; a line from the point it is for; a label; and, if it
+    """A ball, or a disc for a goal on the floor; a line from the controlled point; a label; and, if the goal
     can be dragged, arrows along the world's axes.
 
-    The hand wins: for a moment after it moved the goal, `follow` leaves it where it is.
+    The user's drag has priority: for a moment after it, `follow` does not move the goal.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Goal:
         moved: Callable[[np.ndarray], None] | None,
     ) -> None:
         """start (3,): m; size: of the arrows, m; moved: called with the goal (3,), m, after each move; None:
-        it cannot be dragged."""
+        the goal cannot be dragged."""
         floor = "z" not in axes
         self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
         self._touched = -float("inf")
@@ -71,7 +71,7 @@ class Goal:
         return np.array(self._node.position, float) - self._lift
 
     def follow(self, goal: np.ndarray | None, text: str) -> None:
-        """goal (3,): where the session has it, m; None: it has none, and the hand's stays."""
+        """goal (3,): the session's goal, m; None: it has none, and the dragged position stays."""
         if self._label.text != text:
             self._label.text = text
         if goal is None or time.monotonic() - self._touched < HOLD:
@@ -80,7 +80,7 @@ class Goal:
             self._node.position = goal + self._lift
 
     def reach_from(self, point: np.ndarray) -> None:
-        """Draws the line from where the point (3,) is, m, to the goal."""
+        """Draws the line from the controlled point (3,), m, to the goal."""
         ends = np.array([[point + self._lift, self.place + self._lift]], np.float32)
         shown = bool(np.linalg.norm(ends[0, 1] - ends[0, 0]) > _GAP)
         if self._gap.visible != shown:

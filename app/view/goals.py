@@ -1,4 +1,4 @@
-"""The learner's hand in a scene with a mission: one goal per role, and what is posted when it is moved."""
+"""The goals in a scene with a mission: one per role, and the events that are posted when a goal is moved."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from app.view.targets import Targets
 from lessons.events import Event, InsertTask, MoveTarget
 
 _THERE = 5e-3
-"""m: a point this near has got there."""
+"""Distance, m, below which a point has reached its goal."""
 
 
 def point(values: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -32,8 +32,8 @@ def open_row(rows: Sequence[MissionRow], role: str) -> MissionRow | None:
 
 
 class Goals:
-    """A goal per position role, rings about the robot's hand per orientation role. One that is sent along a
-    given trajectory from the start cannot be dragged: it shows what is asked of its point now."""
+    """One goal per position role, and rings at the robot's hand per orientation role. A goal on a trajectory
+    that is given from the start cannot be dragged: it shows the present reference of its point."""
 
     def __init__(
         self,
@@ -68,7 +68,8 @@ class Goals:
         self._rings = Targets(scene, replace(ready, tasks=turning), colours, poses, 0.75 * size, self._turned)
 
     def _moved(self, task: TaskView, place: np.ndarray) -> None:
-        """Moves the role's open task; if none is left, a new one keeps the point where the hand puts it."""
+        """Moves the goal of the role's first open task; if there is none, adds a task that holds the point
+        there."""
         status = self._status()
         if status is None or status.mission is None:
             return
@@ -85,7 +86,7 @@ class Goals:
             self._post(InsertTask(name, task.name, goal, hold=None))
 
     def _turned(self, event: Event) -> None:
-        """Turns the role's open task."""
+        """Changes the orientation of the role's open task."""
         status = self._status()
         if status is None or status.mission is None or not isinstance(event, MoveTarget):
             return
@@ -95,11 +96,11 @@ class Goals:
             self._post(MoveTarget(row.name, event.value))
 
     def turn(self, poses: np.ndarray, targets: dict[str, np.ndarray], live: bool) -> None:
-        """Rings go along with the hand; arguments as of `app.view.targets.Targets.follow`."""
+        """Moves the rings along with the hand; arguments as for `app.view.targets.Targets.follow`."""
         self._rings.follow(poses, targets, live)
 
     def follow(self, status: Status, latest: np.ndarray | None, fields: dict[str, slice]) -> None:
-        """Goals and lines of a new status and the newest row of telemetry."""
+        """Updates goals and lines from a new status and the newest row of telemetry."""
         rows = () if status.mission is None else status.mission.rows
         for name, goal in self._goals.items():
             row, target = open_row(rows, name), status.targets.get(name)
@@ -120,5 +121,5 @@ class Goals:
 
     @property
     def places(self) -> dict[str, np.ndarray]:
-        """Where each goal is drawn, (3,) m."""
+        """The position at which each goal is drawn, (3,) m."""
         return {name: goal.place for name, goal in self._goals.items()}

@@ -1,4 +1,4 @@
-"""A click on a link tells its name."""
+"""Choosing a link by a click."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from robots import Robot
 
 
 class LinkPicker:
-    """Links can be clicked only while somebody asks for one: they keep the mouse from what is behind them."""
+    """Makes links clickable, but only on request: a clickable link hides objects behind it from the mouse."""
 
     def __init__(self, view: RobotView, robot: Robot, chosen: Callable[[str], None]) -> None:
-        """chosen: hears the name of the link that was clicked."""
+        """chosen: called with the name of the link that was clicked."""
         self._links, self._chosen, self._on = view.links, chosen, False
         self._names: dict[int, str] = {}
         for name in robot.frames:

@@ -1,4 +1,4 @@
-"""What the robot keeps clear of, with arrows by which a hand moves it."""
+"""The obstacles that the robot avoids, with arrows for dragging them."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ Moved = Callable[[str, tuple[float, float, float]], None]
 
 
 class Obstacles:
-    """Boxes and balls; the floor is there anyway. Drawn anew when others appear, else only moved."""
+    """Boxes and balls; the floor is always there. They are redrawn when the set of obstacles changes, and
+    otherwise only moved."""
 
     def __init__(self, scene: viser.SceneApi, moved: Moved) -> None:
-        """moved: called with an obstacle's name and where a hand put its centre, m."""
+        """moved: called with an obstacle's name and the new position of its centre, m."""
         self._scene, self._moved = scene, moved
         self._shown: tuple[Ball | Box, ...] = ()
         self._solids: list[_Solid] = []
 
     def show(self, obstacles: tuple[Obstacle, ...], arrows: bool) -> None:
-        """Follows the session. arrows: whether they can be moved."""
+        """Shows the obstacles of the session. arrows: whether they can be moved."""
         now = tuple(sorted((each for each in obstacles if not isinstance(each, Floor)), key=_name))
         if _shapes(now) != _shapes(self._shown):
             for solid in self._solids:
@@ -51,7 +52,8 @@ def _shapes(obstacles: tuple[Ball | Box, ...]) -> tuple[Ball | Box, ...]:
 
 
 class _Solid:
-    """The hand wins: for a moment after it moved the obstacle, `follow` leaves it where it is."""
+    """One obstacle. The user's drag has priority: for a moment after it, `follow` does not move the
+    obstacle."""
 
     def __init__(self, scene: viser.SceneApi, index: int, obstacle: Ball | Box, moved: Moved) -> None:
         self._touched = -float("inf")

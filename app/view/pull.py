@@ -1,4 +1,4 @@
-"""Pulling at a link with the mouse: a spring between the place one took hold of and the pointer."""
+"""Pulling a link with the mouse: a spring between the point of the link that was grabbed and the pointer."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _HELD = 0.15  # s a push lasts if the page does not renew it
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """joint: 1 … n, of the link that is held; at (3,): where, in the joint's axes, m; hand (3,): where the
-    pointer is, in the world, m."""
+    """joint: 1 … n, of the grabbed link; at (3,): the grabbed point in the joint's axes, m; hand (3,):
+    position of the pointer in the world, m."""
 
     joint: int
     at: np.ndarray
@@ -32,7 +32,8 @@ class Grip:
 
 
 class Pull:
-    """Callbacks note where the pointer is; `follow` posts the force, about thirty times a second."""
+    """Callbacks store the position of the pointer; `follow` posts the force, about thirty times per
+    second."""
 
     def __init__(self, scene: viser.SceneApi, view: RobotView, robot: Robot, post: Send) -> None:
         self._robot, self._post = robot, post
@@ -54,7 +55,7 @@ class Pull:
         self._on = False
 
     def _switch(self, on: bool) -> None:
-        # A link that can be dragged keeps the mouse from whatever is behind it, the target's arrows too.
+        # A draggable link hides objects behind it from the mouse, also the target's arrows.
         self._on = on
         for joint, mesh in self._links:
             if on:
@@ -79,8 +80,8 @@ class Pull:
             self._grip = Grip(joint, at, hand)
 
     def follow(self, poses: np.ndarray, plant: PlantSettings, running: bool, on: bool) -> None:
-        """poses (n + 1, 7) of now; plant: tells where the link's mass is; on: whether links can be dragged.
-        While paused nothing is pushed."""
+        """poses (n + 1, 7): the present ones; plant: gives the link's mass; on: whether links can be pulled.
+        While paused no force is posted."""
         self._poses = poses
         if on != self._on:
             self._switch(on)
@@ -102,7 +103,8 @@ class Pull:
 
 
 def pulled(grip: Grip, poses: np.ndarray, mass: float) -> tuple[np.ndarray, np.ndarray]:
-    """(where the spring is fastened (3,), m, its force (3,), N), in world axes, on a robot of so many kg."""
+    """(attachment point of the spring (3,), m, its force (3,), N), in world axes, for a robot of a given
+    mass, kg."""
     pose = poses[grip.joint - 1]
     point = pose[:3] + vtf.SO3(pose[3:]).as_matrix() @ grip.at
     force = _STIFF * mass * (grip.hand - point)
@@ -113,7 +115,7 @@ def pulled(grip: Grip, poses: np.ndarray, mass: float) -> tuple[np.ndarray, np.n
 def push_at(
     robot: Robot, plant: PlantSettings, joint: int, pose: np.ndarray, point: np.ndarray, force: np.ndarray
 ) -> Push:
-    """A force (N) at a point of a link (m), as force and torque at the link's centre of mass.
+    """Converts a force (N) at a point of a link (m) to force and torque at the link's centre of mass.
 
     Args:
         robot: whose.

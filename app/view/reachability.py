@@ -1,4 +1,5 @@
-"""Judging dragged targets off the page's threads: only the latest question counts."""
+"""Checks on a thread of its own whether dragged targets can be reached; only the latest question is
+answered."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from robots.reach import ReachJudge
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Where the hand holds a target: position (3,), m; rotation (3, 3) or None; frame: a link's name; number:
-    which move of the hand it was."""
+    """A dragged target: position (3,), m; rotation (3, 3) or None; frame: name of a link; number: number of
+    the drag event."""
 
     position: np.ndarray
     rotation: np.ndarray | None
@@ -26,8 +27,9 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Reachability:
-    """accepted: the position itself, or the nearest one found within reach; missing: m between them;
-    turned_away: rad the orientation falls short at the accepted position (0 if none was asked for)."""
+    """accepted: the position itself, or the nearest reachable one that was found; missing: distance between
+    them, m; turned_away: orientation error at the accepted position, rad (0 if no orientation was
+    requested)."""
 
     question: Question
     accepted: np.ndarray
@@ -40,7 +42,7 @@ class Reachability:
 
 
 class ReachabilityWorker:
-    """A thread with placo on it."""
+    """A thread that runs placo."""
 
     def __init__(
         self,
@@ -48,8 +50,8 @@ class ReachabilityWorker:
         place: Callable[[Question, np.ndarray], None],
         answer: Callable[[Reachability], None],
     ) -> None:
-        """place: hears the accepted position, (3,) m, as soon as it is known; answer: then all of the
-        verdict. Both are called on the judge's thread."""
+        """place: called with the accepted position, (3,) m, as soon as it is known; answer: called with the
+        complete verdict afterwards. Both are called on this worker's thread."""
         self._robot = robot
         self._place, self._answer = place, answer
         self._wake = threading.Condition()
@@ -78,7 +80,7 @@ class ReachabilityWorker:
         data = self._robot.model.createData()
         q = self._robot.home
         while (question := self._next()) is not None:
-            # The seed is the last posture: a dragged target moves little between two questions.
+            # The initial guess is the last posture: a dragged target moves little between two questions.
             found = judge.solve(question.position, None, q, question.frame)
             q = found.q
             accepted, missing = question.position, 0.0

@@ -1,4 +1,4 @@
-"""The robot's links, moved by poses from the simulation."""
+"""The robot's links, placed by poses from the simulation."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from app.view.camera import look, turn
 from robots import Robot
 from robots.shapes import link_shapes
 
-_STILL = 1e-4  # m, and about as many rad: a tenth of a pixel
+_STILL = 1e-4  # m, and about the same number of rad: a tenth of a pixel
 _ARROW = 1.2
-"""How far an arrow with its head reaches, in sizes of its gizmo."""
+"""Length of an arrow with its head, as a multiple of the gizmo's size."""
 
 
 class RobotView:
@@ -33,7 +33,8 @@ class RobotView:
         colour: RGB | None = None,
         opacity: float | None = None,
     ) -> None:
-        """root: name of the node below which it is; colour, opacity: of all of it; None: its own, opaque."""
+        """root: name of the parent node; colour, opacity: for the whole robot; None: its own colours,
+        opaque."""
         shapes = link_shapes(robot)
         self._frames = [
             scene.add_frame(f"{root}/{joint}", show_axes=False) for joint in range(1, robot.n + 1)
@@ -51,7 +52,7 @@ class RobotView:
                 ),
             )
             for index, shape in enumerate(shapes)
-            if shape.joint or colour is None  # two bases at one place would flicker
+            if shape.joint or colour is None  # two bases at the same place would flicker
         ]
         self._shown = np.full((robot.n, 7), np.nan)
 
@@ -69,14 +70,14 @@ class RobotView:
 
 
 def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
-    """(position, look_at) from which a robot is well seen, and the length of its arm, m."""
+    """(position, look_at) of a camera that shows the robot well, and the length of its arm, m."""
     points, direction, reach = _home(robot)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return middle + reach * direction, middle, reach
 
 
 def gizmo_size(robot: Robot) -> float:
-    """How large the arrows and rings at a robot's targets are, m."""
+    """The size of the arrows and rings at a robot's targets, m."""
     return _gizmo(_home(robot)[2])
 
 
@@ -85,7 +86,8 @@ def _gizmo(reach: float) -> float:
 
 
 def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
-    """Base, joints and tip at home, (k, 3) m; from where to look at them; and the length of the arm, m."""
+    """Positions of base, joints and tip in the home posture, (k, 3) m; a viewing direction; and the length of
+    the arm, m."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, robot.home)
     joints = np.array([data.oMi[j].translation for j in range(1, robot.model.njoints)])
@@ -103,9 +105,9 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
 def aim(
     camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray, ways: Sequence[np.ndarray] = ()
 ) -> None:
-    """Turns the camera to a robot and the points (k, 3) it will go to, m; ways: (k, 3) each, m, that its hand
-    follows where it stands. phone: viser's sheet covers the lower part of the scene, so the robot goes,
-    smaller, into the upper one."""
+    """Turns the camera to a robot and the points (k, 3) that it will reach, m; ways: (k, 3) each, m, paths
+    that its hand follows. phone: viser's sheet covers the lower part of the scene, so the robot is shown
+    smaller, in the upper part."""
     if not len(room):
         points, direction, _ = _home(robot)
         look(camera, np.vstack([points, *ways]), phone, direction)

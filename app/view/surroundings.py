@@ -1,4 +1,4 @@
-"""What stands around a mobile robot: people with balls, and the circle its arm reaches."""
+"""The surroundings of a mobile robot: people with balls, and the circle of its arm's reach."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TALL, _WIDE, _HEAD = 1.25, 0.17, 0.12  # m, of a person
 
 
 class People:
-    """Figures with a hand stretched out, and the balls they have got."""
+    """Figures of people with an extended hand, and the balls that they have received."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -52,7 +52,7 @@ class People:
         arm = np.array([[shoulder, hand - [0.0, 0.0, _BALL_RADIUS]]], np.float32)
         scene.add_line_segments(f"{node}/arm", arm, colour, thickness=0.06)
         for k in range(person.balls):
-            # A heap at the feet, in front of the person.
+            # A pile of balls on the floor in front of the person.
             away = 0.35 * hand[:2] / max(float(np.linalg.norm(hand[:2])), 1e-6)
             beside = 0.13 * (k - 0.5 * (person.balls - 1)) * np.array([-away[1], away[0]]) / 0.35
             scene.add_icosphere(
@@ -82,7 +82,8 @@ class Carried:
 
 
 class ReachCircle:
-    """How far the arm reaches, on the floor about the base: beyond it the hand takes the base along."""
+    """The arm's reach as a circle on the floor around the base. A goal of the hand outside it makes the base
+    move."""
 
     def __init__(self, scene: viser.SceneApi, joint: int, radius: float) -> None:
         """joint: number of the base's last joint, 1 … n, whose frame the circle moves with; radius: m."""

@@ -1,4 +1,4 @@
-"""The target a hand drags: gizmo, ball, and what the controller makes of it."""
+"""The dragged target: gizmo, ball, and the position that the controller gets."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _INVITATION = "drag an arrow"
 
 
 class TargetGizmo:
-    """Arrows along the world's axes on a position task, and rings that turn with the target while an
-    orientation task of the same frame is on.
+    """Arrows along the world's axes for a position task, and rings for an orientation task of the same frame;
+    the rings rotate with the target.
 
-    The ball is where the hand is. If that is out of reach it turns into a red ghost, and a ball in the
-    task's colour with a line to it marks the place the controller was given instead.
+    The ball is at the dragged position. If that is out of reach, the ball becomes a transparent red one, and
+    a ball in the task's colour with a line to it marks the position that the controller gets instead.
     """
 
     def __init__(
@@ -39,8 +39,8 @@ class TargetGizmo:
         size: float,
         moved: Moved,
     ) -> None:
-        """start (3,): where the target is, m; rotation (3, 3); size: of the gizmo, m; moved: called with
-        the raw position and, if rings are shown, the raw rotation."""
+        """start (3,): initial position of the target, m; rotation (3, 3); size: of the gizmo, m; moved:
+        called with the raw position and, if rings are shown, the raw rotation."""
         self.position, self.orientation = position, orientation
         self._rings = orientation is not None
         x, y, z = (axis in position.axes for axis in "xyz")
@@ -100,21 +100,22 @@ class TargetGizmo:
         return vtf.SO3(np.array(self._turn.wxyz, float)).as_matrix()
 
     def show_rings(self, on: bool) -> None:
-        """Whether the hand may turn the target."""
+        """Shows the rings if the user may rotate the target."""
         on = on and self.orientation is not None
         if on != self._rings:
             self._rings = on
             self._turn.visible = on
 
     def put(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
-        """Moves the gizmo itself, after a reset."""
+        """Moves the gizmo itself, e.g. after a reset."""
         self._gizmo.position = position
         if rotation is not None:
             self._turn.wxyz = _wxyz(rotation)
         self.show_accepted(position, 0.0)
 
     def show_accepted(self, accepted: np.ndarray, missing: float) -> None:
-        """What the judge said: the place the controller was given, and how far it is from the hand, m."""
+        """Shows the result of the reachability check: the position that the controller gets, and its distance
+        from the dragged one, m."""
         out = missing > 0.0
         for handle in (self._ghost, self._accepted, self._gap):
             handle.visible = out
@@ -126,7 +127,7 @@ class TargetGizmo:
         self._say()
 
     def pause(self, words: str) -> None:
-        """words: how to go on, where nothing would follow the target; empty while the simulation runs."""
+        """words: how to continue, if nothing would follow the target; empty while the simulation runs."""
         if words != self._paused:
             self._paused = words
             self._say()
@@ -144,12 +145,12 @@ class TargetGizmo:
             self._label.text = words
 
     def remove(self) -> None:
-        """Takes it out of the scene."""
+        """Removes the target from the scene."""
         for node in (self._gizmo, self._accepted, self._then, self._gap):
             node.remove()
 
     def look_back(self, then: np.ndarray | None) -> None:
-        """The ball at its place in the past, with nothing to drag it by; None: as it is now."""
+        """Shows the ball at its position in the past, without a gizmo; None: the present state."""
         back = then is not None
         if self._then.visible != back:
             self._then.visible, self._gizmo.visible = back, not back
@@ -158,7 +159,7 @@ class TargetGizmo:
 
 
 class TargetFrames:
-    """The filtered target (what the controller follows now) beside the actual frame."""
+    """The filtered target, which the controller follows at present, beside the actual frame."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._desired = scene.add_frame(

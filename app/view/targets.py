@@ -1,4 +1,4 @@
-"""Targets of all tasks but the hand's: something to drag for each that has one."""
+"""The targets of all tasks that `Hand` does not handle: a draggable object for each."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SHOWN = (*_TURNING, *_POINTS, "plane_distance")
 
 
 class Targets:
-    """One for every task that `Hand` has no gizmo for and that is about places in space."""
+    """One target for every task in Cartesian space that has no gizmo of `Hand`."""
 
     def __init__(
         self,
@@ -45,20 +45,20 @@ class Targets:
         ]
 
     def follow(self, poses: np.ndarray, raw: dict[str, np.ndarray], live: bool) -> None:
-        """poses (n + 1, 7) of the instant that is shown; raw: where the session has each target that there
-        is; live: whether it is now, so that they can be dragged."""
+        """poses (n + 1, 7) of the instant that is shown; raw: the session's raw targets; live: whether this
+        instant is now, so that targets can be dragged."""
         for target in self._targets:
             target.follow(poses, of_task(target.task, raw), live)
 
     def remove(self) -> None:
-        """Takes them out of the scene."""
+        """Removes the targets from the scene."""
         for target in self._targets:
             target.remove()
 
 
 class _Target:
-    """Arrows or rings, a mark, and a label. The hand wins: for a moment after it moved the target, `follow`
-    leaves it where it is."""
+    """Arrows or rings, a mark, and a label. The user's drag has priority: for a moment after it, `follow`
+    does not move the target."""
 
     def __init__(
         self,
@@ -108,7 +108,7 @@ class _Target:
             self._post(MoveTarget(self.name, self._value()))
 
     def _value(self) -> tuple[float, ...]:
-        """What the task's target is where the hand has it."""
+        """The task's target at the dragged position."""
         task, at = self.task, np.array(self._control.position, float)
         if task.kind in _TURNING:
             return xyzw(vtf.SO3(np.array(self._control.wxyz, float)).as_matrix())
@@ -143,7 +143,7 @@ class _Target:
             self._reach(frame.translation, base.act(at))
 
     def _reach(self, point: np.ndarray, goal: np.ndarray) -> None:
-        """Draws the line from the frame to what is asked of it."""
+        """Draws the line from the frame to its target."""
         if self.task.kind == "com":
             return
         ends = np.array([[point, goal]], np.float32)
@@ -159,7 +159,7 @@ class _Target:
 
 
 def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
-    """Where a link is in the world, from the poses (n + 1, 7) of the joints."""
+    """The pose of a link in the world, from the poses (n + 1, 7) of the joints."""
     found = robot.model.frames[robot.frame_id(frame)]
     joint = found.parentJoint
     if joint == 0:
@@ -169,7 +169,7 @@ def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
 
 
 def _put(node: viser.SceneNodeHandle, position: np.ndarray, rotation: np.ndarray) -> None:
-    """Moves a node, unless it is there: what does not move need not be drawn again."""
+    """Moves a node if its position has changed, so that the browser need not redraw."""
     wxyz = vtf.SO3.from_matrix(rotation).wxyz
     if np.abs(np.array(node.position) - position).max() > _STILL:
         node.position = position
@@ -178,5 +178,5 @@ def _put(node: viser.SceneNodeHandle, position: np.ndarray, rotation: np.ndarray
 
 
 def _facing(normal: np.ndarray) -> np.ndarray:
-    """A rotation whose x axis is the normal."""
+    """A rotation whose x axis is the given normal."""
     return pin.Quaternion.FromTwoVectors(np.array([1.0, 0.0, 0.0]), normal).toRotationMatrix()

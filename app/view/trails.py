@@ -1,4 +1,4 @@
-"""Curves in the scene: the reference, the way the hand went, and the controller's prediction."""
+"""Curves in the 3D view: the reference, the path of the hand, and the controller's prediction."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from app.client.decimate import decimate
 from app.html.palette import RGB
 
 EXAGGERATION = 100
-"""At torque level the prediction reaches some milliseconds ahead: at true scale it would be a dot."""
+"""Magnification of the prediction at torque level, where it covers only some milliseconds and would look like
+a dot."""
 
 
 def segments(points: np.ndarray) -> np.ndarray:
@@ -19,7 +20,7 @@ def segments(points: np.ndarray) -> np.ndarray:
 
 
 def trace(tips: np.ndarray) -> np.ndarray:
-    """The way (k, 3) a hand went, m, as segments, without the points that lie on straight stretches."""
+    """The path (k, 3) of a hand, m, as segments, without points on straight parts."""
     return segments(tips[decimate(tips.T, _FINE)]) if len(tips) > 1 else NOTHING
 
 
@@ -38,7 +39,8 @@ class Trails:
         name: str = "",
         scale: int = EXAGGERATION,
     ) -> None:
-        """name: sets the nodes of several trails apart; scale: by which predicted motions are enlarged."""
+        """name: distinguishes the nodes of several trails; scale: factor by which predicted motions are
+        enlarged."""
         self._scale = scale
         for index, (points, curve_colour) in enumerate(curves):
             scene.add_line_segments(
@@ -57,7 +59,7 @@ class Trails:
             self._label.visible = False
 
     def draw(self, tips: np.ndarray, path: np.ndarray, T_s: float) -> None:
-        """tips (k, 3): the way the hand went; path (N + 1, 3): the predicted tip."""
+        """tips (k, 3): the path of the hand so far; path (N + 1, 3): the predicted path of the tip."""
         if self._trace.visible:
             self._trace.points = trace(tips)
         if not self._prediction.visible:

@@ -1,1 +1,1 @@
-"""The simulation's side: the body that runs, pacing, leader and ghost."""
+"""The simulation process: the session that runs, its pacing, leader and ghost."""

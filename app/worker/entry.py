@@ -1,4 +1,5 @@
-"""What a process of simulations is told to run, by name. Light itself, so that it can say what it loads."""
+"""The entry module of simulation processes, given by name. It imports little itself, so that it can report
+what it loads."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from app.link.wire import Wire
 
 
 def warm(say: Callable[[str], None]) -> None:
-    """Loads all that simulations need. `say` is told what is being done, for a page that waits."""
+    """Imports all that simulations need. `say` receives a sentence about the progress, for a waiting page."""
     from himpc.compilation.compiling import compile_all
 
     compile_all(lambda ready, of: say(f"compiling the controllers, this once: {ready} of {of} functions"))
@@ -18,7 +19,7 @@ def warm(say: Callable[[str], None]) -> None:
 
 
 def main(wire: Wire) -> None:
-    """A simulation, until the page says Quit or is gone."""
+    """Runs a simulation until the page sends Quit or has ended."""
     from app.worker.main import main as simulate
 
     simulate(wire)

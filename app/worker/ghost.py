@@ -1,4 +1,4 @@
-"""The process of a ghost: a simulation without a clock of its own, that runs up to where its leader is."""
+"""The process of a ghost: a simulation without a clock of its own that runs up to its leader's time."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _CHUNK = 0.01  # s: the longest run before commands are looked at again
 
 @final
 class GhostBody:
-    """A body whose session follows another's."""
+    """A simulation whose session follows another one."""
 
     def __init__(self, begin: Begin, own: tuple[str, ...]) -> None:
         """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
         scene = ghost_scene(begin.choice.scene(), begin.settings, own)
-        # A lesson judges the robot, not its ghost.
+        # The lesson judges the robot, not its ghost.
         self.body = SimulationRunner(begin.choice, scene, judged=False)
         self.driver = GhostDriver(self.body.session, begin.settings, own)
 
     def catch_up(self, until: float) -> bool:
-        """Runs what is due, but not longer than to a moment of `perf_counter`; whether anything was."""
+        """Runs all steps that are due, but stops at a time of `perf_counter`; returns whether it ran any."""
         ran = False
         while self.driver.due and (not ran or time.perf_counter() < until):
             self.body.tick()
@@ -39,7 +39,7 @@ class GhostBody:
 
 
 def follow(wire: Wire, first: FollowLeader) -> None:
-    """Follows until the page says Quit; `first` is what a process that waited for work was told."""
+    """Follows the leader until the page sends Quit; `first` is the message that started this process."""
     ghost = _hear(wire, None, first)
     next_pose = next_reached = next_status = 0.0
     reached = -1.0
@@ -52,7 +52,7 @@ def follow(wire: Wire, first: FollowLeader) -> None:
                 if isinstance(command, FollowLeader):
                     ghost = _hear(wire, ghost, command)
                     if command.script.begin is not None:
-                        reached = -1.0  # the leader waits to hear that its ghost is there
+                        reached = -1.0  # the leader waits until it hears that the ghost has started
             if ghost is None:
                 continue
             ran = ghost.catch_up(time.perf_counter() + _CHUNK)

@@ -1,4 +1,4 @@
-"""A simulation that a ghost follows: what the ghost must hear, and how far it may be left behind."""
+"""A simulation that a ghost follows: the events to send to the ghost, and the limit on its lag."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lessons.session.session import Session
 
 
 class Leader:
-    """Off until `begin`. Its ghost hears everything that took effect since, in order."""
+    """Off until `begin`. Afterwards the ghost receives all events that took effect, in order."""
 
     def __init__(self) -> None:
         self.on = False
@@ -20,21 +20,22 @@ class Leader:
         self._t = math.nan
 
     def begin(self, choice: SceneChoice, session: Session) -> None:
-        """The session was just reset: its ghost begins here, and until it is there no time passes."""
+        """The session was just reset and the ghost begins here. The simulation waits until the ghost has
+        started."""
         self.on, self.until = True, 0.0
         self._begin = Begin(choice, session.settings)
         self._told = len(session.log)
 
     def end(self) -> None:
-        """Nobody follows any more."""
+        """Ends the following."""
         self.on, self.until = False, math.inf
 
     def waits(self, t: float) -> bool:
-        """Whether going on to t (s) would leave the ghost too far behind."""
+        """Whether a step to time t (s) would leave the ghost too far behind."""
         return t > self.until + 1e-9
 
     def script(self, session: Session) -> Script | None:
-        """What is new since the last call, if anything is."""
+        """The events since the last call; None if there are none."""
         if not self.on:
             return None
         begin, self._begin = self._begin, None

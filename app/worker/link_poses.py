@@ -1,4 +1,4 @@
-"""Where a robot's links are, for the 3D view."""
+"""The poses of a robot's links, for the 3D view."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _WXYZ = [0, 1, 2, 6, 3, 4, 5]
 
 
 class LinkPoses:
-    """Of joints 1 … n and the tip: (n + 1, 7), position, m, and quaternion wxyz."""
+    """The poses of joints 1 … n and the tip: (n + 1, 7), position in m and quaternion wxyz."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
@@ -20,7 +20,8 @@ class LinkPoses:
         self._poses = np.zeros((robot.n + 1, 7))
 
     def at(self, q: np.ndarray) -> np.ndarray | None:
-        """At joint positions q, in a buffer that the next call uses again; None if they are not finite."""
+        """The poses at joint positions q, in a buffer that the next call overwrites; None if they are not
+        finite."""
         if not np.isfinite(q).all():
             return None
         pin.framesForwardKinematics(self._model, self._data, q)

@@ -1,4 +1,5 @@
-"""The simulation process: one `Body`, driven in real time. Also what its fork server loads beforehand."""
+"""The simulation process: one `SimulationRunner`, driven in real time; and what its fork server loads
+beforehand."""
 
 from __future__ import annotations
 
@@ -23,16 +24,17 @@ STATUS_PERIOD = 0.1  # s
 SCRIPT_PERIOD = 0.02  # s
 _CHUNK = 0.01  # s: the longest run before commands are looked at again
 _BEAT = 0.004
-"""s between two looks at what is due. To wake up for each tick of a millisecond costs a third of what it
-costs, and each finds cold caches. A command wakes at once."""
-_IDLE = 0.02  # s: the same where nothing moves
+"""Time, s, between two checks for steps that are due. Waking up for each tick of a millisecond takes three
+times as much processor time, as the caches are cold each time. A command wakes the process at once."""
+_IDLE = 0.02  # s: the same while the simulation is idle
 
 
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
 
 
 def rehearse() -> None:
-    """Both kinds of controllers run for a moment: what is loaded on first use is there afterwards."""
+    """Runs both kinds of controllers for a moment, so that everything that is loaded on first use is
+    loaded."""
     for scene in _USUAL:
         body = SimulationRunner(SceneChoice(RunSpec(scene)))
         body.tick(3)
@@ -42,24 +44,24 @@ def rehearse() -> None:
 
 
 def main(wire: Wire) -> None:
-    """Entry point of the process. Waits (warm, everything imported) for the first scene, then simulates it
-    until the page says Quit or is gone."""
-    # Ctrl-C in a terminal reaches the whole process group; the page ends its children itself.
+    """Entry point of the process. Waits, with everything imported, for the first scene, then simulates it
+    until the page sends Quit or has ended."""
+    # Ctrl-C in a terminal reaches the whole process group; the page itself ends its children.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _let_ticks_end()
     try:
         _serve(wire)
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        return  # the page is gone
+        return  # the page has ended
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
         wire.send(SimulationFailed(_sentence(error)))
 
 
 def _let_ticks_end() -> None:
-    """Where there are more simulations than cores, one that wakes up waits until another one's tick is done,
-    instead of stopping it in the middle: of eight on two cores, a third fewer ticks take too long."""
-    if hasattr(os, "SCHED_BATCH"):  # Linux
+    """Lets a tick finish before another simulation gets the core, if there are more simulations than cores:
+    with eight simulations on two cores, a third fewer ticks take too long."""
+    if hasattr(os, "SCHED_BATCH"):  # only on Linux
         with suppress(OSError):  # forbidden in some containers
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
@@ -133,7 +135,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
             body.write_poses()
             next_pose = now + POSE_PERIOD
         if now >= next_status:
-            # A run as fast as it goes is no computer that cannot keep up.
+            # A run at full speed is slower than requested without the computer being too slow.
             capped = pacer.capped(now) and body.pace == body.speed
             wire.send(body.status(pacer.real_time_factor(now), capped))
             next_status = now + STATUS_PERIOD
@@ -147,7 +149,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
 
 
 def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:
-    """Runs up to so many steps, and returns how many it were."""
+    """Runs at most `due` steps; returns how many were run."""
     for ran in range(due):
         step_s = body.session.step_s
         if body.leader.waits(body.session.t + step_s):
@@ -160,7 +162,7 @@ def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:
 
 
 def _sentence(error: Exception) -> str:
-    """The exception and the place of ours it came from, short enough for a page."""
+    """The exception and the line of our code that raised it, short enough for a page."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" ({os.path.basename(frames[-1].filename)}, line {frames[-1].lineno})" if frames else ""
     return f"{type(error).__name__}: {error}{place}"[:600]

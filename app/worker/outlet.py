@@ -1,4 +1,4 @@
-"""What a session's telemetry goes through: memory of the width that its rows have."""
+"""The shared memory for a session's telemetry, as wide as its rows."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Outlet:
 
     Attributes:
         block: the shared memory.
-        poses: what computes the poses that go there.
+        poses: computes the poses that are written there.
         layout: of the rows.
         step_us, late: columns; None if there is none.
-        told: whether the page knows of it.
+        told: whether the page was told about this memory.
     """
 
     def __init__(self, session: Session, told: bool = True) -> None:
@@ -30,7 +30,7 @@ class Outlet:
         self.late = fields["late"].start if "late" in fields else None
 
     def fits(self, session: Session) -> bool:
-        """Whether the session's rows are still laid out this way: another stack has others."""
+        """Whether the session's rows still have this layout; another stack has another one."""
         if session.layout is not self.layout and session.layout == self.layout:
             self.layout = session.layout
         return session.layout is self.layout

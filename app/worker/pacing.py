@@ -1,16 +1,16 @@
-"""How much simulated time is due: in simulated time, never skipping a tick."""
+"""How much simulated time is due. No tick is ever skipped."""
 
 from __future__ import annotations
 
 BACKLOG = 0.1
-"""s of real time, or of simulated time if that goes slower, that may be owed; beyond, simulated time slows
-down instead of piling up work."""
+"""Largest debt, in s of real time or, if the simulation is slower than real time, of simulated time. Beyond
+it, simulated time slows down and no further work accumulates."""
 _MEMORY = 1.0
-"""s over which the real-time factor is averaged and a cap stays visible."""
+"""Time, s, over which the real-time factor is averaged and for which a slowdown is shown."""
 
 
 class Pacer:
-    """Keeps the debt of simulated time. Times are passed in, so that tests need no clock."""
+    """Keeps account of the simulated time that is due. Times are arguments, so that tests need no clock."""
 
     def __init__(self, now: float) -> None:
         self.speed = 1.0
@@ -22,7 +22,7 @@ class Pacer:
         self._factor = 0.0
 
     def due(self, now: float, T_s: float) -> int:
-        """Ticks to run now."""
+        """The number of ticks to run now."""
         self._debt += (now - self._last) * self.speed
         self._last = now
         most = BACKLOG * max(1.0, self.speed)
@@ -32,12 +32,12 @@ class Pacer:
         return int(self._debt / T_s + 1e-9)
 
     def ran(self, ticks: int, T_s: float) -> None:
-        """So many ticks were run."""
+        """Notes that this number of ticks was run."""
         self._debt -= ticks * T_s
         self._ran += ticks * T_s
 
     def rest(self, now: float) -> None:
-        """Time passed that is nobody's debt: paused, or busy loading."""
+        """Notes time that does not count as due: while paused, or while loading."""
         self._last = now
         self._debt = 0.0
         self._window = (now, self._ran)

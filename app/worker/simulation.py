@@ -1,5 +1,5 @@
-"""The simulation behind one page, without process and without clock: the worker drives it in real time,
-tests drive it by hand."""
+"""The simulation behind one page, without process and clock: the worker drives it in real time, tests step it
+directly."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ from robots import InputError
 
 @final
 class SimulationRunner:
-    """A session, whether it plays and how fast, and the memory its telemetry goes to."""
+    """A session, its play state and speed, and the memory for its telemetry."""
 
     def __init__(self, choice: SceneChoice, scene: Scene | None = None, judged: bool = True) -> None:
-        """scene: instead of the choice's own; judged: a lesson's claims are, if it is a step of one. Raises
-        InputError for a scene or robot that cannot be loaded."""
+        """scene: replaces the one of the choice; judged: whether the claims of a lesson are judged, if it is
+        a step of one. Raises InputError for a scene or robot that cannot be loaded."""
         self._judged = judged
         self.running, self.speed = True, 1.0
         self.resets, self.leader = 0, Leader()
@@ -58,7 +58,7 @@ class SimulationRunner:
         self._begin_anew(loaded)
 
     def _begin_anew(self, loaded: Loaded) -> None:
-        """A lesson's robot stands still until its script begins."""
+        """Takes over a loaded scene; the robot of a lesson stands still until its script begins."""
         self.choice, self.scene, self.left_out = loaded.choice, loaded.scene, loaded.left_out
         self.run, self.lecturer = loaded.run, loaded.lecturer
         self.running, self.speed = self.lecturer is None, 1.0
@@ -82,25 +82,26 @@ class SimulationRunner:
 
     @property
     def block(self) -> Block:
-        """Where telemetry goes."""
+        """The shared memory for telemetry."""
         return self._outlet.block
 
     def _refit(self) -> None:
-        """Another stack has other rows: they go to memory of their own, of which `news` tells the page."""
+        """Allocates other memory when a new stack changes the layout of the rows; `news` then tells the
+        page."""
         if not self._outlet.fits(self.session):
             before, self._outlet = self._outlet, Outlet(self.session, told=False)
             before.block.close()
             self.write_poses()
 
     def news(self) -> Ready | None:
-        """What the page must hear of since the last call: the same run has other telemetry."""
+        """The message about a changed telemetry layout; None if there is none since the last call."""
         told, self._outlet.told = self._outlet.told, True
         return None if told else replace(self.ready(), again=True)
 
     # ---------------------------------------------------------------- commands
 
     def handle(self, command: Command) -> Report | None:
-        """Obeys a command; the answer, if it has one, goes to the page."""
+        """Executes a command; returns the answer for the page, if the command has one."""
         lecturer = self.lecturer
         if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, StepTicks, RunStep)):
             self.session.notices.append("First say what you expect: this step asks for a prediction.")
@@ -112,7 +113,7 @@ class SimulationRunner:
                 self.session.post(event)
                 self.resets += 1
                 if not self.running:
-                    self._steps = max(self._steps, 1)  # a reset must show while paused, too
+                    self._steps = max(self._steps, 1)  # a reset must be visible while paused, too
             case Post(Set(path)) if lecturer is not None and path.partition(".")[0] == "stack":
                 self.session.notices.append(
                     "In a lesson the stack stays: choose its scene under Robot first."
@@ -168,7 +169,7 @@ class SimulationRunner:
         self.leader.begin(self.choice, self.session)
 
     def _begin(self, own: bool, fast: bool) -> None:
-        """The run of an exercise from its start."""
+        """Begins the run of an exercise from its start."""
         if self.lecturer is None:
             return
         settings: Any = self.lecturer.settings(own)
@@ -190,7 +191,7 @@ class SimulationRunner:
         return self.ready()
 
     def take_steps(self) -> int:
-        """Single ticks that were asked for while paused, once."""
+        """Returns the number of requested single ticks, and sets it to zero."""
         steps, self._steps = self._steps, 0
         return steps
 
@@ -201,7 +202,7 @@ class SimulationRunner:
                 pass
 
     def advance(self) -> bool:
-        """One step of the run; whether a control period ended with it, and its telemetry was written."""
+        """Runs one step; returns whether it completed a control period, whose telemetry was then written."""
         row = self.session.advance()
         if row is None:
             return False
@@ -212,7 +213,7 @@ class SimulationRunner:
         self.over_budget += bool(row[outlet.step_us] > 1e6 * self.session.settings.T_s)
         self.late += outlet.late is not None and bool(row[outlet.late])
         if self.lecturer is not None and self.lecturer.follow(row):
-            # What is out of control only gets worse; the learner should see where it ended.
+            # A robot out of control only gets worse, and the learner should see where control was lost.
             self.running = self.session.diverged_at is None
         return True
 
@@ -224,24 +225,24 @@ class SimulationRunner:
 
     @property
     def busy(self) -> bool:
-        """There is something to compute, though perhaps nothing runs."""
+        """Whether there is something to compute, even if no run is active."""
         return self.running or (self.lecturer is not None and self.lecturer.busy)
 
     def _finish_period(self) -> None:
-        # A pause stands between two control periods: what is changed meanwhile takes effect at once, and
-        # where the same events strike again a recording of the run comes out the same.
+        # A pause falls between two control periods. Changes made meanwhile take effect at once, and a
+        # recording of the run with the same events gives the same result.
         if not self.running and self.session.between:
             self.tick()
 
     def settle(self) -> None:
-        """While paused: what was asked for takes effect at once, though no time passes."""
+        """While paused: lets requested changes take effect at once, although no time passes."""
         self.session.drain()
         self._refit()
         if self.lecturer is not None and self.lecturer.idle():
             self.running = True
 
     def write_poses(self) -> None:
-        """The plant's true link poses, for the 3D view."""
+        """Writes the true poses of the plant's links, for the 3D view."""
         self._outlet.write_poses(self.session)
 
     # ---------------------------------------------------------------- reports
@@ -288,5 +289,5 @@ class SimulationRunner:
         )
 
     def close(self) -> None:
-        """Frees the memory."""
+        """Frees the shared memory."""
         self.block.close()

@@ -1,1 +1,1 @@
-"""Panels that show the inside of one tick; what nobody has open costs nothing."""
+"""Panels that show the inside of one tick. The simulation computes their data only while they are visible."""

@@ -1,4 +1,4 @@
-"""The tab about one tick: what is drawn of it, and what the simulation is asked for meanwhile."""
+"""The tab about one tick: its pictures, and the data that it requests from the simulation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from lessons.settings.torque import TorqueSettings
 
 
 class InsidePanel:
-    """A tab of the panel of plots. Only what the browser shows is asked for."""
+    """A tab of the panel of plots. It requests only data that the browser shows."""
 
     def __init__(
         self,
@@ -34,7 +34,8 @@ class InsidePanel:
         send: Callable[[Command], None],
         spectrum: SpectrumPicture,
     ) -> None:
-        """post: an event for the session; send: a command; spectrum: where M̄ is set."""
+        """post: posts an event to the session; send: sends a command; spectrum: the picture beside the
+        controls of M̄."""
         levels = tuple(dict.fromkeys(task.level for task in ready.tasks))
         self._plane: PlanePanel | None = None
         if ready.robot.n > 1:
@@ -47,7 +48,7 @@ class InsidePanel:
         self._watching = Watching(send)
 
     def draw(self, moment: Moment) -> None:
-        """Paints the instant, and asks for what the next one shall show."""
+        """Draws the data of an instant, and requests the data for the next one."""
         plane = InsideRequest() if self._plane is None else self._plane.wish
         wish: InsideRequest = replace(plane, matrix=self._matrix.wish, spectrum=self._spectrum.in_view)
         self._watching.ask(wish, moment.status.inside)
@@ -57,7 +58,7 @@ class InsidePanel:
         self._spectrum.draw(moment.status.inside)
 
     def write(self, status: Status, settings: TorqueSettings) -> None:
-        """Puts into words what is drawn."""
+        """Updates the texts about the pictures."""
         if self._plane is not None:
             self._plane.write(status.inside, settings)
         self._matrix.write(status.inside)

@@ -1,4 +1,4 @@
-"""The Hessian of one level's QP as a heat map, with the bounds that hold its solution."""
+"""The Hessian of one level's QP as a heat map, with marks at the active bounds."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ TITLE = "Hessian and active bounds"
 SIZE = (400, 400)
 _LEFT, _TOP, _SIDE = 62.0, 8.0, 330.0
 _SHADES = 6
-"""Steps of colour per sign: as many as the powers of ten that are told apart."""
+"""Number of shades per sign: one per power of ten that is distinguished."""
 
 
 class MatrixPanel:
-    """Asks for the Hessian while the browser shows it."""
+    """The heat map; it requests the Hessian while the browser shows it."""
 
     def __init__(
         self, client: viser.ClientHandle, in_view: InView, robot: Robot, levels: Sequence[str]
@@ -40,16 +40,16 @@ class MatrixPanel:
 
     @property
     def wish(self) -> str | None:
-        """The level to ask for."""
+        """The level whose Hessian is requested; None while the picture is not visible."""
         return str(self._level.value) if self._picture.in_view else None
 
     def draw(self, inside: Inside | None) -> None:
-        """Paints what was told."""
+        """Draws the data that the simulation sent."""
         if inside is not None and inside.matrix is not None and self._picture.in_view:
             self._picture.paint([markup(inside.matrix, self._names)])
 
     def write(self, inside: Inside | None) -> None:
-        """Names the bounds."""
+        """Updates the legend with the names of the bounds."""
         if inside is None or not self._picture.in_view:
             return
         words = block(esc(inside.why_not)) if inside.matrix is None else _legend(inside.matrix, self._names)
@@ -58,7 +58,8 @@ class MatrixPanel:
 
 
 def markup(matrix: Matrix, names: Sequence[str]) -> str:
-    """Cells by sign and size, knots parted by lines, and a mark at every increment that a bound holds."""
+    """SVG of the heat map: cells coloured by sign and size, lines between knots, and a mark at every
+    increment with an active bound."""
     k = len(matrix.shade)
     cell = _SIDE / k
     paths: dict[int, list[str]] = {}
@@ -101,7 +102,7 @@ def _step(shade: int) -> int:
 
 
 def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
-    """Joints where there is room, else knots."""
+    """Labels: joints if there is enough room, otherwise knots."""
     parts = []
     if matrix.shown == 1:
         for joint, name in enumerate(names):

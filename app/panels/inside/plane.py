@@ -1,4 +1,4 @@
-"""The plane of two joints' increments: the QPs of the last tick, drawn."""
+"""A plane through the QPs of the last tick, spanned by the increments of two joints."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SHIFT = 1.0  # N·m
 
 
 class PlanePanel:
-    """Asks for the plane while the browser shows it."""
+    """The picture of the plane; it requests its data while the browser shows it."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class PlanePanel:
 
     @property
     def wish(self) -> InsideRequest:
-        """What to ask the simulation for."""
+        """The data to request from the simulation; empty while the picture is not visible."""
         if not self._picture.in_view:
             return InsideRequest()
         through = str(self._through.value)
@@ -90,7 +90,7 @@ class PlanePanel:
         )
 
     def draw(self, moment: Moment) -> None:
-        """Paints the instant."""
+        """Draws the data of an instant."""
         inside = moment.status.inside
         plane = None if inside is None else inside.plane
         if plane is None or not self._picture.in_view:
@@ -100,7 +100,7 @@ class PlanePanel:
         self._picture.paint(parts(plane, self._half, self._colours, names))
 
     def write(self, inside: Inside | None, settings: TorqueSettings) -> None:
-        """Says what is what, and how well geometry and solver agree."""
+        """Updates the legend, and says how closely geometry and solver agree."""
         if inside is None or not self._picture.in_view:
             return
         several = settings.horizon > 1 and settings.controller != "hiqp"

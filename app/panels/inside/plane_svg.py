@@ -1,4 +1,4 @@
-"""The plane of two increments as SVG: box, contours, what (33) leaves, and the points that are asked for."""
+"""The plane of two increments as SVG: bounds, contours, the set that (33) leaves, and the optimal points."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ if TYPE_CHECKING:
 SIZE = (420, 408)
 _LEFT, _TOP, _SIDE = 50.0, 10.0, 360.0
 _FAR = 6.0
-"""A level's own wish farther off than so many times everything else does not make the picture smaller."""
-_SMALLEST = 0.12  # N·m: half the width of the closest look
+"""The unconstrained optimum of a level enlarges the picture only up to this multiple of the other
+distances."""
+_SMALLEST = 0.12  # N·m: half the width at the largest magnification
 _NEAR = 8.0
-"""Sides of the box that are farther off than so many times the points are left out of the picture."""
+"""Sides of the box that are farther away than this multiple of the points' distance are outside the
+picture."""
 _LOOSE = 0.55
-"""A picture that could be smaller by this factor becomes so: not at every breath of a point."""
+"""The picture shrinks only if it can shrink by this factor, so that small changes do not rescale it."""
 _RINGS = (1.0, 2.0, 3.0)
 CONTOURED = 2
-"""Levels whose contours are drawn; those below have nothing to choose here, as a rule."""
+"""Number of levels whose contours are drawn; lower levels usually have no freedom left in this plane."""
 
 
 def half_width(plane: Plane, before: float | None) -> float:
-    """N·m from the middle to the edge of the picture, a round number; before: what it was."""
+    """Half the width of the picture, N·m, a round number; before: the previous half width."""
     near = [np.zeros(2), *(level.solved for level in plane.levels)]
     near += [each for each in (plane.weighted,) if each is not None]
     reach = max(_SMALLEST, *(float(np.abs(each).max()) for each in near))
@@ -42,7 +44,7 @@ def half_width(plane: Plane, before: float | None) -> float:
 
 
 def _round(size: float) -> float:
-    """The next greater round number."""
+    """The next larger round number."""
     scale = 10.0 ** math.floor(math.log10(size))
     return next(
         scale * digit
@@ -52,7 +54,7 @@ def _round(size: float) -> float:
 
 
 class _Paper:
-    """Where a point of the plane lies on the paper."""
+    """Converts points of the plane to coordinates of the picture."""
 
     def __init__(self, half: float) -> None:
         self.half, self.scale = half, 0.5 * _SIDE / half
@@ -72,8 +74,8 @@ def _bounded(value: float, half: float) -> float:
 
 
 def parts(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequence[str]) -> list[str]:
-    """What changes at different times, from back to front. joints: names of the two, of the axis to the right
-    and of the one upwards."""
+    """SVG layers that change at different times, from back to front. joints: names of the two joints, first
+    the one of the horizontal axis."""
     paper = _Paper(half)
     clip = f'<clipPath id="plane"><rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}"/></clipPath>'
     inner = [_box(plane, paper)]
@@ -136,7 +138,7 @@ def _box(plane: Plane, paper: _Paper) -> str:
 
 
 def _sides(plane: Plane, paper: _Paper) -> str:
-    """Which limit each side of the box is, where it can be seen."""
+    """The names of the limits at the visible sides of the box."""
     left, top, right, bottom = _corners(plane, paper)
     (w, e), (s, n) = plane.box.kinds
     x = min(max(0.5 * (left + right), _LEFT + 30), _LEFT + _SIDE - 30)
@@ -159,11 +161,12 @@ def _sides(plane: Plane, paper: _Paper) -> str:
 
 
 def _contours(level: LevelCut, place: int, paper: _Paper, colours: Mapping[str, RGB]) -> str:
-    """Of the cost: one through the solution, where it touches what is allowed, and others for the shape."""
+    """Contours of the cost: one through the solution, where it touches the feasible set, and others to show
+    its shape."""
     colour = colours.get(level.name, BOUND)
     long, short, angle = level.ellipse(level.solved)
     touches = paper.scale * short > 4.0
-    if not touches:  # the solution is where the cost is least
+    if not touches:  # the solution minimises the cost
         values, axes = np.linalg.eigh(level.P)
         short = 0.045 * paper.half
         long = short * math.sqrt(values[1] / values[0])
@@ -183,7 +186,7 @@ def _contours(level: LevelCut, place: int, paper: _Paper, colours: Mapping[str, 
 
 
 def _left(level: LevelCut, plane: Plane, place: int, paper: _Paper, colours: Mapping[str, RGB]) -> str:
-    """What a level leaves to those below: a line, its part in the box thick, or a point."""
+    """The set that a level leaves to the levels below: a line, drawn thick within the box, or a point."""
     left, colour = level.leaves, css(colours.get(level.name, BOUND))
     if left.at is None or left.span.shape[1] == 2:
         return ""
@@ -252,7 +255,7 @@ def _mark(
     shift: tuple[float, float],
     hollow: bool = False,
 ) -> str:
-    """A point; beyond the picture an arrow at its edge says where it would be."""
+    """A mark at a point; if the point is outside the picture, an arrow at the edge points to it."""
     exact = ",".join(f"{value:.10g}" for value in w)
     if not np.isfinite(w).all():
         return ""

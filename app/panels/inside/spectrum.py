@@ -1,4 +1,4 @@
-"""Eigenvalues of I − M⁻¹M̄ in the unit circle."""
+"""The eigenvalues of I − M⁻¹M̄ beside the unit circle."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from app.panels.widgets.picture import SvgPicture
 TITLE = "Eigenvalues of I − M⁻¹M̄"
 SIZE = (360, 208)
 _MIDDLE, _RADIUS = (180.0, 92.0), 78.0
-_EDGE = 2.2  # how far out the picture goes
+_EDGE = 2.2  # radius of the picture
 
 
 class SpectrumPicture:
-    """Asks for the eigenvalues while the browser shows it."""
+    """The picture; it requests the eigenvalues while the browser shows it."""
 
     def __init__(self, client: viser.ClientHandle, in_view: InView) -> None:
         self._picture = SvgPicture(
@@ -32,13 +32,14 @@ class SpectrumPicture:
         return self._picture.in_view
 
     def draw(self, inside: Inside | None) -> None:
-        """Paints what was told."""
+        """Draws the eigenvalues that the simulation sent."""
         if inside is not None and inside.spectrum is not None and self.in_view:
             self._picture.paint([markup(inside.spectrum)])
 
 
 def markup(values: np.ndarray | Sequence[float]) -> str:
-    """A mark per eigenvalue; all are real. Far ones stand at the edge, with their number."""
+    """SVG with a mark per eigenvalue; all are real. Eigenvalues outside the picture are at its edge, with
+    their value."""
     x0, y0 = _MIDDLE
     ring = f'<circle cx="{x0}" cy="{y0}" r="{_RADIUS}" fill="{css(GOOD, 0.08)}" stroke="{css(BOUND)}"/>'
     far, high = _EDGE * _RADIUS, _RADIUS + 8

@@ -1,1 +1,1 @@
-"""What a lesson shows: its cards, steps, predictions, claims."""
+"""The panels of a lesson: its cards, steps, predictions and claims."""

@@ -1,4 +1,4 @@
-"""The start page: a card per lesson, in order, with what was done of it."""
+"""The start page: a card per lesson, in order, with the learner's progress."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from lessons.teaching.lesson import Lesson
 Choose = Callable[[SceneChoice], None]
 
 LABORATORY = SceneChoice(RunSpec("iiwa14-hold"))
-"""Where the free laboratory begins."""
+"""The scene with which the free laboratory begins."""
 
 
 def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
-    """Cards in the current container; every button can be reached by the keyboard."""
+    """Adds the cards to the current container; every button can be reached by the keyboard."""
     progress = notebook.progress
     done = sum(name in progress.seen for name in COURSE)
     gui.add_html(
@@ -54,7 +54,7 @@ def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
 
 
 def add_invitation(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
-    """One button that leads on from wherever the learner is."""
+    """Adds a button that leads to the next lesson or step, depending on the learner's progress."""
     progress = notebook.progress
     unfinished = [name for name in COURSE if _offer(load_lesson(name), progress)[0] != "Again"]
     name = unfinished[0] if unfinished else COURSE[0]
@@ -79,7 +79,7 @@ def _button(
 
 
 def _offer(lesson: Lesson, progress: LearnerProgress) -> tuple[str, int]:
-    """("Start", "Continue" or "Again", at which place)."""
+    """The label of the button ("Start", "Continue" or "Again") and the index of the step that it opens."""
     seen = progress.seen.get(lesson.name, frozenset())
     parts = len(parts_of(lesson))
     place = progress.next_place(lesson.name, parts)
@@ -104,7 +104,7 @@ def _card(number: int, lesson: Lesson, progress: LearnerProgress) -> str:
 
 
 def _needs(needs: str) -> str:
-    """Lessons by their titles instead of their names."""
+    """Replaces names of lessons by their titles."""
     for name in COURSE:
         needs = needs.replace(f'"{name}"', f"“{load_lesson(name).card.title}”")
     return needs
@@ -120,7 +120,7 @@ def _framed(picture: str, words: str) -> str:
 
 @cache
 def glyph(name: str) -> str:
-    """The little picture of a lesson: SVG that takes the text's colour."""
+    """The icon of a lesson: SVG that takes the colour of the text."""
     folder = files("app.panels.lesson") / "glyphs"
     found = folder / f"{name}.svg"
     return (found if found.is_file() else folder / "lesson.svg").read_text(encoding="utf-8")

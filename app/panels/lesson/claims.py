@@ -1,4 +1,4 @@
-"""What a lesson's tab says, as HTML: where one is, the idea, the claims as they become true or false, why."""
+"""The HTML of a lesson's tab: the heading, the idea, the state of the claims, and the explanation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Part = Step | Challenge
 
 
 def heading(exercise: LessonPlace) -> str:
-    """Which lesson, which step of how many."""
+    """The heading: the lesson, the number of the step and the number of steps."""
     lesson = exercise.whole
     parts = parts_of(lesson)
     names = [part.title if isinstance(part, Step) else "Challenge" for part in parts]
@@ -39,7 +39,7 @@ def heading(exercise: LessonPlace) -> str:
 
 
 def idea(part: Part, opened: bool) -> str:
-    """The text; folded up once the run was seen, so that what happened stands first."""
+    """The text of the idea; it is folded after the run, so that the results come first."""
     words = rendered(part.text)
     if isinstance(part, Step) and part.ghost is not None:
         words += f'<p style="opacity:0.8">Ghost, the dashed grey curve: <b>{esc(part.ghost.words)}</b>.</p>'
@@ -48,7 +48,7 @@ def idea(part: Part, opened: bool) -> str:
 
 
 def state(part: Part, lecture: Lecture, best: float | None) -> str:
-    """How far the run is, the claims or goals, the curves, and a challenge's points."""
+    """The progress of the run, the claims or goals, the curves, and a challenge's points."""
     challenge = isinstance(part, Challenge)
     claims = part.goals if isinstance(part, Challenge) else part.claims
     html = "" if lecture.phase == "waiting" and not challenge else _progress(lecture)
@@ -61,7 +61,7 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
 
 
 def after(part: Part, lecture: Lecture) -> str:
-    """Why it came out like this, and what to do now."""
+    """The explanation of the result, and what to do now."""
     if isinstance(part, Challenge):
         return ""
     return block(
@@ -146,7 +146,7 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 
 
 def pictures(part: Part, lecture: Lecture) -> str:
-    """The signals to look at, over the run."""
+    """The signals of the step, plotted over the run."""
     if not lecture.curves:
         return block("The curves of the run appear here: run this step (key P) to see them.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
@@ -178,7 +178,7 @@ def _unit(signal: Signal) -> str:
 
 
 def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
-    """What claims say about the largest or the last value of a signal itself."""
+    """The bounds that claims set for the largest or the last value of a signal itself."""
     return [
         Bound(claim.bound, claim.text)
         for claim in claims

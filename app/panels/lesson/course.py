@@ -1,4 +1,4 @@
-"""All of the lessons in one page: the tab of the step that is on, the invitation, the list of lessons."""
+"""The lessons in one page: the tab of the active step, the invitation, and the list of lessons."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from lessons.settings.settings import SceneSettings
 
 
 class Course:
-    """Built with every scene. The tab of a lesson comes first, since it is what the learner came for."""
+    """The lessons of a page, built with every scene. The tab of a lesson comes first, since the learner
+    opened the page for it."""
 
     def __init__(
         self,
@@ -31,7 +32,7 @@ class Course:
         settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        """exercise: the one that is on, if any."""
+        """exercise: the active one, if there is one."""
         self._gui, self._learner, self._notebook = gui, learner, notebook
         self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop
@@ -43,7 +44,7 @@ class Course:
     def add_first_tabs(
         self, tabs: viser.GuiTabGroupHandle, plots: viser.PanelHandle | viser.GuiTabGroupHandle
     ) -> None:
-        """The step that is on, and its curves among the plots."""
+        """Adds the tab of the active step, and its curves to the plots."""
         gui, exercise = self._gui, self._exercise
         if exercise is None:
             return
@@ -64,7 +65,7 @@ class Course:
         )
 
     def add_last_tab(self, tabs: viser.GuiTabGroupHandle) -> None:
-        """Every lesson, where none is on."""
+        """Adds the list of lessons, if no lesson is active."""
         if self._panel is None:
             with tabs.add_tab("Lessons"):
                 self._fill()
@@ -78,12 +79,12 @@ class Course:
         self._choose(choice)
 
     def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
-        """Shows how far the lesson is."""
+        """Updates the progress of the lesson."""
         if self._panel is not None:
             self._panel.follow(lecture, settings)
 
     def close(self) -> None:
-        """The panels are about to be removed."""
+        """Called before the panels are removed."""
         self._list.close()
         if self._panel is not None:
             self._panel.close()

@@ -1,4 +1,4 @@
-"""Small pictures as SVG: where a guess lies, what a signal did, what was sketched."""
+"""Small SVG pictures: a guess on a scale, a signal over the run, a sketched curve."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GUESS, TRUTH = css(LEVELS[0]), css(LEVELS[1])
 
 
 def scale(low: float, high: float, guess: float | None, truth: float | None, factor: float, unit: str) -> str:
-    """A logarithmic scale with the guess, the measured value, and how near counts as right."""
+    """A logarithmic scale with the guess, the measured value, and the range of right answers."""
 
     def x(value: float) -> float:
         share = math.log(max(value, 1e-300) / low) / math.log(high / low)
@@ -43,7 +43,7 @@ def scale(low: float, high: float, guess: float | None, truth: float | None, fac
 
 @dataclass(frozen=True)
 class Bound:
-    """A level to compare a curve with, in the curve's unit."""
+    """A reference level for a curve, in the curve's unit."""
 
     value: float
     words: str
@@ -57,7 +57,7 @@ def chart(
     bounds: Sequence[Bound],
     until: float,
 ) -> str:
-    """A signal over the run, with the ghost's (dashed) and what it is compared with (dotted)."""
+    """A signal over the run, with the ghost's curve (dashed) and its reference levels (dotted)."""
     height, top, left = 92, 18, 54
     shown = [curve.values, *([ghost.values] if ghost is not None else [])]
     values = np.concatenate([each[np.isfinite(each)] for each in shown])
@@ -99,7 +99,7 @@ def sketch(
     truth: SignalCurve | None,
     unit: str,
 ) -> str:
-    """What the learner draws, and the truth over it."""
+    """The curve that the learner draws, with the measured one over it."""
     height, top, left = 130, 16, 40
     axis = (low, high, False)
 
@@ -149,7 +149,7 @@ def _axis(values: np.ndarray, marks: list[float]) -> Axis:
         return math.floor(math.log10(least)), math.ceil(math.log10(high)), True
     low = min(low, 0.0)
     if low > -0.02 * high:
-        low = 0.0  # a touch of undershoot would only blur where zero is
+        low = 0.0  # a small negative part would only make the zero line harder to see
     room = 0.06 * (high - low) or 1.0
     return (low if low == 0 else low - room), high + room, False
 
@@ -191,7 +191,7 @@ def _pointer(x: float, tip: float, foot: float, colour: str) -> str:
 def _text(
     x: float, y: float, words: str, colour: str = "currentColor", anchor: str = "start", bold: bool = False
 ) -> str:
-    # Words in the middle of something near an edge would be cut off.
+    # A centred label near an edge would be cut off.
     half = 3.1 * len(words)
     x = min(max(x, half + 2), _W - half - 2) if anchor == "middle" else x
     weight = ' font-weight="600"' if bold else ""

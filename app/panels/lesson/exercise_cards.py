@@ -1,4 +1,4 @@
-"""Exercises as cards: what to write, the commands that begin and judge it, what it is judged by, hints."""
+"""Cards of exercises: the task, the commands that begin and judge it, the criteria, and hints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lessons.exercises.exercise import Exercise
 
 
 def exercise_cards() -> str:
-    """All of them, in order."""
+    """The cards of all exercises, in order."""
     said = (
         f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own; "
         "what you save runs here, and the last command judges what the robot does."
@@ -22,7 +22,7 @@ def exercise_cards() -> str:
 
 
 def belonging_to(lesson: str) -> str:
-    """The exercises that a lesson leads to; nothing if there is none."""
+    """The cards of the exercises that belong to a lesson; "" if there are none."""
     return "".join(block(f"<b>Write it yourself.</b> {card(each)}") for each in exercises_of(lesson))
 
 
@@ -49,7 +49,7 @@ def _judged_by(exercise: Exercise) -> str:
 
 
 def _hints(hints: Sequence[str], number: int = 1) -> str:
-    """The first hint to unfold; the next one is found in it."""
+    """The first hint as a folded element, which contains the next one."""
     if not hints:
         return ""
     first = rendered_line(hints[0])

@@ -1,4 +1,4 @@
-"""The prediction of a step: asked before the run, held against the truth after it."""
+"""The prediction of a step: entered before the run, compared with the measured value after it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _POINTS = 5
 
 
 class Asking:
-    """One prediction. What is picked is sent at once and may be changed until the run begins."""
+    """The input of a prediction. It is sent at once and may be changed until the run begins."""
 
     def __init__(self, gui: viser.GuiApi, prediction: Prediction, predict: Callable[[Answer], None]) -> None:
         self._prediction, self._predict = prediction, predict
@@ -90,7 +90,7 @@ class Asking:
 
     @property
     def suggested(self) -> Answer | None:
-        """What counts if the learner runs the step as it stands: a slider says something where it is."""
+        """The prediction that counts if the learner enters none: a slider counts with its initial value."""
         match self._prediction:
             case Choice():
                 return None
@@ -107,7 +107,7 @@ class Asking:
     # ---------------------------------------------------------------- showing
 
     def show(self, lecture: Lecture) -> None:
-        """Follows the run; once it is over, the truth."""
+        """Updates the input during the run, and shows the measured value after it."""
         if self._mine is None and lecture.answer is not None:
             self._recall(lecture.answer)
         before = lecture.phase in ("waiting", "preparing") and lecture.grade is None
@@ -117,7 +117,7 @@ class Asking:
         self._write(lecture)
 
     def _recall(self, answer: Answer) -> None:
-        """After a reload: what had been said."""
+        """Restores the prediction after a page was reloaded."""
         self._mine = answer
         if isinstance(self._prediction, Value) and isinstance(answer, (int, float)):
             slider = self._inputs[0]
@@ -148,7 +148,7 @@ class Asking:
             self._picture.content = html
 
     def _pictured(self, lecture: Lecture | None) -> str:
-        """lecture: once the run is graded; what came too late for it is not what was said."""
+        """lecture: given after the run was graded; an input that came too late is not part of it."""
         truth, mine = (math.nan, self._mine) if lecture is None else (lecture.truth, lecture.answer)
         match self._prediction:
             case Choice() as choice:

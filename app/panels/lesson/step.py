@@ -1,4 +1,4 @@
-"""The lesson's tab: one step at a time, from its idea to its prediction, its run and what came of it."""
+"""The lesson's tab: one step at a time, with its idea, its prediction, its run and the results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _BACK, _SKIP, _ALL = "◀ Back", "Skip ▶", "All lessons"
 
 
 class LessonPanel:
-    """Built anew for every step, inside a tab that stays. Callbacks only send."""
+    """The panel of a step, rebuilt for every step in a tab that stays. Callbacks only send commands."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class LessonPanel:
         settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        """pictures: where the curves of the run are drawn."""
+        """pictures: the container in which the curves of the run are drawn."""
         self._gui, self._tab, self._pictures, self._loop = gui, tab, pictures, loop
         self._learner, self._send, self._choose = learner, learner.send, choose
         self._all_lessons, self._notebook, self._settings = all_lessons, notebook, settings
@@ -118,7 +118,7 @@ class LessonPanel:
                 self._fast = bool(self._hurry.value)
 
         @self._second.on_update
-        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # in a thread: processes begin and end
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # on a thread: processes begin and end
             if event.client is not None:
                 self._beside = bool(self._second.value)
                 self._show_ghost()
@@ -137,7 +137,7 @@ class LessonPanel:
             {_BACK: self.back, _SKIP: self.next, _ALL: self._all_lessons}[str(self._where.value)]()
 
     def _show_ghost(self) -> None:
-        """Sees to it that the ghost in the scene is this step's, if one is wanted."""
+        """Starts the ghost of this step in the scene, if it needs one."""
         ghost = self._part.ghost if isinstance(self._part, Step) else None
         if ghost is not None and self._beside:
             self._learner.start_ghost(ghost)
@@ -158,7 +158,7 @@ class LessonPanel:
         self._send(Predict(answer))  # pyright: ignore[reportArgumentType]
 
     def run(self) -> None:
-        """The step's script from its start."""
+        """Runs the step's script from its start."""
         lecture, asking = self._lecture, self._asking
         if asking is not None and lecture is not None and lecture.answer is None:
             suggested = asking.suggested
@@ -167,14 +167,14 @@ class LessonPanel:
         self._send(RunStep(own=True, fast=self._fast))
 
     def next(self) -> None:
-        """The next step; after the last one the list of lessons."""
+        """Opens the next step; after the last step, the list of lessons."""
         if self._exercise.place + 1 >= len(parts_of(self._exercise.whole)):
             self._all_lessons()
         else:
             self._go(self._exercise.place + 1)
 
     def back(self) -> None:
-        """The step before, if there is one."""
+        """Opens the previous step, if there is one."""
         if self._exercise.place > 0:
             self._go(self._exercise.place - 1)
 
@@ -184,7 +184,7 @@ class LessonPanel:
     # ---------------------------------------------------------------- showing
 
     def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
-        """Shows how far the exercise is."""
+        """Updates the progress of the exercise."""
         if lecture is None:
             return
         if lecture.exercise != self._exercise:
@@ -214,7 +214,7 @@ class LessonPanel:
         seen = lecture.attempt > 0
         over = lecture.phase == "done"
         challenge = isinstance(self._part, Challenge)
-        # What is missed invites another try; who has had enough presses Skip.
+        # After a missed goal the button offers another attempt; Skip continues without it.
         passed = lecture.result is not None and lecture.result.passed
         if self._asking is not None:
             self._asking.show(lecture)
@@ -247,5 +247,5 @@ class LessonPanel:
             handle.content = html
 
     def close(self) -> None:
-        """The controls are about to be removed."""
+        """Called before the controls are removed."""
         self._bindings.close()

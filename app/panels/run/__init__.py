@@ -1,1 +1,1 @@
-"""What every scene has: playback, looking back, sharing, comparing."""
+"""Panels that every scene has: playback, time line, sharing, comparison."""

@@ -1,4 +1,4 @@
-"""Who is binding: the active constraints of the last plan, and the time spent at bounds."""
+"""The active constraints of the last plan, and the time that each joint spent at its bounds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _HEAD = '<tr style="text-align:left">{}</tr>'
 
 
 class BindingPanel:
-    """A table per question."""
+    """Two tables: the active constraints, and the time at bounds."""
 
     def __init__(self, gui: viser.GuiApi, colours: dict[str, RGB]) -> None:
         self._colours = colours

@@ -1,4 +1,4 @@
-"""What a page says that only watches, and where the instructor gives the token."""
+"""The top of a page that only watches: an explanation, and an input for the instructor's token."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import viser
 from app.html.text import block
 
 BETWEEN = 1.0
-"""s between two guesses of one page. It is the page that waits; other pages and the server do not."""
+"""Time, s, between two attempts of one page. Only this page waits, not other pages or the server."""
 
 
 class Guesses:
-    """One page's tries: at most one in BETWEEN s, and of all that come meanwhile the last."""
+    """The attempts of one page: at most one every BETWEEN s; of all attempts in between only the last one
+    counts."""
 
     def __init__(self, give: Callable[[str], bool]) -> None:
         self._give = give
@@ -23,8 +24,8 @@ class Guesses:
         self._waiting = False
 
     async def offer(self, token: str) -> bool | None:
-        """Whether it was the right one; None if it was not looked at, because a later one came or an earlier
-        one waits and looks at it in its place."""
+        """Whether the token was right; None if it was not checked, because a later attempt replaced it or an
+        earlier one is waiting and checks it instead."""
         self._latest = token
         if self._waiting:
             return None
@@ -39,7 +40,7 @@ class Guesses:
 
 
 def add_watching(gui: viser.GuiApi, give: Callable[[str], bool]) -> None:
-    """At the top of the panel of a page in a classroom.
+    """Adds the top of the panel for a page in a classroom.
 
     Args:
         gui: where.

@@ -1,4 +1,4 @@
-"""Two robots at once: which ghost, and how both have done."""
+"""The comparison of two robots: the settings of the ghost, and the figures of both runs."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _ROWS = 3
 
 
 class ComparePanel:
-    """Callbacks only start and end ghosts; what is shown comes from the learner, so that a ghost that a
-    lesson started shows here as well."""
+    """The panel of the ghost. Callbacks only start and end ghosts; the state comes from the learner, so that
+    a ghost that a lesson started is shown as well."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class ComparePanel:
             self._change_sides(event.client)
 
         @self._end.on_click
-        def _(_: object) -> None:  # in a thread: it waits for a process to end
+        def _(_: object) -> None:  # on a thread: it waits for a process to end
             learner.stop_ghost()
 
     def _row(self, gui: viser.GuiApi, place: int) -> tuple[viser.GuiDropdownHandle[str], viser.GuiTextHandle]:
@@ -115,7 +115,7 @@ class ComparePanel:
         learner.start_ghost(Ghost(", ".join(own), own))
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
-        """Shows what is."""
+        """Shows the present state."""
         ghost = self._learner.ghost
         on = ghost is not None
         if self._end.visible != on:

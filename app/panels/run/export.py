@@ -1,4 +1,4 @@
-"""What a learner can take away: rows, plots, and the setting."""
+"""Downloads: telemetry rows, plots, and the setting."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 
 
 class ExportPanel:
-    """Files are made on viser's threads, from what the learner has recorded; the simulation is not asked."""
+    """The panel of downloads. Files are made on viser's threads from the recorded data, without the
+    simulation."""
 
     def __init__(
         self, gui: viser.GuiApi, learner: SimulationClient, settings: Callable[[], SceneSettings]
@@ -43,7 +44,7 @@ class ExportPanel:
         button = gui.add_button(label, hint=hint)
 
         @button.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # in a thread: it takes a while
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a thread: it takes a while
             client = event.client
             if client is None:
                 return
@@ -57,7 +58,7 @@ class ExportPanel:
         record = simulation.record
         if record is None:
             return None
-        # The page's loop adds to it meanwhile.
+        # The page's loop appends rows meanwhile.
         rows = simulation.read(lambda *_: record.recent() if self._span.value == _MINUTE else record.whole())
         return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
 
@@ -86,7 +87,7 @@ class ExportPanel:
         run = self._rows(self._learner)
         if run is None:
             return None
-        from lessons.plots.draw import draw  # here: few pages ever draw, and all would load Matplotlib
+        from lessons.plots.draw import draw  # imported here: few pages make plots, and Matplotlib is large
 
         ghost = self._learner.ghost
         beside = None if ghost is None else self._rows(ghost)

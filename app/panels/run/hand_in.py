@@ -1,4 +1,4 @@
-"""What was done of the lessons, as a text to hand in."""
+"""The learner's progress in the lessons, as a text to hand in."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robots import InputError
 
 
 def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
-    """A folder in the current container. The text is made when it is asked for, on viser's threads."""
+    """Adds a folder to the current container. The text is made on request, on viser's threads."""
     with gui.add_folder("Hand in what you did", expand_by_default=False):
         gui.add_html(block(_SIGNED if notebook.signs else _NOT_SIGNED))
         name = gui.add_text("Your name", "")
@@ -26,7 +26,7 @@ def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook
         try:
             code = "" if told is None else code_of(told)
         except InputError:
-            code = ""  # e.g. an uploaded robot: the lessons are told all the same
+            code = ""  # e.g. for an uploaded robot; the text still contains the progress
         text.visible = False
         text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], code)
         text.visible = True

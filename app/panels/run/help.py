@@ -1,4 +1,4 @@
-"""The last tab: keys, what is drawn, words."""
+"""The last tab: the keys, the meaning of the drawings, and the glossary."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _DRAWN = (
 
 
 class HelpPanel:
-    """Plain text; nothing here changes. It also opens as a window."""
+    """A text that never changes. It can also be opened as a window."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._gui = gui

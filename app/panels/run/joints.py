@@ -1,5 +1,5 @@
-"""Inputs (torques or accelerations), velocities and positions inside their bounds: all joints in shares, or
-one in its units."""
+"""Plots of inputs (torques or accelerations), velocities and positions with their bounds: all joints as
+shares of their bounds, or one joint in its units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robots import Robot
 from robots.truth import joint_axis
 
 _ALL = "All joints, % of bound"
-_SHARE = 120.0  # %: the axis ends a little beyond the bounds
+_SHARE = 120.0  # %: the axis reaches slightly beyond the bounds
 _RUG = 0.035  # height of the mark "at its bound", as a share of the axis
 
 
@@ -40,8 +40,8 @@ class _Quantity:
 
 @dataclass(frozen=True)
 class Input:
-    """What drives the joints: fields of the telemetry (value, lower, upper; no lower one: it is −upper), and
-    units of turning and of sliding joints."""
+    """The input of the joints: fields of the telemetry (value, lower and upper bound; without a lower field
+    it is −upper), and the units for revolute and for prismatic joints."""
 
     title: str
     value: str
@@ -55,7 +55,7 @@ ACCELERATION = Input("Acceleration, largest", "acceleration", None, "a_limit", (
 
 
 class JointPlots:
-    """Three charts. The choice is only noted by the callback; the page's loop builds and draws."""
+    """Three charts. The callback only stores the choice; the page's loop builds and draws the charts."""
 
     def __init__(self, gui: viser.GuiApi, in_view: InView, robot: Robot, driven: Input = TORQUE) -> None:
         self._gui, self._in_view = gui, in_view
@@ -81,7 +81,7 @@ class JointPlots:
             self._joint = None if index < 0 else index
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None) -> None:
-        """ghost: the same stretch of time of the ghost, drawn dashed."""
+        """ghost: the ghost's data over the same interval, drawn dashed."""
         joint = self._joint
         if (joint, ghost is not None) != self._built:
             self._build(joint, ghost is not None)
@@ -94,7 +94,7 @@ class JointPlots:
     def _curves(
         self, at_bound: np.ndarray, kind: int, joint: int | None, own: _Quantity, other: _Quantity | None
     ) -> list[np.ndarray]:
-        """Values, upper and lower bound, the marks at the bottom, the ghost's values."""
+        """Values, upper and lower bound, the marks at the bottom, and the ghost's values."""
         if joint is None:
             edge = np.where(np.isfinite(own.values[:, 0]), 100.0, np.nan)
             low, high = -_SHARE, _SHARE
@@ -170,7 +170,7 @@ class JointPlots:
             (-_SHARE, _SHARE),
             height=170,
             bands=((n, n + 1, GOOD),),
-            # One legend serves the three; the ghost's curves would double it.
+            # One legend is enough for the three charts; it would otherwise contain the ghost's curves twice.
             legend=last and not ghost,
         )
 

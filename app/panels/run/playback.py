@@ -1,4 +1,4 @@
-"""Run, pause, step, speed, reset, and how honest the clock is. Always visible above the tabs."""
+"""Run, pause, step, speed and reset, and the real-time factor. Always visible above the tabs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class PlaybackPanel:
     def __init__(
         self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop, fastest: float
     ) -> None:
-        """fastest: the highest speed that can be asked for, simulated seconds per second."""
+        """fastest: the highest selectable speed, simulated seconds per second."""
         self._learner, self._loop = learner, loop
         self._running: PendingEdit[bool] = PendingEdit()
         self._closed = False
@@ -90,7 +90,7 @@ class PlaybackPanel:
             learner.reset_all()
 
     def show_trouble(self, trouble: Trouble | None) -> None:
-        """A simulation that stopped, hangs or takes long, or None."""
+        """Shows that a simulation stopped, hangs or takes long; None removes the message."""
         self._trouble.visible = trouble is not None
         self._again.visible = trouble is not None and trouble.offer is not None
         if trouble is None:
@@ -104,7 +104,7 @@ class PlaybackPanel:
         self._closed = True
 
     def _show_speed(self, speed: float) -> None:
-        # On the event loop, for the reason `Bindings` gives.
+        # On the event loop, for the reason given in `Bindings`.
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 

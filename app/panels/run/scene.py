@@ -1,4 +1,4 @@
-"""Which robot and which scene: catalog, a URDF by path, an upload, and the report of the import."""
+"""The choice of robot and scene: catalog, a URDF by path, an upload, and the report of the import."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ MAX_UPLOAD = 10_000_000  # bytes, what the importer reads
 
 
 class RobotPanel:
-    """Choices become a `SceneChoice`; the simulation answers with the new scene or with one sentence."""
+    """The panel of robot and scene. A choice becomes a `SceneChoice`; the simulation answers with the new
+    scene or with a sentence."""
 
     def __init__(
         self,
@@ -30,7 +31,7 @@ class RobotPanel:
         choose: Callable[[SceneChoice], None],
         own_files: Folder | None,
     ) -> None:
-        """own_files: where files may lie that this page names by path; None: it may name none."""
+        """own_files: folder of the files that this page may name by path; None: it may name none."""
         robot = ready.robot
         self._choose = choose
         gui.add_html(
@@ -105,7 +106,7 @@ class RobotPanel:
 
         @load.on_click
         def _(_: object) -> None:
-            """On a thread: the file is first loaded in a process of its own, which takes a second."""
+            """Runs on a thread: the file is first loaded in a process of its own, which takes a second."""
             name = path.value.strip()
             self._wait(answer)
             if not is_file(name):
@@ -148,8 +149,8 @@ class RobotPanel:
         self._ask(answer, RunSpec("hold", tip=tip), text)
 
     def _wait(self, answer: viser.GuiHtmlHandle) -> None:
-        """Something was asked for; `answer` stands above what was pressed: what stands below may be out of
-        sight."""
+        """Shows that a request is in progress. `answer` is the text above the control that was used; a text
+        below it could be out of sight."""
         if self._answer is not None:
             self._answer.visible = False
         self._answer, self._waits = answer, True
@@ -157,8 +158,8 @@ class RobotPanel:
         answer.visible = True
 
     def refuse(self, sentence: str) -> bool:
-        """A scene or robot was not loaded; the one before goes on. Whether it was asked for here, and is now
-        told here."""
+        """Shows why a scene or robot was not loaded; the previous one continues. Returns whether the request
+        came from this panel."""
         waited, self._waits = self._waits, False
         if waited and self._answer is not None:
             self._answer.content = block(

@@ -1,4 +1,4 @@
-"""The setting as a command line, as a code and as a script, and a code of somebody else opened."""
+"""The setting as a command line, a state code and a script; and an input for a state code."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robots import InputError
 
 
 class SharePanel:
-    """Texts are made when they are asked for, on viser's threads."""
+    """The panel of texts, which are made on request, on viser's threads."""
 
     def __init__(
         self, gui: viser.GuiApi, learner: SimulationClient, choose: Callable[[SceneChoice], None]
@@ -74,7 +74,7 @@ class SharePanel:
 
 
 def code_of(told: Told) -> str:
-    """The setting as a code. Raises InputError if a code cannot carry it."""
+    """The state code of the setting. Raises InputError if a state code cannot contain it."""
     return encode(_state(told))
 
 

@@ -1,5 +1,5 @@
-"""Looking back while paused: a slider over the last minute. Always visible above the tabs while it can be
-used."""
+"""A slider over the last minute, for looking back while paused. It is above the tabs, visible whenever it can
+be used."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _LEAST = 0.2  # s: less is not worth a slider
 
 
 class TimeLine:
-    """`past` is the moment to show, None for now. Time that goes on again, by running, a step or a reset,
-    brings the view back to now."""
+    """The time line. `past` is the moment to show, None for now. When simulated time continues, by running, a
+    step or a reset, the view returns to now."""
 
     def __init__(self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop) -> None:
         self.past: float | None = None
         self._learner, self._loop = learner, loop
-        self._paused_at: float | None = None  # s, the simulated time that stands
+        self._paused_at: float | None = None  # s, simulated time at which the run is paused
         self._closed = False
         self._slider = gui.add_slider(
             "Look back [s]",

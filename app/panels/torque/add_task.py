@@ -1,4 +1,4 @@
-"""One more task: its kind, its frame, its axes, and whose priority it gets."""
+"""The form for one more task: its kind, frame, axes and level."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _OWN = "a level of its own, at place "
 
 
 class AddTask:
-    """A folder whose controls show what the chosen kind needs. Nothing happens before Add is pressed."""
+    """A folder whose controls depend on the chosen kind of task. The button Add creates the task."""
 
     def __init__(
         self, gui: viser.GuiApi, post: Send, robot: Robot, stack: Stack, own: Mapping[str, Task]
     ) -> None:
-        """own: tasks of files of one's own, by path."""
+        """own: tasks of the user's own files, by path."""
         self._post, self._own = post, own
         with gui.add_folder("Add a task", expand_by_default=False, order=-1.0):
             self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
@@ -72,7 +72,7 @@ class AddTask:
         return bool(self._pick.value)
 
     def choose(self, frame: str) -> None:
-        """A link was clicked."""
+        """Chooses the link that was clicked."""
         if frame in self._frame.options:
             self._frame.value = frame
 

@@ -1,4 +1,4 @@
-"""The controller: which one, horizon, M̄ with its gauge, time step, limits, solver."""
+"""The settings of the controller: its kind, horizon, M̄ with its gauge, time step, limits and solver."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale")
 
 
 class ControllerPanel:
-    """Everything about the controller that can be changed while it runs.
+    """All settings of the controller that can be changed while it runs.
 
     spectrum: the picture beside M̄.
     """

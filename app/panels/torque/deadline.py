@@ -1,4 +1,4 @@
-"""When a torque is due, what decides how long it took, and how often it comes too late."""
+"""The deadline of the torque, the settings of the computing time, and the share of late ticks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 
 _LOOKS = 9
-"""Looks at the counters over which the share of late ticks is taken: about two seconds."""
+"""Number of updates over which the share of late ticks is taken: about two seconds."""
 
 
 class DeadlineFolder:

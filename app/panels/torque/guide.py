@@ -1,4 +1,4 @@
-"""What to do first in a torque-level scene, and what the stack makes of it: words of the Start tab."""
+"""The guide of the Start tab: what to try first in a torque-level scene, adapted to its stack."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from himpc.stack import Level
 def guide(
     tasks: tuple[TaskView, ...], levels: Sequence[Level], colours: Mapping[str, RGB], dragged: bool
 ) -> str:
-    """HTML of what to try, with the levels by the names and places that they have now.
+    """HTML of what to try, with the present names and places of the levels.
 
     Args:
         tasks: of the stack.
@@ -54,7 +54,7 @@ def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[
         "Then switch a level off in the tab <b>Tasks</b>" if places else "Add a level in the tab <b>Tasks</b>"
     )
     rest = f"{off}, or push the robot below, and see which errors grow."
-    if any(task.kind == "position" for task in tasks):  # and no hand can drag it
+    if any(task.kind == "position" for task in tasks):  # and cannot be dragged
         return "Watch the hand follow the curve.", rest
     return "Push the robot below.", f"{off}, and see which errors grow."
 
@@ -83,7 +83,7 @@ def _listed(places: Mapping[str, int]) -> str:
 
 
 def spoken(level: str) -> str:
-    """A level's name as words."""
+    """The name of a level as words."""
     return level.replace("+", " and ").replace("_", " ")
 
 

@@ -1,4 +1,4 @@
-"""Where a task wants its joints: such a target has no place in space, so each joint has a slider."""
+"""Sliders for joint-space targets: such a target has no place in the 3D view, so each joint has a slider."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from robots import Robot
 from robots.truth import joint_axis
 
 Targets = Mapping[str, NDArray[np.float64]]
-"""Where the hand put the target of each task that has one."""
+"""The raw targets that can be moved, by task."""
 
 _TURN, _WAY = np.pi, 2.0
-"""rad and m to both sides of zero, for a joint without limits."""
+"""Range of a slider on both sides of zero for a joint without limits, rad and m."""
 
 
 def add_joint_targets(
@@ -30,10 +30,11 @@ def add_joint_targets(
     robot: Robot,
     targets: Callable[[], Targets],
 ) -> None:
-    """A folder with a slider per joint for every task on joints whose target can be moved, if there is one.
+    """Adds a folder with a slider per joint for every joint-space task whose target can be moved, if there is
+    one.
 
-    targets: those in force. A target is moved as a whole: of sliders that are moved at once, each builds on
-    what the others asked for.
+    targets: the present ones. A target is sent as a whole: if several sliders move at once, each change
+    includes those that the other sliders have already requested.
     """
     tasks = [task for task in level.tasks if isinstance(task, (Joints, Posture)) and task.name in targets()]
     if not tasks:
@@ -85,7 +86,7 @@ def _add_slider(
         return MoveTarget(task, wish.ask(tuple(wanted)))
 
     def read(now: Targets) -> float:
-        # A stack that changed has other targets, until its own sliders are here.
+        # After a change of the stack the targets differ, until the sliders are rebuilt.
         value = shown(now) if task in now else slider.value
         return min(max(value, slider.min), slider.max)
 
@@ -93,5 +94,5 @@ def _add_slider(
 
 
 def _inside(low: float, factor: float, digits: int) -> float:
-    """The smallest number to show that is not below a limit."""
+    """The smallest number that can be displayed and is not below a limit."""
     return float(np.ceil(low * factor * 10**digits - 1e-6) / 10**digits)

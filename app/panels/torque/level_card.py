@@ -1,4 +1,4 @@
-"""One level in the list of tasks: its error and rank, gains and weights, and what can be done to it."""
+"""One level in the list of tasks: its error and rank, gains and weights, and its buttons."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class LevelCard:
         shift: Callable[[str, int], None],
         unfolded: bool,
     ) -> None:
-        """targets: in force, which `moves` mirrors; shift: moves the level of a name by so many places;
-        unfolded: whether what changes the tasks is in sight."""
+        """targets: the present ones, which `moves` mirrors; shift: moves the level with a name by a number of
+        places; unfolded: whether the controls that edit the tasks are unfolded."""
         name = self.name = level.name
         self._colour = colours.get(name, BOUND)
         self._folder = gui.add_folder(_title(place, name), order=float(place))
@@ -98,7 +98,7 @@ def _title(place: int, name: str) -> str:
 
 
 def _rank(found: tuple[int, int] | None) -> str:
-    """What the level gets of what it asks for."""
+    """The number of directions that the level gets of those it asks for."""
     if found is None:
         return ""
     rank, rows = found

@@ -1,4 +1,4 @@
-"""What the plant really is. The controller is told none of it."""
+"""The settings of the true plant. The controller does not know them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from robots import Robot
 def add_plant(
     gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings, robot: Robot
 ) -> None:
-    """Controls of the plant's settings."""
+    """Adds the controls of the plant's settings."""
     gui.add_html(block("This is the truth in the simulation. The controller sees none of it."))
     controls = Controls(gui, bindings, settings)
     controls.add("plant.payload_kg", "plant.friction", "plant.damping", "plant.armature")
-    # The same factor link by link, named by the joint that moves it.
+    # One factor per link, named by the joint that moves the link.
     for path, title in (("mass_scale", "Mass of each link"), ("inertia_scale", "Inertia of each link")):
         controls.add(f"plant.{path}")
         controls.add_elements(f"plant.{path}", robot.joint_names, title)

@@ -1,4 +1,4 @@
-"""The plots about the whole controller: error per level, solve time, leaks."""
+"""Plots about the whole controller: error per level, solve time, and leaks between levels."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
 
 
 class LevelPlots:
-    """Logarithmic axes: they need not jump to show both a micrometre and a lost level. A ghost has dashed
-    curves of its own; the page's loop builds the charts anew when one comes or goes."""
+    """Plots with logarithmic axes, which show a micrometre as well as a lost level without changing their
+    range. The curves of a ghost are dashed; the page's loop rebuilds the charts when a ghost starts or
+    ends."""
 
     def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
         self._gui, self._in_view = gui, in_view
@@ -28,7 +29,7 @@ class LevelPlots:
         self._build(ghost=False)
 
     def rebuild(self, ready: Ready) -> None:
-        """Other tasks have other curves."""
+        """Rebuilds the charts for other tasks."""
         self._tasks = ready.tasks
         self._build(self._with_ghost)
 
@@ -55,7 +56,7 @@ class LevelPlots:
             ]
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float) -> None:
-        """ghost: the same stretch of time of the ghost."""
+        """ghost: the ghost's data over the same interval."""
         if (ghost is not None) != self._with_ghost:
             self._build(ghost is not None)
         windows = [window] if ghost is None else [window, ghost]
@@ -66,7 +67,7 @@ class LevelPlots:
 
     def _errors(self, window: PlotWindow) -> list[np.ndarray]:
         fields = window.layout.fields
-        nothing = np.full(2 * BUCKETS, np.nan)  # of a ghost that does not have the new stack yet
+        nothing = np.full(2 * BUCKETS, np.nan)  # a ghost that does not have the new stack yet
         return [
             np.linalg.norm(window.columns(fields[f"error/{task.name}"]), axis=1)
             * (1e3 if task.unit == "m" else np.degrees(1.0))

@@ -1,4 +1,4 @@
-"""The first tab: what to do first, where the target is, pushes, and what the scene shows."""
+"""The first tab: what to try first, the state of the target, pushes, and options of the 3D view."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _PICK_UP, _DROP = f"Pick up {_LOAD:g} kg", "Drop the payload"
 
 
 class StartPanel:
-    """Guidance that follows what the learner has already done."""
+    """A guide that depends on what the learner has already done."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class StartPanel:
         colours: Mapping[str, RGB],
         dark: bool,
     ) -> None:
-        """settings: in force; colours: per level."""
+        """settings: the present ones; colours: per level."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
@@ -109,11 +109,11 @@ class StartPanel:
         self.pull.value = not self.pull.value
 
     def dragged(self) -> None:
-        """The first drag happened: go on to what comes next."""
+        """Called at the first drag: the guide continues with the next step."""
         self._dragged = True
 
     def show_verdict(self, verdict: Reachability | None, clamped: bool) -> None:
-        """Where the target is, in words."""
+        """Shows a sentence about the state of the target."""
         if verdict is None:
             self._where.content = block("The target is where the hand is.")
             return
@@ -131,7 +131,7 @@ class StartPanel:
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
     def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
-        """The guide names the levels as they are; the button offers what is not the case."""
+        """Updates the names of the levels in the guide, and the label of the button."""
         told = guide(now.ready.tasks, now.settings.levels, colours, self._dragged)
         if self._guide.content != told:
             self._guide.content = told

@@ -1,4 +1,4 @@
-"""What a task is about, to be changed while the robot moves: its name, its frame, its axes."""
+"""The controls that change the name, frame and axes of a task while the robot moves."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AXES = ("xyz", "xy", "xz", "yz", "x", "y", "z")
 
 
 class TaskEditor:
-    """The controls of one task. Each stands in a nameless folder, see `Controls`."""
+    """The controls of one task. Each is in an unnamed folder, see `Controls`."""
 
     def __init__(
         self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], task: Task, robot: Robot, alone: bool
@@ -46,7 +46,7 @@ class TaskEditor:
         self._button(f"Remove {name}", lambda: Set("stack.remove", name), BAD)
 
     def _menu(self, label: str, field: str, options: Sequence[str], usual: str) -> None:
-        """usual: what an empty field means."""
+        """usual: the meaning of an empty field."""
         name = self._task.name
 
         def read(settings: TorqueSettings) -> str:

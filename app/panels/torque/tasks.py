@@ -1,4 +1,4 @@
-"""The stack as an ordered list: levels with their tasks, and one more of them."""
+"""The stack as an ordered list of levels with their tasks, and the form for one more task."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from robots import Robot
 
 
 class TasksPanel:
-    """One folder per level, in the order of priority. Another stack has other folders: see `rebuild`."""
+    """One folder per level, in the order of priority. Another stack needs other folders: see `rebuild`."""
 
     def __init__(
         self,
@@ -34,8 +34,8 @@ class TasksPanel:
         targets: Callable[[], Targets],
         in_lesson: bool,
     ) -> None:
-        """bindings: of what stays; loop: viser's; current, targets: what is in force; in_lesson: whether the
-        stack may not be changed."""
+        """bindings: for controls that exist in every stack; loop: viser's; current, targets: the present
+        ones; in_lesson: whether the stack may not be changed."""
         self._gui, self._loop, self._colours = gui, loop, colours
         self._current, self._targets = current, targets
         self._robot, self._in_lesson = robot, in_lesson
@@ -94,7 +94,7 @@ class TasksPanel:
                 )
 
     def _ask(self, event: Event) -> None:
-        """Posts it. What is being edited stays unfolded on the stack that comes of it."""
+        """Posts an edit. The folder that is edited stays unfolded in the resulting stack."""
         match event:
             case (
                 Set("stack.edit", {"name": str(name)})
@@ -107,7 +107,7 @@ class TasksPanel:
         self._post(event)
 
     def rebuild(self) -> None:
-        """Shows another stack, the one in force."""
+        """Shows the new stack."""
         self.close()
         self._levels.remove()
         self._build(self._current())
@@ -118,11 +118,11 @@ class TasksPanel:
         return not self._in_lesson and self._add.picking
 
     def choose(self, frame: str) -> None:
-        """The link of this frame was clicked."""
+        """Chooses the link of this frame, which was clicked."""
         self._add.choose(frame)
 
     def toggle(self, place: int) -> Set | None:
-        """The event for the hotkey of a place (0-based); None if no level stands there."""
+        """The event for the hotkey of an index (0-based); None if there is no such level."""
         levels = {level.name: level for level in self._current().levels}
         names = self._order.now(tuple(levels))
         if place >= len(names) or names[place] not in levels:
@@ -132,7 +132,7 @@ class TasksPanel:
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(levels[name].enabled)))
 
     def _move(self, name: str, by: int) -> None:
-        """Moves a level one place up (−1) or down (+1), if there is one."""
+        """Moves a level one place up (−1) or down (+1), if possible."""
         names = list(self._order.now(tuple(level.name for level in self._current().levels)))
         to = names.index(name) + by if name in names else -1
         if 0 <= to < len(names):
@@ -162,6 +162,6 @@ class TasksPanel:
         )
 
     def close(self) -> None:
-        """The controls are about to be removed."""
+        """Called before the controls are removed."""
         self._bindings.close()
         self._moves.close()

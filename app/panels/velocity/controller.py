@@ -1,4 +1,4 @@
-"""The velocity-level controller: which one, how far ahead, how strict, weights, limits, delay."""
+"""The settings of the velocity-level controller: its kind, horizon, strictness, weights, limits and delay."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _COST = r"J_l = \tfrac12 \sum_{k<N} \lVert e_k \rVert_Q^2 + \tfrac12 \lVert e_N 
 
 
 class HtmpcPanel:
-    """Everything about the controller that can be changed while it runs."""
+    """All settings of the controller that can be changed while it runs."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class HtmpcPanel:
                 self._controls.add("gains.1", "gains.2")
 
     def _effort(self, path: str, symbol: str, part: str) -> None:
-        """One slider for the weights of a part of the joints."""
+        """One slider for the weights of a group of joints."""
         robot = self._robot
         base = list(base_joints(robot))
         arm = [joint for joint in range(robot.n) if joint not in base]

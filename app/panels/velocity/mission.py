@@ -1,4 +1,4 @@
-"""The mission as a list: done, in the window, ahead; and the buttons that change it."""
+"""The mission as a list of completed, active and future tasks, with the buttons that change it."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class MissionPanel:
         controls: Controls[VelocitySettings],
         architectures: bool,
     ) -> None:
-        """points: what can be sent somewhere; colours: by role; status: the newest one; places: where each
-        role's goal is drawn, (3,) m; architectures: whether the scene has several."""
+        """points: the points that can get a target; colours: by role; status: the newest one; places:
+        position at which each role's goal is drawn, (3,) m; architectures: whether the scene has several."""
         self._points = {task.name: task for task in points}
         self._colours, self._post, self._status, self._places = colours, post, status, places
         self._filled = False
@@ -84,7 +84,7 @@ class MissionPanel:
         return () if status is None or status.mission is None else status.mission.rows
 
     def _start(self) -> tuple[float, float, float]:
-        """The role's goal as it is drawn now, a first guess for another one."""
+        """The position at which the role's goal is drawn now: the initial guess for another goal."""
         x, y, z = self._places().get(str(self._role.value), np.zeros(3))
         return round(float(x), 2), round(float(y), 2), round(float(z), 2)
 
@@ -128,19 +128,19 @@ class MissionPanel:
 
 
 def swap(rows: tuple[MissionRow, ...], post: Send) -> None:
-    """Puts the second open task first."""
+    """Moves the second open task to the first place."""
     ahead = [row.name for row in rows if row.state != "done"]
     if len(ahead) > 1:
         post(MoveLevel(ahead[1], 0))
 
 
 def _options(*names: str) -> tuple[str, ...]:
-    """What a menu offers; it cannot be empty."""
+    """The options of a menu, which must not be empty."""
     return names or (_NOTHING,)
 
 
 def _waiting(rows: tuple[MissionRow, ...]) -> MissionRow | None:
-    """The first open task, if it stays until it is released."""
+    """The first open task, if it lasts until it is released; else None."""
     first = next((row for row in rows if row.state != "done"), None)
     return first if first is not None and first.hold is None else None
 

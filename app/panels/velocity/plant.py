@@ -1,4 +1,4 @@
-"""What the velocity-controlled plant really is. The controller is told its lag at most."""
+"""The settings of the true velocity-controlled plant. The controller knows at most its lag."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ _SHOWN = (
 def add_servo_plant(
     gui: viser.GuiApi, bindings: Bindings[VelocitySettings], settings: VelocitySettings
 ) -> None:
-    """Controls of the plant's settings."""
+    """Adds the controls of the plant's settings."""
     gui.add_html(block("This is the truth in the simulation. Of it the controller knows the lag at most."))
     Controls(gui, bindings, settings).add(*(f"plant.{name}" for name in _SHOWN))

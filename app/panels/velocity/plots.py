@@ -19,7 +19,8 @@ _W = (1e-4, 1e1)  # m³
 
 
 class TrackingPlots:
-    """Errors on a logarithmic axis: it need not jump to show both a millimetre and three metres."""
+    """Plots with a logarithmic error axis, which shows a millimetre as well as three metres without changing
+    its range."""
 
     def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
         self._in_view, self._tasks = in_view, ready.tasks
@@ -80,7 +81,7 @@ class TrackingPlots:
         )
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float) -> None:
-        """ghost: the same stretch of time of the ghost."""
+        """ghost: the ghost's data over the same interval."""
         if (ghost is not None) != self._with_ghost:
             self._build(ghost is not None)
         fields = window.layout.fields

@@ -1,4 +1,4 @@
-"""The first tab of a velocity-level scene: what to do first, how it goes, and what the scene shows."""
+"""The first tab of a velocity-level scene: what to try first, the progress, and options of the 3D view."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball
 
 _STILL = 0.02
-"""m/s and rad/s: joints slower than this are at rest."""
+"""Speed, m/s and rad/s, below which a joint is at rest."""
 _FAR = 0.05
-"""m: a point farther than this from its goal has not got there."""
+"""Distance to its goal, m, above which a point has not reached it."""
 
 
 class BeginPanel:
-    """Guidance that follows what the learner has already done. The callbacks are set by the face."""
+    """A guide that depends on what the learner has already done. The face sets the callbacks."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class BeginPanel:
         drives: bool,
         dark: bool,
     ) -> None:
-        """scene: its name; roles: in their order; drives: whether there is a mobile base."""
+        """scene: its name; roles: in their order; drives: whether the robot has a mobile base."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_swap: Callable[[], None] = lambda: None
         self.on_look: Callable[[], None] = lambda: None
@@ -83,7 +83,7 @@ class BeginPanel:
                 self.on_theme(bool(self.dark.value))
 
     def dragged(self) -> None:
-        """The first drag happened: go on to what comes next."""
+        """Called at the first drag: the guide continues with the next step."""
         self._dragged = True
 
     def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
@@ -112,7 +112,7 @@ class BeginPanel:
 
 
 def last_ball(settings: VelocitySettings) -> Ball | None:
-    """The ball that came last among what the robot keeps clear of."""
+    """The newest ball among the obstacles."""
     return next((each for each in reversed(settings.htmpc.obstacles) if isinstance(each, Ball)), None)
 
 

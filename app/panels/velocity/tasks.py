@@ -1,4 +1,4 @@
-"""The levels of a velocity-level controller: which point each moves, on or off, Q, live error and bound."""
+"""The levels of a velocity-level controller: the point that each moves, its switch, Q, error and bound."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class RolesPanel:
         ]
 
     def toggle(self, place: int) -> Set | None:
-        """The event for the hotkey of a place (0-based); None if no level stands there."""
+        """The event for the hotkey of an index (0-based); None if there is no such level."""
         if place >= len(self._order):
             return None
         name = self._order[place]
@@ -60,7 +60,7 @@ class RolesPanel:
 
 
 class _Card:
-    """One role."""
+    """The controls of one role."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""One strip chart: fixed axes (nothing jumps), seconds before now from left to right."""
+"""A strip chart with fixed axes; time runs from left to right, in seconds before now."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from app.html.text import block
 from app.panels.widgets.in_view import InView
 
 _NUDGE = 10
-"""Looks between two curves that are sent even if nothing changed, with an invisible change of the time axis:
-without one, a chart that was laid out while its panel still had no width stays without ticks for ever."""
-_AROUND = 60  # px of a chart's height that are title and time axis
+"""Number of updates after which the curves are sent even if they have not changed, with an invisible change
+of the time axis. Without it, a chart that was laid out while its panel had no width would never get ticks."""
+_AROUND = 60  # px of a chart's height that the title and the time axis take
 _FINE = 0.35  # px: what is closer to a curve lies on it
 _TOP = 30_000.0
-"""The end of every axis as it is sent, in two bytes a value; the beginning is 0. No screen shows more."""
+"""The largest value of every axis as it is sent, in two bytes per value; the smallest is 0. No screen has
+more pixels."""
 _TICKS = 5
 _SECONDS = tuple(range(-round(WINDOW), 1, 2))
 _TIMES: uplot.Axis = {
@@ -32,14 +33,14 @@ _TIMES: uplot.Axis = {
     "values": tuple(f"{second} s".replace("-", "−") if second else "now" for second in _SECONDS),
 }
 _PATIENCE = 12
-"""Looks at a chart without a value after which words say why."""
+"""Number of updates without a value after which a text explains why the chart is empty."""
 _NOTHING = block("Nothing has happened yet: run (Space), or take single ticks (T), to see a curve.")
 
 
 @dataclass(frozen=True)
 class ChartLine:
-    """label: of the legend; fill: opacity of the area below, down to the axis; dashed: for bounds and, finer,
-    for ghosts."""
+    """label: name in the legend; fill: opacity of the area below the curve; dashed: for bounds and, with a
+    finer pattern, for ghosts."""
 
     label: str
     colour: RGB
@@ -54,7 +55,7 @@ class ChartLine:
 
 
 def of_ghost(lines: Sequence[ChartLine], ghost: bool) -> list[ChartLine]:
-    """The ghost's curves beside these, if there is one."""
+    """The lines of the ghost; empty if there is no ghost."""
     return [line.of_ghost() for line in lines] if ghost else []
 
 
@@ -73,11 +74,11 @@ class Chart:
         bands: Sequence[tuple[int, int, RGB]] = (),
         legend: bool = True,
     ) -> None:
-        """span: what the axis shows, in the chart's unit; log: its ends are powers of ten; bands: (upper
-        line, lower line, colour) fills between two lines, by index."""
+        """span: range of the axis in the chart's unit; log: its ends are powers of ten; bands: (upper line,
+        lower line, colour) of areas between two lines, by index."""
         self._log = log
         if log:
-            # uPlot's own logarithmic scale draws nine grid lines per decade, a wall of grey here.
+            # The logarithmic scale of uPlot would draw nine grid lines per decade.
             span = (math.log10(span[0]), math.log10(span[1]))
         self._span = span
         self._title, self._in_view = title, in_view
@@ -110,11 +111,12 @@ class Chart:
         return self._in_view.sees(self._title)
 
     def show(self, window: PlotWindow, curves: Callable[[], Sequence[np.ndarray]]) -> None:
-        """curves: (2 · BUCKETS,) values of each line; not asked for while nobody sees the chart.
+        """curves: (2 · BUCKETS,) values of each line; it is called only while the chart is visible.
 
-        What is beyond the axis is drawn at its edge. uPlot cannot leave out what is before the first known
-        value: a linear curve is flat there, since a jump would look like a motion; a logarithmic one lies on
-        the axis."""
+        Values beyond the axis are drawn at its edge. uPlot cannot omit the time before the first known value:
+        there a linear curve is constant, since a jump would look like a motion, and a logarithmic curve lies
+        on the axis.
+        """
         if not self.in_view:
             return
         values = np.array(curves())
@@ -136,7 +138,7 @@ class Chart:
         self._send(kept, values[:, kept], window.ages()[kept])
 
     def _send(self, kept: np.ndarray, values: np.ndarray, ages: np.ndarray) -> None:
-        """kept: numbers of the points."""
+        """kept: numbers of the points that are sent."""
         self._shows += 1
         due = self._shows % _NUDGE == 0
         if not due and self._looks_the_same(kept, values):
@@ -147,7 +149,7 @@ class Chart:
         private.send_curves(self._handle, (ages.astype(np.float32), *np.rint(values).astype(np.int16)))
 
     def _explain(self, blank: bool) -> None:
-        """Words below a chart that stays blank."""
+        """Shows a text below a chart that stays empty."""
         self._blank = self._blank + 1 if blank else 0
         if self._note.visible != (self._blank >= _PATIENCE):
             self._note.visible = not self._note.visible
@@ -163,7 +165,8 @@ class Chart:
 
 
 def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:
-    """About five ticks: at powers of ten (a logarithmic axis' span is of exponents), or at round numbers."""
+    """About five ticks: at powers of ten (the range of a logarithmic axis consists of exponents), or at round
+    numbers."""
     low, high = span
     every = max(1.0, round((high - low) / _TICKS)) if log else _round((high - low) / _TICKS)
     places = [every * k for k in range(math.ceil(low / every - 1e-9), math.floor(high / every + 1e-9) + 1)]
@@ -177,7 +180,7 @@ def _power(exponent: float) -> str:
 
 
 def _round(step: float) -> float:
-    """The next greater one of 1, 2 and 5 times a power of ten."""
+    """The next larger number of the form 1, 2 or 5 times a power of ten."""
     scale = 10.0 ** math.floor(math.log10(step))
     return next(scale * digit for digit in (1.0, 2.0, 5.0, 10.0) if scale * digit >= step - 1e-12 * scale)
 

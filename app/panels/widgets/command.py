@@ -1,4 +1,4 @@
-"""Commands of the page, each with a key: in viser's palette (Ctrl K) and on the keyboard."""
+"""Commands of the page, available by key and in viser's palette (Ctrl K)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Callable
 import viser
 
 CAMERA_KEYS = frozenset({"W", "A", "S", "D", "Q", "E", "ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"})
-"""What moves viser's camera, whatever is held with it: no command has one of these."""
+"""Keys that move viser's camera, with any modifier; a command cannot use them."""
 
 
 def add_command(
     gui: viser.GuiApi, label: str, key: str, does: Callable[[], object], shift: bool = False
 ) -> None:
-    """A command that calls `does` on viser's event loop; shift: its key counts together with Shift."""
+    """Adds a command that calls `does` on viser's event loop; shift: the key is used together with Shift."""
     command = gui.add_command(
         label,
         hotkey=key,  # pyright: ignore[reportArgumentType]

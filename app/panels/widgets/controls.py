@@ -1,4 +1,4 @@
-"""Controls of settings, made from what the table of settings says: a slider, switch or menu each."""
+"""Controls for settings, generated from the table of settings: a slider, switch or menu for each."""
 
 from __future__ import annotations
 
@@ -22,17 +22,19 @@ S = TypeVar("S", bound=SceneSettings)
 
 
 class Controls(Generic[S]):
-    """Adds controls, each bound to the path of a setting: they show what is, and post what is set.
+    """Adds controls and binds each to the path of a setting: a control shows the setting and posts its
+    changes.
 
-    Each stands in a nameless folder: of two inputs of one container changed at once, viser loses one.
+    Each control is in an unnamed folder: viser loses one of two inputs of the same container that change at
+    once.
     """
 
     def __init__(self, gui: viser.GuiApi, bindings: Bindings[S], settings: S) -> None:
-        """settings: in force when the page is built."""
+        """settings: the present ones when the page is built."""
         self._gui, self._bindings, self._settings = gui, bindings, settings
 
     def add(self, *paths: str) -> None:
-        """A control for each path."""
+        """Adds a control for each path."""
         for path in paths:
             self.add_as(self._settings.entry(path))
 
@@ -42,7 +44,7 @@ class Controls(Generic[S]):
         read: Callable[[S], Any] | None = None,
         make: Callable[[float], Any] | None = None,
     ) -> None:
-        """A control as an entry describes it, which may differ from the table's.
+        """Adds a control as an entry describes it; the entry may differ from the one of the table.
 
         Args:
             entry: its path must be a setting's.
@@ -60,7 +62,7 @@ class Controls(Generic[S]):
                 self._slider(entry, read, whole=place.form.kind == WHOLE, make=make)
 
     def add_elements(self, path: str, names: Sequence[str], title: str) -> None:
-        """A folder with a number for each element of a list, called by `names`."""
+        """Adds a folder with a number input for each element of a list; `names` are their labels."""
         entry = self._settings.entry(path)
         with self._gui.add_folder(title, expand_by_default=False):
             for at, name in enumerate(names, start=1):
@@ -148,7 +150,8 @@ class Controls(Generic[S]):
 def add_control(
     gui: viser.GuiApi, bindings: Bindings[SceneSettings], control: Control, settings: SceneSettings
 ) -> None:
-    """A lesson's control: in the lesson's words, and within its range even where the setting is not."""
+    """Adds a control of a lesson, with the lesson's label and range, even if the setting is outside this
+    range."""
     if control.choices and control.choices != (False, True):
         _add_choices(gui, bindings, control, settings)
         return
@@ -173,26 +176,26 @@ def _add_choices(
     menu = gui.add_dropdown(control.words, tuple(of), initial_value=shown(settings, next(iter(of))))
     bindings.bind(
         menu,
-        # What the menu does not offer cannot be shown in it.
+        # A value that is not among its options cannot be shown in a menu.
         lambda s: shown(s, str(menu.value)),
         lambda value: Set(control.path, of[str(value)]),
     )
 
 
 def _words(value: Any) -> str:
-    """A choice in a menu."""
+    """The label of an option in a menu."""
     if isinstance(value, (list, tuple)):
         return ", ".join(map(_words, value))
     return figure(value) if isinstance(value, float) else str(value)
 
 
 def _step(low: float, high: float) -> float:
-    """About a hundredth of the range, a power of ten times 1 or 5."""
+    """About a hundredth of the range, rounded to 1 or 5 times a power of ten."""
     rough = (high - low) / 200
     power = 10.0 ** math.floor(math.log10(rough))
     return float(f"{(5 if rough >= 5 * power else 1) * power:.3g}")
 
 
 def _tenth(value: float) -> float:
-    """A tenth of the value's decade: one click is a visible change whatever the value's size."""
+    """A tenth of the value's decade: one click then makes a visible change to values of any size."""
     return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1

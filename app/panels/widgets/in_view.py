@@ -1,4 +1,4 @@
-"""Which charts a browser shows, so that nothing is sent for the others."""
+"""Finds out which charts the browser shows, so that nothing is sent for the others."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import viser
 from app.adapter import private
 
 LABEL = "Charts in view"
-"""Of the control, never shown, by which the browser tells."""
+"""Label of the hidden control through which the browser reports."""
 AWAKE, ASLEEP = "(awake)", "(asleep)"
-_LONGEST = 4000  # characters that are looked at
+_LONGEST = 4000  # number of characters that are read
 
-# Charts go by their titles. An observer notices tabs, folded panels and scrolling alike; a page behind other
-# tabs shows nothing. Charts come and go with viser's tabs, hence the look now and then.
+# Charts are identified by their titles. An observer notices tabs, folded panels and scrolling alike; a page
+# in a hidden tab shows nothing. Charts appear and disappear with viser's tabs, so the script checks
+# regularly.
 _SCRIPT = """
 const control = %s, awake = %s, asleep = %s, key = "__himpcLabInView";
 window[key]?.();
@@ -57,13 +58,13 @@ look();
 
 
 def tells_what_is_seen(updates: object) -> bool:
-    """Whether a write to a control is the script's: nobody pressed anything."""
+    """Whether a write to a control comes from this script, not from a user."""
     value = updates.get("value") if isinstance(updates, Mapping) else None
     return isinstance(value, str) and value.partition("\n")[0] in (AWAKE, ASLEEP)
 
 
 class InView:
-    """Until the browser has told anything, everything counts as seen."""
+    """The visible charts. Until the browser has reported, all charts count as visible."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._told = client.gui.add_text(LABEL, "", visible=False)
@@ -85,9 +86,9 @@ class InView:
 
     @property
     def told(self) -> bool:
-        """Whether the browser has told anything."""
+        """Whether the browser has reported."""
         return self._titles is not None
 
     def sees(self, title: str) -> bool:
-        """Whether a chart of this title is in view."""
+        """Whether a chart with this title is visible."""
         return self._titles is None or title in self._titles

@@ -1,4 +1,4 @@
-"""Controls that mirror what the session has: its settings, or where its targets are."""
+"""Controls that show values of the session: its settings or its targets."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from app.client.pending_edit import HOLD, Send
 from lessons.events import Event
 
 REMIND = 2.0
-"""s between two reminders of what every control must show. viser sends at most one change per 50 ms and
-tab and drops all but the latest: of two controls changed at once (or while the browser stutters) one may
-never arrive, and would go on showing what the session does not have."""
+"""Time, s, between two times that the values of all controls are sent again. viser sends at most one change
+per 50 ms and tab and drops all but the latest: if two controls change at once (or while the browser is busy),
+one change may be lost, and the control would go on showing a wrong value."""
 
 S = TypeVar("S")
 
@@ -31,16 +31,17 @@ class _Mirror(Generic[S]):
 
 
 class Bindings(Generic[S]):
-    """Two ways: a control posts an event, and settings that changed otherwise (a reset, a hotkey, an event
-    that was refused) move the control. Callbacks only post: they never touch the simulation.
+    """Bindings between controls and settings in both directions: a control posts an event, and settings that
+    changed otherwise (a reset, a hotkey, a refused event) update the control. Callbacks only post events and
+    never touch the simulation.
 
-    Controls are written on the server's event loop only. There a value that arrives from the browser and the
-    callback that posts it are one piece; written from any other thread, a control could be put back between
-    the two, and the callback would post the old value: the learner's edit would be lost.
+    Controls are written on the server's event loop only. There, nothing can run between the arrival of a
+    value from the browser and the callback that posts it. From another thread, a control could be reset
+    between the two, and the callback would post the old value, which would discard the learner's edit.
     """
 
     def __init__(self, post: Send, loop: asyncio.AbstractEventLoop) -> None:
-        """loop: the server's, on which viser handles what browsers send."""
+        """loop: the event loop of the server, on which viser handles messages of browsers."""
         self.post = post
         self._loop = loop
         self._mirrors: list[_Mirror[S]] = []
@@ -53,23 +54,24 @@ class Bindings(Generic[S]):
         read: Callable[[S], Any],
         event: Callable[[Any], Event],
     ) -> None:
-        """`read` gives the control's value for what the session has, `event` the event for a value."""
+        """Binds a control: `read` gives its value for a state of the session, `event` the event for a new
+        value."""
         mirror = _Mirror(handle, read)
         self._mirrors.append(mirror)
 
         @handle.on_update
         async def _(change: viser.GuiEvent[Any]) -> None:
             if change.client is None:
-                return  # written by `refresh`
+                return  # a value that `refresh` wrote
             mirror.touched = time.monotonic()
             self.post(event(on_scale(handle)))
 
     def refresh(self, present: S) -> None:
-        """Shows what the session has. Returns at once; the event loop does it."""
+        """Shows the values of the session. Returns at once; the event loop updates the controls."""
         self._loop.call_soon_threadsafe(unless_removed, self._write, present)
 
     def close(self) -> None:
-        """The controls are about to be removed: writes nothing any more."""
+        """Called before the controls are removed: nothing is written any more."""
         self._closed = True
 
     def _write(self, present: S) -> None:
@@ -89,16 +91,17 @@ class Bindings(Generic[S]):
 
 
 def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
-    """The control's value, for a slider within its ends: its number box takes any number."""
+    """The control's value, limited to the range if the control is a slider, as its number box accepts any
+    number."""
     value, low, high = handle.value, getattr(handle, "min", None), getattr(handle, "max", None)
     if not isinstance(handle, viser.GuiSliderHandle) or low is None or high is None:
         return value
-    # What is not a number compares false with both ends.
+    # A comparison of NaN with either end is false.
     return value if low <= value <= high else high if value > high else low
 
 
 def scalar(value: object) -> float:
-    """A number for a slider where settings may hold one per coordinate: their mean."""
+    """A number for a slider whose setting may have one value per coordinate: their mean."""
     if isinstance(value, (tuple, list)):
         return float(sum(value) / len(value))
     return float(value)  # pyright: ignore[reportArgumentType]

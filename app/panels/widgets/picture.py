@@ -1,4 +1,4 @@
-"""A picture that lives: what stays is sent once, what moves is painted into it."""
+"""A picture that changes: its constant parts are sent once, and changed parts are redrawn."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from app.adapter import private
 from app.html.text import esc
 from app.panels.widgets.in_view import InView
 
-_EVERY = 0.15  # s between two paintings: a picture in full motion is some kilobytes a second
+_EVERY = 0.15  # s between two updates: a picture in motion has several kilobytes per second
 _AGAIN = 15
-"""Paintings after which all of a picture is painted once more: a tab that was closed forgot it."""
+"""Number of updates after which the whole picture is sent again, since a tab that was closed has lost it."""
 
-# The panel may be folded or in a tab behind: then there is nothing to paint into.
+# If the panel is folded or its tab is hidden, the element does not exist and nothing is drawn.
 _PAINT = """
 window.__himpcLabPaint = (title, count, changes) => {
   for (const each of document.querySelectorAll("[data-chart]")) {
@@ -30,13 +30,13 @@ window.__himpcLabPaint = (title, count, changes) => {
 
 
 class SvgPicture:
-    """An SVG that is as wide as its panel."""
+    """An SVG picture that is as wide as its panel."""
 
     def __init__(
         self, client: viser.ClientHandle, in_view: InView, title: str, size: tuple[int, int], empty: str
     ) -> None:
-        """title: of the picture, unlike all others; size: width and height, units of its own; empty: words
-        that stand there until the first painting."""
+        """title: a unique title of the picture; size: width and height in units of the picture; empty: text
+        that is shown until the first update."""
         self._client, self._in_view, self.title = client, in_view, title
         width, height = size
         private.run_script(client, _PAINT)
@@ -53,14 +53,14 @@ class SvgPicture:
 
     @property
     def in_view(self) -> bool:
-        """Whether the browser has told that it shows it."""
+        """Whether the browser has reported that it shows the picture."""
         seen = self._in_view.told and self._in_view.sees(self.title)
         if not seen:
-            self._painted = []  # whoever looks again gets all of it
+            self._painted = []  # a browser that shows the picture again gets all of it
         return seen
 
     def paint(self, parts: Sequence[str]) -> None:
-        """SVG elements, one piece over the other, instead of those that were there; only pieces that changed
+        """Replaces the SVG elements of the picture, given as layers from back to front; only changed layers
         are sent."""
         now = time.monotonic()
         if not self.in_view or now < self._next:
@@ -78,5 +78,5 @@ class SvgPicture:
 
 
 def _script(value: object) -> str:
-    """As JavaScript."""
+    """The update as JavaScript."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"))

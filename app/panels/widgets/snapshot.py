@@ -1,4 +1,4 @@
-"""What panels are shown: one instant of a learner's session."""
+"""The data that panels show: one instant of a learner's session."""
 
 from __future__ import annotations
 
@@ -34,5 +34,5 @@ class SessionSnapshot(Generic[S_co]):
         return float("nan") if where is None else float(self.latest[where][0])
 
     def error(self, task: str) -> float:
-        """‖x̃‖ of a task, m or rad."""
+        """The error norm ‖x̃‖ of a task, m or rad."""
         return float(np.linalg.norm(self.field(f"error/{task}")))

@@ -1,4 +1,4 @@
-"""A window over the page, opened and closed by key."""
+"""A window over the page that a key opens and closes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from app.panels.widgets.command import add_command
 
 
 class PopupWindow:
-    """Filled afresh each time it opens."""
+    """A window whose content is built each time it opens."""
 
     def __init__(
         self, gui: viser.GuiApi, title: str, hotkey: str, fill: Callable[[], None], shift: bool = False
     ) -> None:
-        """hotkey: opens and closes it; shift: together with Shift."""
+        """hotkey: opens and closes the window; shift: the key is used together with Shift."""
         self._gui, self._title, self._fill = gui, title, fill
-        self._modal: Any = None  # viser does not name the type
+        self._modal: Any = None  # viser's type has no public name
         add_command(gui, title, hotkey, self._switch, shift)
 
     def _switch(self) -> None:
@@ -36,7 +36,7 @@ class PopupWindow:
                 self._button()
                 self._fill()
         except KeyError:
-            # Another scene came in: the page is built anew, and viser knows this window no more.
+            # Another scene was loaded: the page is rebuilt, and this window no longer exists in viser.
             self._modal = None
 
     def _button(self) -> None:

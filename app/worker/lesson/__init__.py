@@ -1,1 +1,1 @@
-"""The lecturer: which step of a lesson is on, and how its run is judged."""
+"""The lecturer: it knows which step of a lesson is active and judges its run."""

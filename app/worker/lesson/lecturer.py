@@ -1,7 +1,8 @@
-"""Follows the run of an exercise in the simulation process: records it, judges it, says when it is over.
+"""Follows the run of an exercise in the simulation process: records it, judges it, and says when it has
+ended.
 
-A run is what happens from t = 0 to the exercise's duration. Afterwards the robot is free; what was
-measured stays.
+A run lasts from t = 0 to the exercise's duration. Afterwards the robot can be moved freely, and the measured
+values stay.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ from robots import InputError
 _JUDGE_EVERY = 5  # reports: twice a second
 _CHUNK = 0.01  # s of the ghost's computation before commands are looked at again
 FAST = 50.0
-"""Speed of a run that is to be over as soon as possible: more than any computer here can keep up with."""
+"""Simulation speed for a run that should end as soon as possible: faster than any computer here can be."""
 
 Array = np.ndarray
 
 
 class Lecturer:
-    """Of one exercise. A session is handed over at t = 0, before its first tick."""
+    """The lecturer of one exercise. It gets a session at t = 0, before the first tick."""
 
     def __init__(self, exercise: LessonPlace, session: Session, seed: int = 0) -> None:
         self.exercise = exercise
@@ -69,22 +70,22 @@ class Lecturer:
 
     @property
     def waiting(self) -> bool:
-        """Before the run."""
+        """Whether the run has not begun."""
         return self._phase in ("waiting", "preparing")
 
     @property
     def busy(self) -> bool:
-        """There is something to compute though nothing runs."""
+        """Whether the ghost is being computed although no run is active."""
         return self.waiting and self._ghost is not None and not self._ghost.finished
 
     @property
     def pace(self) -> float | None:
-        """Simulated seconds per second that the run asks for; None: what the learner set."""
+        """Simulated seconds per second that the run needs; None: the speed that the learner set."""
         return FAST if self.fast and self._phase == "running" else None
 
     @property
     def unanswered(self) -> bool:
-        """Whether a prediction is to be made first."""
+        """Whether the learner must make a prediction first."""
         return (
             self.waiting
             and isinstance(self._part, Step)
@@ -93,14 +94,14 @@ class Lecturer:
         )
 
     def settings(self, own: bool) -> SceneSettings:
-        """What a run begins with: the lesson's own settings, or those the learner made of them. What the
-        script changed in the last run is undone either way."""
+        """The settings at the start of a run: the lesson's own, or the learner's. Changes that the script
+        made in the last run are undone in both cases."""
         if own and isinstance(self._part, Step):
             self._posted.clear()
         return settings_after(self._own, self._posted)
 
     def begin(self, session: Session, fast: bool) -> bool:
-        """Asked to run a fresh session: whether it can, or the ghost must be finished first."""
+        """Begins a run of a fresh session; returns False if the ghost must be computed first."""
         self._enter(session)
         self.fast = fast
         self._attempt += 1
@@ -111,7 +112,7 @@ class Lecturer:
         return self._phase == "running"
 
     def idle(self) -> bool:
-        """Works on the ghost for a moment; whether a run that waited for it begins now."""
+        """Computes a part of the ghost; returns whether a run that waited for it begins now."""
         if self.waiting and self._ghost is not None:
             self._ghost.work(_CHUNK)
         if self._phase != "preparing" or self.busy:
@@ -120,20 +121,20 @@ class Lecturer:
         return True
 
     def touch(self, event: Event) -> None:
-        """The learner changed something, or pushed or dragged."""
+        """Notes that the learner changed a setting, pushed the robot or dragged a target."""
         self._touched = self._touched or self._phase == "running"
-        with contextlib.suppress(InputError):  # what the session refuses changes nothing
+        with contextlib.suppress(InputError):  # an event that the session refuses changes nothing
             settings_after(self._session.settings, [event])
             self._posted.append(event)
 
     def follow(self, row: Array) -> bool:
-        """Takes a row of telemetry; whether the run ended with it."""
+        """Takes a row of telemetry; returns whether the run ended with it."""
         session = self._session
         if self._phase != "running":
             return False
         t = float(row[session.layout.fields["t"].start])
         if t <= self._before:
-            self._record = self._empty_record()  # put back to the start
+            self._record = self._empty_record()  # the run was reset to its start
         self._before = t
         self._record.add(row)
         self._lost_at = session.diverged_at
@@ -146,8 +147,8 @@ class Lecturer:
         return True
 
     def _foreign_change(self) -> str:
-        """Why a challenge's attempt cannot count: a setting that is no knob differs, or a knob is beyond its
-        range."""
+        """Why an attempt at a challenge cannot count: a setting that is not one of its knobs differs, or a
+        knob is outside its range."""
         assert isinstance(self._part, Challenge)
         now = self._session.settings
         allowed = self._own
@@ -162,7 +163,7 @@ class Lecturer:
     # ---------------------------------------------------------------- reports
 
     def report(self) -> Lecture | None:
-        """What is known now; None while there is nothing new."""
+        """The present state of the exercise; None if nothing has changed since the last report."""
         self._reports += 1
         due = self._phase == "running" and self._reports % _JUDGE_EVERY == 0
         if self._last is not None and self._last.answer == self.answer and not due:
@@ -204,7 +205,7 @@ class Lecturer:
     def _ghost_so_far(self) -> LessonRows | None:
         if self._ghost is None or not len(self._record) or not len(self._ghost.record):
             return None
-        if self._phase == "done":  # a mission may take one of the two longer than the other
+        if self._phase == "done":  # in a mission, one of the two runs may last longer than the other
             return self._ghost.record
         return self._ghost.record.until(float(self._record["t"][-1, 0]))
 
@@ -217,7 +218,7 @@ class Lecturer:
         return "Your run: you changed or moved something while it went on." if self._touched else ""
 
     def _weigh_prediction(self) -> None:
-        """A prediction is about the lesson's own run, and is measured there."""
+        """Grades the prediction, which is about the lesson's own run and is measured in it."""
         prediction = self._part.prediction if isinstance(self._part, Step) else None
         if prediction is None or self.answer is None:
             return

@@ -1,4 +1,4 @@
-"""The second robot of a step, computed headless while the learner reads: what claims compare with."""
+"""The second robot of a step, computed headless while the learner reads: the reference for claims."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lessons.teaching.lesson import Step
 
 
 class GhostRun:
-    """A run in small pieces. It is finished when nothing of it is left to be computed."""
+    """A run that is computed in small pieces, until `finished` is true."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
         self._session = begin(scene, seed)
@@ -25,14 +25,14 @@ class GhostRun:
         return len(self.record) >= self._ticks or session.diverged_at is not None or session.over
 
     def work(self, seconds: float) -> None:
-        """Goes on for about so long (wall time)."""
+        """Continues the run for about this wall time."""
         until = perf_counter() + seconds
         while not self.finished and perf_counter() < until:
             self.record.add(self._session.tick())
 
 
 def ghost_of(exercise: LessonPlace, seed: int) -> GhostRun | None:
-    """The second robot's run, where a claim or a prediction is measured against it."""
+    """The second robot's run, if a claim or a prediction is compared with it; else None."""
     step = exercise.part
     if not isinstance(step, Step) or step.ghost is None:
         return None

@@ -1,4 +1,4 @@
-"""The rows of a run that is still going on."""
+"""The telemetry rows of a run that is in progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class LessonRows:
     """Telemetry rows since the run's start; `record[field]` is (ticks, width), like a finished recording."""
 
     def __init__(self, layout: Layout, room: int, rows: np.ndarray | None = None) -> None:
-        """room: how many rows are expected; rows: those there are already."""
+        """room: expected number of rows; rows: the rows so far."""
         self._layout = layout
         self._rows = np.empty((max(room, 1), layout.size)) if rows is None else rows
         self._count = 0 if rows is None else len(rows)
@@ -37,8 +37,8 @@ class LessonRows:
 
 
 def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A curve with at most 2 · BUCKETS points: of each bucket the least and the greatest finite value, in the
-    order they came."""
+    """Decimates a curve to at most 2 · BUCKETS points: each bucket's minimum and maximum of its finite
+    values, in the order in which they came."""
     if len(t) <= 2 * BUCKETS:
         return t.copy(), values.copy()
     size = -(-len(t) // BUCKETS)

@@ -1,1 +1,1 @@
-"""What a running session tells the page, torque or velocity."""
+"""The reports of a running session to the page, for torque level and velocity level."""

@@ -1,4 +1,4 @@
-"""The file of a controller of one's own: what is saved there, runs."""
+"""The file of the user's own controller: its code takes effect when the file is saved."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from lessons.session.torque import TorqueSession
 from robots import InputError
 
 Stamp = tuple[str, int, int]
-"""Path, time and size: another one means that the file was saved."""
+"""Path, time and size of the file; if they differ, the file was saved."""
 
 
 class File:
-    """Looks at the file now and then. A new text is judged on a thread, since that takes a second, and then
-    takes over without a bump; a wrong one leaves the code that runs where it is."""
+    """Checks the file from time to time. A new text is first judged on a thread, which takes a second, and
+    then replaces the running code without a jump in torque. If the new text is wrong, the running code
+    stays."""
 
     def __init__(self) -> None:
         self._stamp: Stamp | None = None
@@ -27,7 +28,7 @@ class File:
         self._judging: threading.Thread | None = None
 
     def look(self, session: TorqueSession) -> OwnCode | None:
-        """What there is to be told; None if the controller is one of the lab's."""
+        """The state of the file; None if the controller is one of the lab's."""
         path = str(session.settings.controller)
         if not is_file(path):
             self._stamp = None
@@ -63,7 +64,7 @@ class File:
 
 
 def _stamp(path: str) -> Stamp | None:
-    """None while there is no file, as for a moment while it is saved."""
+    """None while the file does not exist, which happens for a moment while it is saved."""
     try:
         found = os.stat(path)
     except OSError:

@@ -1,4 +1,4 @@
-"""What the simulation process tells the page of a session, whatever its kind."""
+"""What the simulation process reports about a session of either kind."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
 
 LISTED = 24
-"""Binding rows sent to the page: more cannot be read in a tenth of a second."""
+"""Largest number of active constraints sent to the page: nobody can read more in a tenth of a second."""
 
 
 class SessionReport(ABC):
-    """What there is to see of a session.
+    """The data of a session that the page shows.
 
-    watch: what the page wants to see of its inside.
+    watch: the internal data that the page requests.
     """
 
     def __init__(self, session: Any) -> None:
-        """session: of the kind that the subclass is for."""
+        """session: of the kind that the subclass handles."""
         self.session = session
         self.watch = InsideRequest()
 
     def own(self) -> OwnCode | None:
-        """Of a controller from a file: whether it runs; what was saved meanwhile takes over."""
+        """For a controller from a file: whether it runs. Code that was saved meanwhile takes effect."""
         return None
 
     @abstractmethod
     def tasks(self) -> tuple[TaskView, ...]:
-        """What the page must know of the tasks."""
+        """The data of the tasks that the page needs."""
 
     @abstractmethod
     def targets(self) -> dict[str, np.ndarray]:
-        """Where the hand put the draggable targets, by task."""
+        """The raw targets that can be dragged, by task."""
 
     @abstractmethod
     def path(self) -> np.ndarray:
@@ -52,18 +52,19 @@ class SessionReport(ABC):
         return tuple(BindingRow(*row) for row in self.session.binding()[:LISTED])
 
     def gauge(self) -> tuple[float, float] | None:
-        """Norm and spectral radius of I − M⁻¹M̄, where the controller has an M̄."""
+        """Norm and spectral radius of I − M⁻¹M̄, if the controller has an M̄."""
         return None
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per level the directions it gets where the robot is, and its rows, where there is a stack."""
+        """Per level, the number of directions available to it at the present posture, and its number of rows;
+        empty without a stack."""
         return {}
 
     def mission(self) -> MissionView | None:
-        """How far the mission is, where there is one."""
+        """The state of the mission, if there is one."""
         return None
 
     def inside(self) -> Inside | None:
-        """What `watch` asks for of the inside of the last tick; None where it asks for nothing, or there is
-        no such thing."""
+        """The data of the last tick that `watch` requests; None if it requests nothing or there is no such
+        data."""
         return None

@@ -1,4 +1,4 @@
-"""What the page is told of a session, whatever its kind."""
+"""Starts a session, with the matching kind of report."""
 
 from collections.abc import Mapping
 
@@ -20,6 +20,6 @@ _REPORTS: Mapping[type[Session], type[SessionReport]] = {
 
 
 def start(scene: Scene, seed: int) -> SessionReport:
-    """A scene from its beginning. Raises InputError if its settings do not fit its robot."""
+    """Starts a scene from its beginning. Raises InputError if its settings do not fit its robot."""
     session = begin(scene, seed)
     return _REPORTS[type(session)](session)

@@ -1,4 +1,4 @@
-"""What there is to see of a torque-level session."""
+"""The reports of a torque-level session."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robots import InputError, convergence_eigenvalues, convergence_gauge
 
 @final
 class TorqueRun(SessionReport):
-    """See `app.worker.reports.report.Run`."""
+    """See `app.worker.reports.report.SessionReport`."""
 
     session: TorqueSession
 

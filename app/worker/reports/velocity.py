@@ -1,4 +1,4 @@
-"""A velocity-level session as the simulation process drives it: every step is one command to the servos."""
+"""The reports of a velocity-level session. Each step sends one command to the servos."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from himpc.tasks import FramePosition, Task
 from lessons.session.velocity import VelocitySession
 
 _ABOVE = np.array([0.0, 0.0, 0.015])
-"""m, of predicted paths above the floor, so that it does not hide them."""
+"""Height of predicted paths above the floor, m, so that the floor does not hide them."""
 _ARM = 0.55
-"""m from a person's middle to the hand that takes the ball."""
+"""Distance from a person's middle to the hand that takes the ball, m."""
 _AROUND = 1.9
-"""m about a mobile base that the camera should show at least."""
+"""Radius around a mobile base that the camera should show at least, m."""
 
 
 @final
 class VelocityRun(SessionReport):
-    """See `app.worker.reports.report.Run`.
+    """See `app.worker.reports.report.SessionReport`.
 
-    A target belongs to a role: it is the goal of the role's first open task, (m,) m or (3, 3)."""
+    A target belongs to a role: it is the goal of the role's first open task, (m,) m or (3, 3).
+    """
 
     session: VelocitySession
 
@@ -109,7 +110,8 @@ class VelocityRun(SessionReport):
         )
 
     def _people(self) -> tuple[Person, ...]:
-        """Each stands behind the place of the hand-over, seen from where the base goes for it."""
+        """The persons. Each stands behind the hand-over point, seen from the place to which the base drives
+        for it."""
         options, progress = self.session.settings.options, self.session.progress
         visits: dict[int, list[tuple[MissionTask, bool]]] = {}
         beside: np.ndarray | None = None
@@ -146,5 +148,5 @@ def _goal(task: MissionTask) -> tuple[float, ...] | None:
 
 
 def _point(values: tuple[float, ...] | np.ndarray) -> np.ndarray:
-    """A point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
+    """A point in space, m, from the coordinates of a hand (3) or of a base on the floor (2)."""
     return np.array([*values, 0.0][:3], float)
