@@ -46,7 +46,7 @@ TEXTS = (
         ("deadlines/2", "So let $\\bar M$ be twice as large."),
         ("inside-the-qp/1", "It wants *two* numbers, so look"),
         ("further/deliveries", "So ask whether they were"),
-        ("contributing", "A sentence that gives a reason gets a run"),
+        ("contributing", "Each sentence that gives a reason needs a run"),
     )),
     Exempt("definition", "", (
         ("further/deliveries", "The base waits at the edge, $\\rho = 1.2$ m"),
