@@ -1,7 +1,8 @@
-"""Independent work on all local cores: a function, items in, outcomes out; `cluster` does it elsewhere.
+"""Runs a function on independent items on all local cores; `cluster` does the same on other machines.
 
-A piece of work that fails is an outcome, not the end of the others. Outcomes come as they are ready; each
-carries the place of its item, so that what is made of them does not depend on who was faster.
+An item that fails gives an outcome, too, and the others continue. Outcomes come in the order in which they
+are ready; each outcome has the index of its item, so that results do not
+depend on the speed of the processes.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ def on_cores(
     waiting = deque(range(len(items)))
     while waiting:
         orphans = yield from _until_one_dies(function, items, waiting)
-        # A dying process takes its pool's other work with it: one at a time, the culprit shows.
+        # A dying process also ends the other work of its pool; if the items run one at a time, the guilty one
+        # is found.
         for place in sorted(orphans):
             yield place, _alone(function, items[place])
 
@@ -81,7 +83,7 @@ def _until_one_dies(
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         while not orphans and (waiting or under_way):
             with _born_deaf():
-                # No more than there are processes: who dies takes no more along.
+                # Not more items than processes: a dying process ends no further items.
                 while waiting and len(under_way) < workers:
                     future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()

@@ -1,1 +1,1 @@
-"""For authors of a controller, scene, task or lesson: files to begin with, and lessons by a file's path."""
+"""Helps authors of a controller, scene, task or lesson: writes template files, and loads lessons from files."""

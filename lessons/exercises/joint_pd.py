@@ -30,7 +30,7 @@ PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
 
 
 def checks(seed: int) -> tuple[GradeCheck, ...]:
-    # Where gravity pulls otherwise than at the start.
+    # A configuration with other gravity torques than at the start.
     moved = tuple(radians(each) for each in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
     sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (

@@ -17,7 +17,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# What the plant of this scene really is, told to the controller: then the law is exact.
+# The controller gets the true parameters of the plant; then the law is exact.
 EXACT = (
     "nominal.mass_scale=1",
     "nominal.inertia_scale=1",
@@ -25,7 +25,7 @@ EXACT = (
     "nominal.damping=[0.15,0.1,0.08]",
 )
 CIRCLE = RunSpec("planar3-circle", set=("q1_amplitude_deg=40", *EXACT), duration=1.2)
-# Two tasks that cannot both be done: only the order says which one is.
+# Two tasks that cannot be met together: the order decides which one is met.
 HOLD = RunSpec(
     "planar3-circle",
     set=(

@@ -17,7 +17,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# An M̄ that is no multiple of the unit matrix: who forgets it errs.
+# An M̄ that is no multiple of the unit matrix: a solution without M̄ gives a wrong result.
 M_BAR = ("M_bar=[0.06,0.03,0.02]", "T_s=0.002")
 ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false", *M_BAR)
 FREE = RunSpec("planar3-circle", set=ALONE, duration=1.0)

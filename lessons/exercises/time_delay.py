@@ -21,7 +21,7 @@ from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure
 
 GAINS = ("levels.posture.K_p=100", "levels.posture.K_v=20")
-# Hung on while it runs: a torque that was right before is not any more.
+# The load is attached during the run: a torque that was right before is then wrong.
 HUNG = ((0.05, Set("plant.payload_kg", 3.0)),)
 LOADED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), events=HUNG, duration=0.8)
 MISLED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS, "nominal.mass_scale=2"), events=HUNG, duration=0.8)

@@ -15,7 +15,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# An M̄ that is no multiple of the unit matrix: who forgets it errs.
+# An M̄ that is no multiple of the unit matrix: a solution without M̄ gives a wrong result.
 SETTINGS = ("horizon=1", "damping=false", "M_bar=[0.06,0.03,0.02]", "T_s=0.002", "q1_amplitude_deg=60")
 FREE = RunSpec("planar3-circle", set=SETTINGS, duration=1.0)
 WEAK = RunSpec("planar3-circle", set=(*SETTINGS, "limits.torque_scale=0.04"), duration=1.0)

@@ -21,7 +21,7 @@ from himpc.limits.rows import Kind, Rows
 Array = NDArray[np.float64]
 
 _HELD = 1e-9
-"""N·m: a solution nearer to a cut than this lies in it."""
+"""N·m: a solution nearer to a cut than this counts as lying in it."""
 _MET = 1e-7
 """N·m: what rounding may leave of an equality."""
 
@@ -228,7 +228,7 @@ def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
     left, sigma, right = np.linalg.svd(A)
     rank = int((sigma > RANK_TOLERANCE * size).sum())
     at = right[:rank].T @ ((left[:, :rank].T @ b) / sigma[:rank])
-    # A distance in N·m that no choice of w can mend.
+    # A distance in N·m that no choice of w can reduce.
     missed = float(np.abs(A @ at - b).max(initial=0.0)) / max(size, 1e-300)
     return Allowed(at if missed <= _MET else None, right[rank:].T)
 

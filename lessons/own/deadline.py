@@ -1,4 +1,4 @@
-"""A call that may take so long and no longer, by its own doing."""
+"""Calls with a time limit, which counts only the time that the call itself uses."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class CallDeadline:
             signal.signal(signal.SIGALRM, before)
 
     def _begin(self) -> None:
-        """A call begins."""
+        """Starts the time of a call."""
         self._computed = time.thread_time()
         self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
 

@@ -1,5 +1,6 @@
-"""A file of one's own is loaded within limits: a deadline, no other processes, no signals; what it replaces
-in a library is put back."""
+"""Loads a user's file within limits: a deadline, no other processes, no signals. If the file replaces
+something in a library, the original is restored.
+"""
 
 from __future__ import annotations
 
@@ -107,7 +108,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
     thread.start()
     thread.join(seconds)
     if not done:
-        # Where it computes, it ends there; what sleeps in a library ends when it wakes.
+        # Code that computes ends at once; code that sleeps in a library ends when it wakes.
         here = ctypes.c_ulong(thread.ident or 0)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(here, ctypes.py_object(TooLong))
         raise late
@@ -133,7 +134,7 @@ def _is_code(value: Any) -> bool:
 
 
 def _restored(before: dict[str, dict[str, Any]]) -> list[str]:
-    """Puts back what is another one now, and names it."""
+    """Restores the objects that were replaced, and returns their names."""
     found = []
     for name, names in before.items():
         module = sys.modules.get(name)

@@ -1,7 +1,8 @@
-"""What a learner has done so far: as the browser keeps it, and as a text to hand in.
+"""The progress of a learner: in the form that the browser stores, and as a text to hand in.
 
-With a key, which an instructor's lab holds, both carry an HMAC of their content: whoever has the key can tell
-that a lab with the same key wrote them. Without one they carry a sum that only tells damage.
+With the key of an instructor's lab, both contain an HMAC of their content: everybody who has the key can
+verify that a lab with the same key wrote them. Without a key they contain a checksum that only detects
+damage.
 """
 
 from __future__ import annotations

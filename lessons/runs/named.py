@@ -1,4 +1,4 @@
-"""Scenes and tasks by name or, where whoever started the program said so, by the path of a file."""
+"""Finds scenes and tasks by name or, if the user who started the program allowed it, by the path of a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The robot with two arms: hands that are dragged, that move as with a tray, and that want apart."""
+"""The scenes of the robot with two arms: dragged hands, hands that move as with a tray, and conflicting
+targets.
+"""
 
 from __future__ import annotations
 

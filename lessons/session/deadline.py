@@ -1,4 +1,4 @@
-"""Deadlines: what a tick applies when the controller's torque is not ready in time."""
+"""Deadlines: chooses the torque that a tick applies if the controller's torque is not ready in time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 class DelayedTorque:
-    """Where a late torque waits for the next tick: a queue of one.
+    """A queue of length one, in which a late torque waits for the next tick.
 
     A tick whose torque is in time applies it, and what waited is thrown away: nothing old ever acts after
     something newer. A tick whose torque is late applies what waits, or, if nothing does, holds the torque of

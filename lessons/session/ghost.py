@@ -1,4 +1,4 @@
-"""A ghost: a session that lives through what another one lives through, with some settings of its own."""
+"""A ghost: a session that gets the same events as another session, but has some different settings."""
 
 from __future__ import annotations
 

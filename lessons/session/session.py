@@ -1,4 +1,4 @@
-"""The headless loop, whatever its kind: one scene, one controller, one plant, one mailbox."""
+"""The headless loop of both kinds of scenes: one scene, one controller, one plant, one mailbox."""
 
 from __future__ import annotations
 

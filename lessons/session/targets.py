@@ -1,4 +1,4 @@
-"""The hand on a target: where it starts, and what it may be moved to."""
+"""Draggable targets: their start, and the values to which they may be moved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people are told of a setting: its label, unit, help and the usual range, one row per setting."""
+"""The description of a setting for users: one row with its label, unit, help text and usual range."""
 
 from __future__ import annotations
 

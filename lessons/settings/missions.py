@@ -1,4 +1,4 @@
-"""What the velocity-level scenes ask of the robot: each scene's choices, and the mission they make."""
+"""The missions of the velocity-level scenes: the options of each scene, and the mission made from them."""
 
 from __future__ import annotations
 

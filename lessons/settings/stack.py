@@ -1,4 +1,4 @@
-"""The stack as a setting: told as data, and read from data."""
+"""The stack as a setting: converts it to data and back."""
 
 from __future__ import annotations
 

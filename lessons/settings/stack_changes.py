@@ -1,4 +1,4 @@
-"""What may be done to a stack while the robot moves, part by part."""
+"""The changes of a stack that are allowed while the robot moves."""
 
 from __future__ import annotations
 

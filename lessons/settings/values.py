@@ -1,4 +1,4 @@
-"""What a setting may be, from how its field is declared; and values a user gives for it, checked."""
+"""Derives the allowed values of a setting from the declaration of its field, and checks users' values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A claim: a measurable sentence about a run, that can fail."""
+"""A claim: a measurable sentence about a run, which can be false."""
 
 from __future__ import annotations
 

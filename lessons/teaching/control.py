@@ -1,4 +1,4 @@
-"""What acts on a run, as data: the few controls that matter for a step, and its script."""
+"""The controls that a step shows and its script of events, as data."""
 
 from __future__ import annotations
 
