@@ -106,7 +106,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silences the tracebacks that a client logs when it loses its scheduler; users get one sentence instead."""
+    """Hides the tracebacks that a client logs when it loses its scheduler; users get one sentence."""
     log = logging.getLogger("distributed.client")
     before = log.level
     log.setLevel(logging.CRITICAL)

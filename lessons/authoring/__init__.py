@@ -1,1 +1,1 @@
-"""Helps authors of a controller, scene, task or lesson: writes template files, and loads lessons from files."""
+"""Helps authors of controllers, scenes, tasks and lessons: writes template files and loads lesson files."""

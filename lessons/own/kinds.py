@@ -47,7 +47,7 @@ def expected(module: ModuleType, kind: Kind) -> None:
 
 
 def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
-    """The function that creates the control law of a controller's file. Raises InputError if there is none."""
+    """The function that creates the law of a controller's file. Raises InputError if there is none."""
     expected(module, "controller")
     names = vars(module)
     if "Controller" in names:

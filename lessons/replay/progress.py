@@ -68,7 +68,7 @@ def kept(progress: LearnerProgress, key: bytes | None) -> str:
 
 
 def found(text: str | None, key: bytes | None) -> LearnerProgress:
-    """What a browser kept; with a key, nothing that was not written with it."""
+    """The progress that a browser stored; with a key, only progress that is signed with it."""
     if key is None or not text:
         return progress_from(text)
     seal, body = text[:64], text[64:]
@@ -78,7 +78,7 @@ def found(text: str | None, key: bytes | None) -> LearnerProgress:
 
 
 def progress_from(text: str | None) -> LearnerProgress:
-    """From the browser's storage, which anybody may have written: what makes no sense is left out."""
+    """Reads the browser's storage, which anybody may have written; invalid entries are left out."""
     try:
         found = json.loads(text or "{}")
     except (ValueError, RecursionError):
@@ -108,7 +108,7 @@ def _of_lessons(found: Any) -> list[tuple[str, Any]]:
 
 @dataclass(frozen=True)
 class HandedIn:
-    """What leaves the browser.
+    """The text that a learner hands in, as data.
 
     Attributes:
         name: as the learner wrote it.

@@ -88,5 +88,5 @@ def _section(results: Results, quick: bool) -> Section:
 
 
 ITEMS = (
-    Item("himpc-adaptation", "M̄ that looks after itself", "not in the paper; Remark 4", _jobs, _section),
+    Item("himpc-adaptation", "M̄ that adapts to the payload", "not in the paper; Remark 4", _jobs, _section),
 )
