@@ -105,7 +105,7 @@ def one_by_one(
 
 
 def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
-    """What the function returns, or why it raised."""
+    """The result of the function, or its failure if it raised."""
     try:
         return function(item)
     except Exception as error:
@@ -146,9 +146,10 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _born_deaf() -> Iterator[None]:
-    """Children of this moment inherit that Ctrl-C is blocked: before any code of ours runs in them it would
-    end them with Python's own complaint. So would an owner that leaves a start half done: a signal that comes
-    meanwhile, to whatever thread, is heard afterwards."""
+    """Blocks Ctrl-C while processes start. A child inherits the block: otherwise Ctrl-C would end it with a
+    traceback before our code runs in it. In the owner the block prevents a half-finished start; a signal that
+    arrives meanwhile, in any thread, is handled afterwards.
+    """
     heard: list[int] = []
     handlers: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])

@@ -239,8 +239,7 @@ class Apart:
             self._look(watch)
 
     def _look(self, watch: ProcessDeadline) -> None:
-        """Raises OwnFault, and ends the process, if an answer takes too long by its own doing, or too much
-        memory."""
+        """Raises OwnFault, and ends the process, if the process is too slow or needs too much memory."""
         slept = watch.slept
         if watch.over():
             self.close()

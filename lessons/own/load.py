@@ -21,11 +21,11 @@ from lessons.own.files import Source, execute
 from robots import InputError
 
 LONGEST = 10.0
-"""s that loading a file may take by its own doing."""
+"""s that loading a file may take, without waiting for a core."""
 _REFUSED = ("os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "os.posix_spawn", "os.system",
             "os.spawn", "pty.spawn", "signal.pthread_kill")  # fmt: skip
 _BY_ITSELF = ("subprocess.Popen",)
-"""What an installed package may do while it is imported, and a file of one's own may not."""
+"""Calls that an installed package may make during its import, and a user's file may not."""
 _SHARED = ("builtins", "math", "numpy", "scipy", "pinocchio", "os", "time", "himpc", "robots", "lessons")
 _running: ContextVar[str] = ContextVar("_running", default="")
 
@@ -43,7 +43,7 @@ def alone(path: str) -> Iterator[None]:
 
 @cache
 def _watched() -> None:
-    """An audit hook cannot be taken away again: there is one, which does nothing while no such code runs."""
+    """Installs one audit hook, which cannot be removed; it does nothing while no such code runs."""
     sys.addaudithook(_hook)
 
 
@@ -121,7 +121,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
 
 
 def _shared() -> dict[str, dict[str, Any]]:
-    """What functions, classes and modules the lab's own and its libraries' modules name."""
+    """The functions, classes and modules that the modules of the lab and its libraries name."""
     return {
         name: {key: value for key, value in vars(module).items() if _is_code(value)}
         for name, module in list(sys.modules.items())
