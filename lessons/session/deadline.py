@@ -15,7 +15,7 @@ class DelayedTorque:
     a newer one. A tick whose torque is late applies the waiting torque or, if there is none, holds the torque
     of the previous tick; its own torque then waits. So one late tick costs one tick of holding, and of two
     late ones in a row the second applies the first one's torque: a controller that is always late acts
-    exactly like one whose torque is delayed by one tick. However late it is, it waits no longer than one tick.
+    exactly like one whose torque is delayed by one tick. However late it is, it waits at most one tick.
     """
 
     def __init__(self) -> None:
