@@ -1,4 +1,4 @@
-"""Independent work on the workers of a Dask scheduler that is there, as `parallel` does it on local cores."""
+"""Runs independent work on the workers of an existing Dask scheduler, as `parallel` does on local cores."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ U = TypeVar("U")
 
 PATIENCE = 60.0
 """s that a scheduler may be without workers before work is given up: one that died is replaced sooner."""
-_ASK = 1.0  # s between two questions whether there are workers
+_ASK = 1.0  # s between two checks whether there are workers
 
 
 @contextmanager
@@ -39,7 +39,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
             '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
             "to use this machine's cores"
         ) from None
-    # Asked first by plain socket: a Client that finds nobody goes on trying in the background.
+    # A plain socket tries the address first: a Client that finds no scheduler would go on trying in the
+    # background.
     try:
         parts = urlsplit(address)
         socket.create_connection((parts.hostname or "", parts.port or 0), timeout=10).close()
@@ -84,7 +85,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
                     orphans.append(places[future.key])
                 else:
                     yield places[future.key], future.result() if error is None else FailedJob(sentence(error))
-            # A dying worker takes along what waited there: one at a time, the culprit shows.
+            # A dying worker also loses the work that waited on it; if the items run one at a time, the guilty
+            # one is found.
             for place in sorted(orphans):
                 alone = client.submit(guarded, function, items[place], pure=False)
                 futures.append(alone)
@@ -104,7 +106,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """A client that loses its scheduler logs tracebacks; people are told in a sentence."""
+    """Hides the tracebacks that a client logs when it loses its scheduler; users get one sentence."""
     log = logging.getLogger("distributed.client")
     before = log.level
     log.setLevel(logging.CRITICAL)

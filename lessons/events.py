@@ -1,4 +1,4 @@
-"""What may happen to a running session. Events are data; tasks and levels go by their stable names."""
+"""The events that a running session accepts. Events are data; they refer to tasks and levels by name."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class MoveLevel:
 
 @dataclass(frozen=True)
 class MoveTarget:
-    """The hand puts a task's target somewhere: position (m), quaternion (x y z w) or joints (rad)."""
+    """A task's target moves to a new place: position (m), quaternion (x y z w) or joints (rad)."""
 
     task: str
     value: Vector
@@ -48,12 +48,12 @@ class Push:
 
 @dataclass(frozen=True)
 class Reset:
-    """Back to the scene's start; settings stay as they are."""
+    """The session returns to the scene's start and keeps its settings."""
 
 
 @dataclass(frozen=True)
 class Release:
-    """Somebody takes the ball: a hold of unknown length ends."""
+    """A person takes the ball, which ends a hold of unknown length."""
 
     task: str
 
@@ -71,7 +71,7 @@ class InsertTask:
     hold: float | None = 0.0
 
     def task(self) -> MissionTask:
-        """The task. Raises InputError for values that cannot be."""
+        """The task. Raises InputError for invalid values."""
         return MissionTask(self.name, self.role, Go(self.goal, self.cruise), self.tolerance, self.hold)
 
 
@@ -84,14 +84,14 @@ class RemoveTask:
 
 @dataclass(frozen=True)
 class Appear:
-    """A ball (centre and radius, m) is suddenly there, or an obstacle of that name is somewhere else."""
+    """A ball (centre and radius, m) appears, or the obstacle of that name moves there."""
 
     name: str
     centre: Vector
     radius: float
 
     def ball(self) -> Ball:
-        """The obstacle. Raises InputError for numbers that cannot be."""
+        """The obstacle. Raises InputError for invalid numbers."""
         if len(self.centre) != 3:
             raise InputError(f"obstacle '{self.name}' needs a centre of three numbers")
         x, y, z = self.centre

@@ -1,4 +1,4 @@
-"""What scripts import that were written before `lessons` itself had all of it."""
+"""Old import names: scripts that were written before `lessons` exported these names import them here."""
 
 from lessons import arrays, load_scene, prepared, run, scene_named, summary, with_tasks
 

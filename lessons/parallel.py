@@ -1,7 +1,8 @@
-"""Independent work on all local cores: a function, items in, outcomes out; `cluster` does it elsewhere.
+"""Runs a function on independent items on all local cores; `cluster` does the same on other machines.
 
-A piece of work that fails is an outcome, not the end of the others. Outcomes come as they are ready; each
-carries the place of its item, so that what is made of them does not depend on who was faster.
+An item that fails gives an outcome, too, and the others continue. Outcomes come in the order in which they
+are ready; each outcome has the index of its item, so that results do not
+depend on the speed of the processes.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ def on_cores(
     waiting = deque(range(len(items)))
     while waiting:
         orphans = yield from _until_one_dies(function, items, waiting)
-        # A dying process takes its pool's other work with it: one at a time, the culprit shows.
+        # A dying process also ends the other work of its pool; if the items run one at a time, the guilty one
+        # is found.
         for place in sorted(orphans):
             yield place, _alone(function, items[place])
 
@@ -81,7 +83,7 @@ def _until_one_dies(
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         while not orphans and (waiting or under_way):
             with _born_deaf():
-                # No more than there are processes: who dies takes no more along.
+                # Not more items than processes: a dying process ends no further items.
                 while waiting and len(under_way) < workers:
                     future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()
@@ -103,7 +105,7 @@ def one_by_one(
 
 
 def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
-    """What the function returns, or why it raised."""
+    """The result of the function, or its failure if it raised."""
     try:
         return function(item)
     except Exception as error:
@@ -144,9 +146,10 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _born_deaf() -> Iterator[None]:
-    """Children of this moment inherit that Ctrl-C is blocked: before any code of ours runs in them it would
-    end them with Python's own complaint. So would an owner that leaves a start half done: a signal that comes
-    meanwhile, to whatever thread, is heard afterwards."""
+    """Blocks Ctrl-C while processes start. A child inherits the block: otherwise Ctrl-C would end it with a
+    traceback before our code runs in it. In the owner the block prevents a half-finished start; a signal that
+    arrives meanwhile, in any thread, is handled afterwards.
+    """
     heard: list[int] = []
     handlers: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])

@@ -1,1 +1,1 @@
-"""For authors of a controller, scene, task or lesson: files to begin with, and lessons by a file's path."""
+"""Helps authors of controllers, scenes, tasks and lessons: writes template files and loads lesson files."""

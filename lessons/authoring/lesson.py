@@ -1,4 +1,4 @@
-"""A lesson by its name, or by the path of a file."""
+"""Loads a lesson by its name, or by the path of a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A file to begin with."""
+"""Writes a template file for a controller, scene, task or lesson."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robots import InputError
 from robots.errors import unknown_name
 
 EXAMPLES: tuple[str, ...] = ("pd", "osf", "one_level_qp", "himpc_one_page")
-"""Controllers there are to begin with."""
+"""Controllers that can be used as a template."""
 TASKS: tuple[str, ...] = (
     "position",
     "orientation",
@@ -30,13 +30,13 @@ target that is no value of its coordinates, which a task of a file must have."""
 
 
 def choices(kind: Kind) -> Sequence[str]:
-    """What a new file of a kind may begin with."""
+    """The templates of a kind of file."""
     controllers = (*EXAMPLES, *EXERCISES)
     return {"controller": controllers, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": TASKS}[kind]
 
 
 def text_of(kind: Kind, start: str | None, file: str) -> str:
-    """The text of a new file. Raises InputError for a beginning there is not."""
+    """The text of a new file. Raises InputError if there is no such template."""
     known = choices(kind)
     if start is not None and start not in known:
         raise unknown_name(f"{kind} to begin with called", start, known)

@@ -1,8 +1,8 @@
-"""PD with gravity compensation: every level pulls at its own coordinates, and nothing keeps them apart.
+"""PD with gravity compensation: every level controls its own coordinates, and nothing decouples the levels.
 
     himpc-lab run planar3-hold --controller FILE.py
 
-`torque(now)` is called once per control period with everything that is measured and asked for, and returns a
+`torque(now)` is called once per control period with all measurements and references, and returns a
 torque per joint, (n,) N·m. What `now` holds is listed in `himpc.controllers.view.View`.
 """
 

@@ -1,6 +1,6 @@
-"""Exercises: write the missing lines of a controller, and be judged by what it does.
+"""Exercises: students write the missing lines of a controller, and the motion of the robot is graded.
 
-One file per exercise, its docstring is its card; `starts/` has the file with the hole.
+Each exercise is one file, whose docstring is its card; `starts/` has the file with missing lines.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ EXERCISES: dict[str, str] = {
     "one-level-qp": "one level of the QP (35), one knot, with its bounds",
     "two-levels": "two levels with the equality (33)",
 }
-"""One line each, in the order in which to do them."""
+"""Each exercise with one line, in the recommended order."""
 
 
 def load_exercise(name: str) -> Exercise:
-    """An exercise by its name. Raises InputError for a name that is none, naming the nearest."""
+    """The exercise of a name. Raises InputError, which names the nearest valid name, if there is none."""
     if name not in EXERCISES:
         raise unknown_name("exercise", name, EXERCISES)
     found: Exercise = import_module(f"lessons.exercises.{name.replace('-', '_')}").EXERCISE
@@ -34,12 +34,12 @@ def load_exercise(name: str) -> Exercise:
 
 
 def exercises_of(lesson: str) -> tuple[Exercise, ...]:
-    """Those a lesson leads to, in order."""
+    """The exercises that belong to a lesson, in order."""
     return tuple(each for each in map(load_exercise, EXERCISES) if each.lesson == lesson)
 
 
 def start_of(name: str) -> str:
-    """The file with the hole in it. Raises InputError for a name that is none."""
+    """The file with missing lines. Raises InputError if there is no exercise of this name."""
     load_exercise(name)
     place = Path(str(files("lessons.exercises") / "starts" / f"{name.replace('-', '_')}.py"))
     return place.read_text(encoding="utf-8")

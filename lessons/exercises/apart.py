@@ -1,4 +1,4 @@
-"""The lab's side of a submission's process: it is shown numbers and returns a torque, within deadlines."""
+"""The lab's side of a submission's process: it sends numbers and receives a torque, within deadlines."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ _BOOT = (
 
 
 class Exhausted(Exception):
-    """A submission has used up what grading it may cost; the message is one sentence."""
+    """A submission has exceeded the time or memory allowed for grading it; the message is one sentence."""
 
 
 @final
 class Apart:
-    """A process that holds nothing of the lab and runs a submission. To be used in a `with` statement.
+    """A process that runs a submission and contains no data of the lab. To be used in a `with` statement.
 
     Attributes:
-        protection: what of the system keeps it from files, the network and other processes; () where only
-            Python does.
+        protection: the means of the operating system that deny it files, the network and other processes; ()
+            if only Python does.
         exercise: what the file says in EXERCISE.
         line: where it begins to compute the torque.
     """
@@ -92,7 +92,7 @@ class Apart:
 
     @property
     def pid(self) -> int | None:
-        """Of the process, None while there is none."""
+        """The id of the process; None if no process runs."""
         return None if self._child is None else self._child.pid
 
     def close(self) -> None:
@@ -101,7 +101,7 @@ class Apart:
         if child is None:
             return
         self._before += spent(child.pid)[0]
-        # Where seccomp sees to it the process could start nothing.
+        # With seccomp the process could not start other processes.
         if "seccomp" in self.protection:
             child.kill()
         else:
@@ -154,12 +154,12 @@ class Apart:
         kind, data = self._exchanged(wire.LOAD, text, STARTING, "starting its process")
         if kind != wire.READY:
             raise self._nonsense()
-        self.protection = tuple(json.loads(data))  # written before a line of the file was run
+        self.protection = tuple(json.loads(data))  # written before any line of the file was run
 
     # ---------------------------------------------------------------- one message and its answer
 
     def torque(self, now: View) -> Any:
-        """What the law makes of a tick. Raises OwnFault, one sentence."""
+        """The torque of the control law for a tick. Raises OwnFault, one sentence."""
         if self._child is None:
             raise OwnFault(f"{self._source.path}: its process is over")
         message, arrays = b"", numbers_of(now)
@@ -208,7 +208,9 @@ class Apart:
         return self._answered(wire.packed(kind, data), ProcessDeadline(child.pid, seconds, what))
 
     def _answered(self, message: bytes, watch: ProcessDeadline) -> tuple[bytes, bytes]:
-        """Sends and hears one message. Raises OwnFault, and ends the process, if that takes too long."""
+        """Sends one message and receives the answer. Raises OwnFault, and ends the process, if that takes too
+        long.
+        """
         left = memoryview(message)
         while left:
             if self._in_poll.poll(1e3 * LOOK):
@@ -237,8 +239,7 @@ class Apart:
             self._look(watch)
 
     def _look(self, watch: ProcessDeadline) -> None:
-        """Raises OwnFault, and ends the process, if an answer takes too long by its own doing, or too much
-        memory."""
+        """Raises OwnFault, and ends the process, if the process is too slow or needs too much memory."""
         slept = watch.slept
         if watch.over():
             self.close()
@@ -285,7 +286,7 @@ class Apart:
 
 
 def _pipes(child: subprocess.Popen[bytes]) -> tuple[int, int]:
-    """To the process and from it; neither ever keeps this side waiting."""
+    """The pipes to and from the process; neither of them blocks this side."""
     assert child.stdin is not None and child.stdout is not None
     for pipe in (child.stdin, child.stdout):
         os.set_blocking(pipe.fileno(), False)

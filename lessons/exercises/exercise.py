@@ -1,4 +1,4 @@
-"""An exercise as data: what to write, and the checks it is judged by."""
+"""An exercise as data: the task, and the checks that grade a solution."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class GradeCheck:
     points: int = 1
 
     def holds(self, value: float) -> bool:
-        """Whether a value meets it; NaN does not."""
+        """Whether a value meets the condition; NaN does not."""
         return holds(value, self.relation, self.bound)
 
     @property
@@ -58,17 +58,17 @@ class GradeCheck:
 
 @dataclass(frozen=True)
 class Exercise:
-    """What to write and what it is judged by.
+    """The task of an exercise and the checks that grade a solution.
 
     Attributes:
         name: its name in `lessons.exercises.EXERCISES`.
         card: the docstring of its file.
         equation: LaTeX.
         plain: the same as plain text, for a terminal.
-        hints: that open one by one.
+        hints: shown one by one.
         lesson: the lesson it belongs to.
-        checks: for a seed, which decides the disturbances.
-        mistakes: that are often made, to be named.
+        checks: function of a seed, which decides the disturbances.
+        mistakes: frequent mistakes, which the grade names.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Exercise:
 
     @property
     def scene(self) -> str:
-        """Where to watch it live."""
+        """The scene in which to watch the solution live."""
         return self.checks(0)[-1].run.scene
 
     @property
@@ -91,7 +91,9 @@ class Exercise:
         return f"my_{self.name.replace('-', '_')}.py"
 
     def commands(self, file: str | None = None) -> tuple[str, str, str]:
-        """What begins a solution in a file (by default `file`), shows it on the page, and judges it."""
+        """The commands that start a solution in a file (by default `file`), show it on the page, and grade
+        it.
+        """
         file = file or self.file
         return (
             f"himpc-lab new controller {file} --from {self.name}",

@@ -1,4 +1,4 @@
-"""A folder of submissions: one table, which is also what an interrupted grading carries on from."""
+"""Grades a folder of submissions into one table; an interrupted grading continues from this table."""
 
 from __future__ import annotations
 
@@ -101,16 +101,16 @@ def _one_line(text: str) -> str:
 
 
 def _text(name: str) -> str:
-    """What UTF-8 can say: names of files may be any bytes."""
+    """The text as valid UTF-8: names of files may be any bytes."""
     return name.encode(errors="replace").decode()
 
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""How a cell begins that a spreadsheet would compute."""
+"""First characters of cells that a spreadsheet would compute."""
 
 
 def _cell(text: str) -> str:
-    """As a spreadsheet shows it, and does not compute it."""
+    """The cell in a form that a spreadsheet shows and does not compute."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
@@ -119,7 +119,7 @@ def _of_cell(text: str) -> str:
 
 
 def _rows(out: Path) -> Iterator[Row]:
-    """What a table holds already; one that is no table of ours holds nothing."""
+    """The rows that a table already contains; a file that is not such a table counts as empty."""
     if not out.exists():
         return
     try:
@@ -134,7 +134,7 @@ def _rows(out: Path) -> Iterator[Row]:
 
 
 def _write(out: Path, rows: list[Row]) -> None:
-    """As a whole or not at all: whoever stops it finds what was there before."""
+    """Writes the whole table or nothing: if the writing is stopped, the old file stays."""
     beside = out.with_name(out.name + ".part")
     try:
         with beside.open("w", newline="", encoding="utf-8") as file:

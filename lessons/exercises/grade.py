@@ -1,4 +1,4 @@
-"""Grading: a submission has a process of its own and is judged by what the robot does."""
+"""Grades a submission, which runs in a separate process, by the motion of the robot."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class Grade:
-    """What a submission is worth.
+    """The grade of a submission.
 
     Attributes:
         file: its path.
@@ -108,7 +108,7 @@ class Submission:
 
 
 class Shown(Protocol):
-    """A submission to those who judge it: what it is shown and what it returns are all they have of it."""
+    """A submission as the checks see it: only its inputs and its outputs."""
 
     @property
     def where(self) -> str:
@@ -134,7 +134,7 @@ def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
 def grade_apart(submission: Submission) -> Grade:
     """Grades a submission in a process of its own; whatever it does there is a grade."""
     source, asked = submission.source, submission.exercise
-    # Its own time is counted in its own process; what the checks take is no fault of it.
+    # Only the time in the submission's own process counts, not the time of the checks.
     within = replace(submission.within, seconds=PATIENCE * submission.within.seconds)
     try:
         return isolated(graded, submission, within=within, copied=True)
@@ -171,7 +171,7 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult,
     recordings: dict[RunSpec, Recording | str] = {}
     diagnosis = Diagnosis(exercise.mistakes)
     lines: list[CheckResult] = []
-    general: list[tuple[int, str]] = []  # which lines say what it may be, and how they begin
+    general: list[tuple[int, str]] = []  # lines that name a possible mistake, and how they begin
     for check in exercise.checks(seed):
         begins = ""
         try:
@@ -201,7 +201,7 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult,
 
 
 class _Lost(Exception):
-    """The robot was out of control; says when."""
+    """The robot went out of control; the message says when."""
 
 
 def _measured(

@@ -30,7 +30,7 @@ PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
 
 
 def checks(seed: int) -> tuple[GradeCheck, ...]:
-    # Where gravity pulls otherwise than at the start.
+    # A configuration with other gravity torques than at the start.
     moved = tuple(radians(each) for each in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
     sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (
@@ -51,7 +51,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=3,
         ),
         GradeCheck(
-            "It is calm afterwards.",
+            "The arm is at rest afterwards.",
             "the damper K_v does not brake it",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
             5.0,
@@ -59,8 +59,8 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "A new posture is reached, where gravity pulls otherwise.",
-            "the error is not taken towards the target q_d, or gravity is not that of where the arm is",
+            "The arm reaches a new posture, in which the gravity torques are different.",
+            "the error does not refer to the target q_d, or gravity is not computed at the present q",
             sent,
             2.0,
             measure=Measure(ERROR, "last"),
@@ -92,7 +92,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("the damping K_v is missing", _law, K_v=0.0),
     wrong("gravity g(q) is missing", _law, gravity=0.0),
     wrong("gravity g(q) has the wrong sign", _law, gravity=-1.0),
-    Mistake("gravity g(q) is that of the start: it is another one at every q", _frozen),
+    Mistake("gravity g(q) is that of the start: it must be computed at every q", _frozen),
     wrong("M̄ is missing: it turns an acceleration into a torque", _law, M_bar=False),
     wrong("the target q_d is missing: the error is q − q_d", _law, target=False),
 )

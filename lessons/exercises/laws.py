@@ -1,4 +1,6 @@
-"""The laws of the exercises with a switch for each thing that can be wrong, to recognise what is."""
+"""The control laws of the exercises, with a switch for each known mistake; they are used to recognise
+mistakes.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,7 @@ def wanted(level: LevelView, *, K_p: float = 1.0, K_v: float = 1.0, target: bool
 
 
 def held(now: View) -> Array:
-    """The torque that acts, again."""
+    """Returns the acting torque unchanged."""
     return now.tau_0
 
 

@@ -1,4 +1,4 @@
-"""Which known mistake a submission makes: the one that returns the same torques wherever it was shown."""
+"""Finds the known mistake of a submission: the one that returns the same torques at every state shown."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Mistake:
 
 @final
 class Diagnosis:
-    """What is left of the known mistakes of an exercise, run by run."""
+    """The known mistakes that still fit a submission, run by run."""
 
     def __init__(self, mistakes: Sequence[Mistake]) -> None:
         self._left = list(mistakes)
@@ -40,11 +40,11 @@ class Diagnosis:
         self._seen = 0
 
     def begin(self) -> None:
-        """A run begins."""
+        """Notes that a run begins."""
         self._laws, self._seen = [each.make() for each in self._left], 0
 
     def see(self, now: View, answer: Any) -> None:
-        """What a submission made of a tick: the first ones of a run, then every tenth."""
+        """Compares the torque of a submission at a tick: at the first ticks of a run, then at every tenth."""
         self._seen += 1
         if self._seen > _FIRST and self._seen % _EVERY:
             return

@@ -17,7 +17,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# What the plant of this scene really is, told to the controller: then the law is exact.
+# The controller gets the true parameters of the plant; then the law is exact.
 EXACT = (
     "nominal.mass_scale=1",
     "nominal.inertia_scale=1",
@@ -25,7 +25,7 @@ EXACT = (
     "nominal.damping=[0.15,0.1,0.08]",
 )
 CIRCLE = RunSpec("planar3-circle", set=("q1_amplitude_deg=40", *EXACT), duration=1.2)
-# Two tasks that cannot both be done: only the order says which one is.
+# Two tasks that cannot be met together: the order decides which one is met.
 HOLD = RunSpec(
     "planar3-circle",
     set=(
@@ -40,23 +40,23 @@ ROUGH = replace(HOLD, set=HOLD.set[:1], duration=0.5)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "The hand follows its circle, though the second task is to stay: the first one comes first.",
-            "the first level does not close (4), or does not come first",
+            "The hand follows its circle although the second task asks it to stay: the first has priority.",
+            "the first level does not satisfy (4), or does not have priority",
             HOLD,
             2.5,
             measure=Measure(Signal("error/position", "mm"), "rms", after=0.6),
             points=2,
         ),
         GradeCheck(
-            "Joint 1 swings as asked: the second level gets the freedom there is.",
-            "the second level does not close (4) with what it gets",
+            "Joint 1 follows its reference: the second level uses the remaining freedom.",
+            "the second level does not satisfy (4) with its remaining freedom",
             CIRCLE,
             1.5,
             measure=Measure(Signal("error/q1", "deg"), "rms", after=0.6),
             points=2,
         ),
         GradeCheck(
-            "Nothing of the second level reaches the hand, in the arm's own terms.",
+            "The torque of the second level does not accelerate the hand, by the model of the arm.",
             "the projector is not the dynamically consistent one; return a row of torques per level",
             CIRCLE,
             1e-6,
@@ -65,7 +65,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "The torque is OSF's, with a model that is a little wrong and a push.",
-            "one of the terms is another one: J̇q̇, Λ, N, or what the levels above already do to this one",
+            "one of these terms is wrong: J̇q̇, Λ, N, or the effect of the levels above on this level",
             pushed(ROUGH, seed, "link_3", 3.0, plane=True),
             1e-6,
             beside="osf",

@@ -17,7 +17,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# An M̄ that is no multiple of the unit matrix: who forgets it errs.
+# An M̄ that is no multiple of the unit matrix: a solution without M̄ gives a wrong result.
 M_BAR = ("M_bar=[0.06,0.03,0.02]", "T_s=0.002")
 ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false", *M_BAR)
 FREE = RunSpec("planar3-circle", set=ALONE, duration=1.0)
@@ -31,8 +31,8 @@ HEAVY = RunSpec(
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "With room to spare the torque is the optimum.",
-            "G, e⁰, H or f is another one: the residual (28) is taken at the next knot",
+            "Without active bounds the torque is the optimum.",
+            "G, e⁰, H or f is wrong: the residual (28) is taken at the next knot",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
             1e-6,
             beside="hiqp",
@@ -40,14 +40,14 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "The torque stays within its bound.",
-            "the torque bound (32f) is not kept: it is on τ₀ + Δτ",
+            "the torque bound (32f) is violated: it applies to τ₀ + Δτ",
             WEAK,
             100.0001,
             measure=Measure(Signal("torque share", "%")),
             points=2,
         ),
         GradeCheck(
-            "At the torque bound it is the optimum, not a cut-off one.",
+            "At the torque bound the torque is the optimum of the QP, not a clipped one.",
             "it is not the optimum: the bounds must stand in the QP",
             WEAK,
             1e-6,
@@ -55,7 +55,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "At the velocity bound it is the optimum.",
+            "At the velocity bound the torque is the optimum.",
             "the velocity bound (32e) on q̇ + T_s (q̈₀ + M̄⁻¹Δτ), approached at most as fast as `approach` says",
             SLOW,
             1e-6,
@@ -63,7 +63,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "The weights count.",
+            "The weights Q and R have the right effect.",
             "Q weighs the residual, R the increments: both stand in H, Q in f",
             HEAVY,
             1e-6,
@@ -79,7 +79,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("the torque is held: nothing is optimised", held),
     wrong("no bound is in the QP", _law, limits="none"),
     wrong(
-        "the torque is cut off afterwards, and not bounded in the QP",
+        "the torque is clipped after the QP instead of bounded in the QP",
         hierarchy,
         levels=1,
         limits="afterwards",
@@ -97,7 +97,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("τ₀ is missing: the QP gives increments", _law, alone=True),
     wrong("the velocity bound (32e) is missing", _law, limits="torque"),
     wrong(
-        "the bound (32f) is on Δτ alone, and belongs on τ₀ + Δτ",
+        "the bound (32f) is imposed on Δτ instead of τ₀ + Δτ",
         hierarchy,
         levels=1,
         limits="on the increment",

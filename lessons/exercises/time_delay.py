@@ -21,7 +21,7 @@ from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure
 
 GAINS = ("levels.posture.K_p=100", "levels.posture.K_v=20")
-# Hung on while it runs: a torque that was right before is not any more.
+# The load is attached during the run: a torque that was right before is then wrong.
 HUNG = ((0.05, Set("plant.payload_kg", 3.0)),)
 LOADED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), events=HUNG, duration=0.8)
 MISLED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS, "nominal.mass_scale=2"), events=HUNG, duration=0.8)
@@ -32,7 +32,7 @@ STILL = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), duration=0.2)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "A load of 3 kg that is hung on, and that nobody told of, does not sag.",
+            "The hand does not sag under an attached load of 3 kg that the controller does not know.",
             "Ĥ = τ₀ − M̄ q̈₀ is not what it should be",
             LOADED,
             2.0,
@@ -40,8 +40,8 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=3,
         ),
         GradeCheck(
-            "It does not matter what the model says.",
-            "Ĥ is not the estimate, or reads the nominal model: now.M, now.bias or now.gravity",
+            "The torque does not depend on the nominal model.",
+            "Ĥ is not the estimate, or uses the nominal model: now.M, now.bias or now.gravity",
             MISLED,
             2.0,
             measure=Measure(ERROR, "last"),
@@ -57,7 +57,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "The torque is that of the equation.",
-            "one of its terms is another one: τ₀, M̄, q̈₀, K_p x̃ or K_v ẋ̃",
+            "one of these terms is wrong: τ₀, M̄, q̈₀, K_p x̃ or K_v ẋ̃",
             pushed(STILL, seed + 1, "link_5", 20.0, at=0.02),
             1e-6,
             beside="tdeosf",
@@ -100,7 +100,7 @@ EXERCISE = Exercise(
     plain="τ = τ₀ + M̄ (q̈_d − K_v (q̇ − q̇_d) − K_p (q − q_d) − q̈₀)",
     hints=(
         "`now.tau_0` is the torque that acted, and `now.q_ddot` the acceleration it gave.",
-        "Ĥ = τ₀ − M̄ q̈₀ stands for gravity, friction, loads and what M̄ does not say: (9).",
+        "Ĥ = τ₀ − M̄ q̈₀ contains gravity, friction, loads and the model error of M̄: (9).",
         "Then τ = M̄ q̈_wanted + Ĥ.",
     ),
     lesson="no-model-needed",

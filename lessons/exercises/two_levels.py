@@ -15,7 +15,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# An M̄ that is no multiple of the unit matrix: who forgets it errs.
+# An M̄ that is no multiple of the unit matrix: a solution without M̄ gives a wrong result.
 SETTINGS = ("horizon=1", "damping=false", "M_bar=[0.06,0.03,0.02]", "T_s=0.002", "q1_amplitude_deg=60")
 FREE = RunSpec("planar3-circle", set=SETTINGS, duration=1.0)
 WEAK = RunSpec("planar3-circle", set=(*SETTINGS, "limits.torque_scale=0.04"), duration=1.0)
@@ -25,7 +25,7 @@ FIGHT = RunSpec("planar3-conflict", set=SETTINGS[:-1], duration=1.5)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "With room to spare the torque is the optimum of both levels.",
+            "Without active bounds the torque is the optimum of both levels.",
             "a residual, a weight or a level is not what it should be",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
             1e-6,
@@ -41,7 +41,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=3,
         ),
         GradeCheck(
-            "Where torque is short, level 2 gives way.",
+            "If the torque is not enough for both levels, the error of level 2 grows.",
             "it is not the optimum: the bounds must stand in the QP of both levels",
             WEAK,
             1e-6,
@@ -49,8 +49,8 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=3,
         ),
         GradeCheck(
-            "Where the tasks fight, the hand stays on its circle.",
-            "level 1 pays for level 2",
+            "If the tasks conflict, the hand stays on its circle.",
+            "the error of level 1 grows in favour of level 2",
             FIGHT,
             1.0,
             measure=Measure(Signal("error/position", "mm"), "rms", after=0.5),
@@ -100,7 +100,7 @@ EXERCISE = Exercise(
     r"\quad \text{s.t. bounds, } J_1 \bar M^{-1} \Delta\tau_2 = J_1 \bar M^{-1} \Delta\tau_1",
     plain="min ‖e₂‖²_Q + ‖Δτ₂‖²_R, within bounds and with J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁",
     hints=(
-        "Solve level 1 as before. Level 2 is the same QP with rows that say: J₁M̄⁻¹ stays as it is.",
+        "Solve level 1 as before. Level 2 is the same QP with rows that keep J₁M̄⁻¹Δτ as level 1 left it.",
         "In `solve_qp` a row with lower = upper is an equality.",
         "Safer near singularities: Δτ₂ = Δτ₁ + Z y with Z a basis of what J₁M̄⁻¹ maps to zero (SVD).",
         "Return np.array([now.tau_0 + dtau_1, now.tau_0 + dtau_2]): a row per level, the last one acts.",

@@ -1,4 +1,4 @@
-"""How long a process takes to answer by its own doing: what it computes, and what it sleeps."""
+"""Measures how long a process itself takes to answer: the time in which it computes or sleeps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robots.processes.family import spent
 from robots.processes.isolation import PATIENCE
 
 LOOK = 0.1
-"""s between looks at a process that has not answered."""
+"""s between two checks of a process that has not answered."""
 
 
 @final
@@ -36,7 +36,7 @@ class ProcessDeadline:
         return time.monotonic() - self.began
 
     def over(self) -> bool:
-        """Whether it took too long. To be asked every tenth of a second."""
+        """Whether it took too long. Call this every tenth of a second."""
         now = time.monotonic()
         computed, asleep = spent(self._pid)
         if self._last is None:

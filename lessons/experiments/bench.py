@@ -16,7 +16,7 @@ from lessons.session.torque import TorqueSession
 
 HORIZONS = (5, 10, 20, 30)
 SCENES = ("iiwa14-circle", "iiwa14-hold")
-"""A motion that is known beforehand, and targets that a hand drags."""
+"""A scene whose motion is known beforehand, and scenes with dragged targets."""
 CONTENDERS: tuple[tuple[Route, Solver], ...] = (
     ("compiled", "daqp"),
     ("explicit", "daqp"),
@@ -27,8 +27,10 @@ CONTENDERS: tuple[tuple[Route, Solver], ...] = (
 _LONGEST_EXPLICIT = 20
 """The explicit route is left out beyond this horizon: one step takes seconds there."""
 _TURN = 10
-"""Timed ticks of a contender before the next one has its turn: all of them see the same noise. One tick goes
-before them: it finds the caches full of the rival's numbers, which no robot's controller does."""
+"""Timed ticks of a contender before it is the turn of the next one: all contenders see the same noise. An
+untimed tick goes before them: at that tick the caches still hold the data of the previous contender, which
+does not happen on a robot.
+"""
 _DRAG_TICKS = 100
 """Ticks from one drag to the next."""
 _BUDGET_S = 6.0
@@ -78,7 +80,8 @@ def bench(
                     session.tick()
                     if tick > 0 and session.plan is not None:
                         steps[key].append(session.plan.step_us / 1e3)
-                        # The kernel asks no solver, and putting its evidence together is no part of a step.
+                        # The kernel uses no external solver, and collecting its evidence is not part of a
+                        # step.
                         levels = () if key[0] == "compiled" else session.plan.levels
                         solves[key].append(sum(level.qp_us for level in levels) / 1e3)
         timings += [
@@ -91,7 +94,7 @@ def bench(
 
 
 def _drag(session: TorqueSession, tick: int) -> None:
-    """Puts the hand somewhere else now and then, where there is a target to drag."""
+    """Moves the draggable target, if there is one, at regular intervals."""
     target = session.target("position")
     if target is not None and tick % _DRAG_TICKS == _TURN:
         away = 0.2 * np.cos(np.arange(3) + tick)

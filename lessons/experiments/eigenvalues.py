@@ -1,4 +1,4 @@
-"""A run beside the eigenvalues that tell whether time-delay estimation is stable: those of M⁻¹M̄."""
+"""A run with the eigenvalues of M⁻¹M̄, which decide whether time-delay estimation is stable."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class EigenvalueJob(Work):
 
 
 def longest(flags: NDArray[np.bool_]) -> int:
-    """How many in a row are true, at most."""
+    """Length of the longest sequence of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 

@@ -30,16 +30,16 @@ _KEPT_BY: Mapping[type[Session], tuple[str, ...]] = {
     TorqueSession: (*_KEPT, "tau_lower", "tau_upper", "delta_tau"),
     VelocitySession: (*_KEPT, "step"),
 }
-"""What plots need of a run: fields, and beginnings of the fields per task and level."""
+"""The data of a run that plots need: fields, and prefixes of the fields per task and level."""
 
 
 @dataclass(frozen=True)
 class Work(ABC):
-    """Something that ends in a run.
+    """A piece of work whose result is a run.
 
     Attributes:
         spec: what is run.
-        timed: its step times are what it is run for: nothing else runs meanwhile.
+        timed: its purpose is to measure step times; nothing else runs at the same time.
     """
 
     spec: RunSpec
@@ -47,7 +47,7 @@ class Work(ABC):
 
     @abstractmethod
     def do(self) -> JobResult:
-        """The run. Raises InputError for what cannot be."""
+        """The run. Raises InputError for invalid input."""
 
 
 @final
@@ -97,7 +97,7 @@ class JobResult:
 
     @property
     def completed(self) -> bool:
-        """Ran to its end without losing control."""
+        """Whether the run reached its end without losing control."""
         return self.error is None and not self.summary["diverged"]
 
     def figure(self, *path: str | int) -> float:
@@ -134,7 +134,8 @@ def _arrays(recording: Recording) -> dict[str, Array]:
 
 
 def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None = None) -> Results:
-    """Does jobs, equal ones once: on all cores, then the timed ones one after the other in this process.
+    """Runs jobs, equal jobs only once: first on all cores, then the timed jobs one after the other in this
+    process.
 
     Args:
         jobs: what to run.

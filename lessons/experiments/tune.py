@@ -75,7 +75,8 @@ def tune(
         recording = run(replace(scene, settings=settings), seconds, seed)
         error, roughness = _error(recording), _roughness(recording)
         if recording.session.diverged_at is not None:
-            # Before anything worked it is lost for want of estimation, afterwards for too much of it.
+            # Control lost before any satisfactory step means that M̄ is too small, afterwards that it is too
+            # large.
             verdict = "control lost" if kept_control else "too small"
         elif roughness > noise:
             verdict = "noisy"

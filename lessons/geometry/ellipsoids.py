@@ -1,4 +1,4 @@
-"""Manipulability ellipsoids: how fast each level can still move where its hand is."""
+"""Manipulability ellipsoids: how fast each level can still move its frame."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from himpc.tasks import FrameOrientation, FramePosition
 Array = NDArray[np.float64]
 
 _GONE = 1e-6
-"""Directions that joints of unit speed move by less than this, m/s or rad/s, are not there any more."""
+"""Directions in which joints of unit speed move by less than this, m/s or rad/s, count as lost."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What there is to see inside the last tick of a session."""
+"""The QPs of the last tick of a session, for drawing."""
 
 from __future__ import annotations
 

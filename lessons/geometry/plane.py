@@ -21,7 +21,7 @@ from himpc.limits.rows import Kind, Rows
 Array = NDArray[np.float64]
 
 _HELD = 1e-9
-"""N·m: a solution nearer to a cut than this lies in it."""
+"""N·m: a solution nearer to a cut than this counts as lying in it."""
 _MET = 1e-7
 """N·m: what rounding may leave of an equality."""
 
@@ -42,7 +42,7 @@ class TorqueBox:
 
 @dataclass(frozen=True, eq=False)
 class Allowed:
-    """What (33) leaves of the plane: at + span·s. Nothing if `at` is None: the cut misses it.
+    """The part of the plane that (33) allows: at + span·s. It is empty if `at` is None: the cut misses it.
 
     Attributes:
         at: (2,) a point of it, N·m.
@@ -112,8 +112,8 @@ class Plane:
         joints: the two joints, counted from 0.
         box: the bounds.
         levels: highest priority first.
-        weighted: (2,) N·m, what one cost of all tasks would ask for; None if it found nothing.
-        osf: (2,) N·m, what OSF would ask for.
+        weighted: (2,) N·m, the optimum of one weighted cost of all tasks; None if there is none.
+        osf: (2,) N·m, the change of torque that OSF demands.
     """
 
     joints: tuple[int, int]
@@ -228,7 +228,7 @@ def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
     left, sigma, right = np.linalg.svd(A)
     rank = int((sigma > RANK_TOLERANCE * size).sum())
     at = right[:rank].T @ ((left[:, :rank].T @ b) / sigma[:rank])
-    # A distance in N·m that no choice of w can mend.
+    # A distance in N·m that no choice of w can reduce.
     missed = float(np.abs(A @ at - b).max(initial=0.0)) / max(size, 1e-300)
     return Allowed(at if missed <= _MET else None, right[rank:].T)
 
@@ -265,7 +265,9 @@ def _best_on(P: Array, centre: Array, at: Array, along: Array, box: TorqueBox) -
 
 
 def _stretch(at: Array, along: Array, box: TorqueBox) -> tuple[float, float]:
-    """Between which s at + s·along is in the box; the first is greater than the second if nowhere."""
+    """The interval of s in which at + s·along is in the box; the first bound exceeds the second if it is
+    empty.
+    """
     low, high = -np.inf, np.inf
     for axis in (0, 1):
         if abs(along[axis]) < 1e-14:

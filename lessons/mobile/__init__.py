@@ -1,1 +1,1 @@
-"""Where scripts exported before version 0.2 look for events; nothing else does."""
+"""Old place of the events, for scripts exported before version 0.2; no other code uses it."""

@@ -1,4 +1,4 @@
-"""The names that scripts exported before version 0.2 import; nothing else uses them."""
+"""Old import names, for scripts exported before version 0.2; no other code uses them."""
 
 from lessons.events import Appear, InsertTask, Release, RemoveTask
 

@@ -1,3 +1,3 @@
-"""Files of one's own: a Python file is a controller, a scene, a task or a lesson by what it defines.
+"""Users' files: a Python file is a controller, a scene, a task or a lesson, depending on what it defines.
 
-Here it is read, judged and loaded; what is made of it stands above."""
+This package reads, checks and loads such a file; the packages that import this one use the result."""

@@ -1,4 +1,4 @@
-"""A call that may take so long and no longer, by its own doing."""
+"""Calls with a time limit, which counts only the time that the call itself uses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 
 class TooLong(BaseException):
-    """Nothing that code from outside catches by mistake."""
+    """Ends a call; it is a class that user code does not catch by mistake."""
 
 
 def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
@@ -27,11 +27,9 @@ def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs:
 
 @final
 class CallDeadline:
-    """Ends calls that take too long, in the main thread of a POSIX system.
-
-    One that computed all the time does; one that did not may have slept or, on a busy machine, waited for a
-    core, which does not count. How long it waited is asked from the first alarm on, since asking costs as
-    much as a short call.
+    """Ends calls that take too long, in the main thread of a POSIX system. Computing and sleeping count;
+    waiting for a core on a busy machine does not. How long it waited is asked from the first alarm on, since
+    asking costs as much as a short call.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -54,7 +52,7 @@ class CallDeadline:
             signal.signal(signal.SIGALRM, before)
 
     def _begin(self) -> None:
-        """A call begins."""
+        """Starts the time of a call."""
         self._computed = time.thread_time()
         self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
 

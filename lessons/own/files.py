@@ -1,4 +1,4 @@
-"""A Python file of somebody's own: read, executed, and what is wrong with it in one sentence."""
+"""Reads and executes a user's Python file, and reports an error in it as one sentence."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LARGEST = 1_000_000  # bytes
 
 
 def is_file(name: str) -> bool:
-    """Whether what stands where a name is expected is the path of a Python file."""
+    """Whether a text given as a name is the path of a Python file."""
     return name.endswith(SUFFIX)
 
 
@@ -114,7 +114,7 @@ def execute(source: Source) -> ModuleType:
 
 @contextmanager
 def _beside(path: str) -> Iterator[None]:
-    """A file may import what lies beside it, unless that is called as something installed."""
+    """Lets a file import modules from its own folder, except those with the name of an installed module."""
     folder = str(Path(path).absolute().parent)
     sys.path.append(folder)
     try:

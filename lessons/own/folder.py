@@ -1,4 +1,4 @@
-"""Where files of one's own may lie that are named while the program runs, instead of when it is started."""
+"""The folder of the users' files that may be named while the program runs, not only at its start."""
 
 from __future__ import annotations
 

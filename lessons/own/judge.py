@@ -1,4 +1,4 @@
-"""A file is first loaded where it can do no harm: in a process of its own, with a deadline."""
+"""Loads a file first in a separate process with a deadline, where it can do no harm."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def judged(source: Source) -> Kind:
 
 
 LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
-"""What a file may cost before it is known to be harmless."""
+"""Limits for loading a file before it is known to be harmless."""
 
 
 @lru_cache(maxsize=64)
@@ -35,7 +35,7 @@ def _kind(source: Source) -> Kind:
 
 
 def loaded(source: Source) -> ModuleType:
-    """The module of a file that was judged. Raises InputError like `judged`."""
+    """The module of a file, after `judged` has accepted it. Raises InputError like `judged`."""
     judged(source)
     return _loaded(source)
 

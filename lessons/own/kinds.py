@@ -1,4 +1,4 @@
-"""What a file of one's own defines."""
+"""Finds out what a user's file defines."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def expected(module: ModuleType, kind: Kind) -> None:
 
 
 def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
-    """What makes a fresh law of a controller's file. Raises InputError if there is none."""
+    """The function that creates the law of a controller's file. Raises InputError if there is none."""
     expected(module, "controller")
     names = vars(module)
     if "Controller" in names:

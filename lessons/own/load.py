@@ -1,5 +1,6 @@
-"""A file of one's own is loaded within limits: a deadline, no other processes, no signals; what it replaces
-in a library is put back."""
+"""Loads a user's file within limits: a deadline, no other processes, no signals. If the file replaces
+something in a library, the original is restored.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +21,11 @@ from lessons.own.files import Source, execute
 from robots import InputError
 
 LONGEST = 10.0
-"""s that loading a file may take by its own doing."""
+"""s that loading a file may take, without waiting for a core."""
 _REFUSED = ("os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "os.posix_spawn", "os.system",
             "os.spawn", "pty.spawn", "signal.pthread_kill")  # fmt: skip
 _BY_ITSELF = ("subprocess.Popen",)
-"""What an installed package may do while it is imported, and a file of one's own may not."""
+"""Calls that an installed package may make during its import, and a user's file may not."""
 _SHARED = ("builtins", "math", "numpy", "scipy", "pinocchio", "os", "time", "himpc", "robots", "lessons")
 _running: ContextVar[str] = ContextVar("_running", default="")
 
@@ -42,7 +43,7 @@ def alone(path: str) -> Iterator[None]:
 
 @cache
 def _watched() -> None:
-    """An audit hook cannot be taken away again: there is one, which does nothing while no such code runs."""
+    """Installs one audit hook, which cannot be removed; it does nothing while no such code runs."""
     sys.addaudithook(_hook)
 
 
@@ -107,7 +108,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
     thread.start()
     thread.join(seconds)
     if not done:
-        # Where it computes, it ends there; what sleeps in a library ends when it wakes.
+        # Code that computes ends at once; code that sleeps in a library ends when it wakes.
         here = ctypes.c_ulong(thread.ident or 0)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(here, ctypes.py_object(TooLong))
         raise late
@@ -120,7 +121,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
 
 
 def _shared() -> dict[str, dict[str, Any]]:
-    """What functions, classes and modules the lab's own and its libraries' modules name."""
+    """The functions, classes and modules that the modules of the lab and its libraries name."""
     return {
         name: {key: value for key, value in vars(module).items() if _is_code(value)}
         for name, module in list(sys.modules.items())
@@ -133,7 +134,7 @@ def _is_code(value: Any) -> bool:
 
 
 def _restored(before: dict[str, dict[str, Any]]) -> list[str]:
-    """Puts back what is another one now, and names it."""
+    """Restores the objects that were replaced, and returns their names."""
     found = []
     for name, names in before.items():
         module = sys.modules.get(name)

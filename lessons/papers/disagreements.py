@@ -1,4 +1,4 @@
-"""The page "Where we disagree with the papers", made from what was reproduced."""
+"""Makes the page "Where we disagree with the papers" from the reproduced numbers."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ CLOSE = 0.10
 that nothing closer could be expected of a reading."""
 
 TIE = 0.02
-"""An effect within this of where it turns is none."""
+"""An effect that is closer than this to its turning point counts as no effect."""
 
 Verdict = Literal["agrees", "differs", "opposite", "no number", ""]
 Side = Literal["below", "above", "about"]
@@ -60,7 +60,7 @@ class Row:
 
     @property
     def verdict(self) -> Verdict:
-        """How ours stands to the paper's; "" if the paper neither prints nor says anything."""
+        """The verdict on our number against the paper's; "" if the paper neither prints nor says anything."""
         if self.paper is None and self.says is None:
             return ""
         if not math.isfinite(self.ours):

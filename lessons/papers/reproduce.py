@@ -1,4 +1,4 @@
-"""Runs items and writes what came out: `report.md`, `results.json` and the pictures."""
+"""Runs items and writes the results: `report.md`, `results.json` and the pictures."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What was measured before: it judges a new measurement, and stands in for one where nothing is run.
+"""The stored measurements. New measurements are compared with them, and they are shown if nothing is run.
 
 `stored.json` holds, for the whole and for the quick version, the rows and checks of every item as they were
-measured when somebody last looked at all of them. Written by `himpc-lab reproduce --store`.
+measured at the last review. Written by `himpc-lab reproduce --store`.
 """
 
 from __future__ import annotations

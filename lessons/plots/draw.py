@@ -100,7 +100,7 @@ def _draw_lines(axes: Axes, panel: Panel) -> None:
     dotted = (0, (4, 1.5, 1, 1.5))
     for place, bound in enumerate(panel.bounds):
         label = panel.bound_label if place == 0 else ""
-        axes.axhline(bound, color="white", linewidth=1.6, zorder=0.9)  # or the grid fills the gaps
+        axes.axhline(bound, color="white", linewidth=1.6, zorder=0.9)  # otherwise the grid fills the gaps
         axes.axhline(bound, color=BOUND, linewidth=1.2, linestyle=dotted, zorder=1, label=label)
     for place, mark in enumerate(panel.marks):
         label = panel.mark_label if place == 0 else ""
@@ -114,7 +114,7 @@ def _draw_lines(axes: Axes, panel: Panel) -> None:
 
 
 def _positive(values: Iterable[np.ndarray]) -> bool:
-    """Whether a logarithmic axis would have anything to show."""
+    """Whether there is a positive value for a logarithmic axis."""
     return any(bool((each[np.isfinite(each)] > 0).any()) for each in values)
 
 

@@ -1,4 +1,4 @@
-"""One look for every picture: each controller keeps its colour, in tables of contents and in print."""
+"""One style for all pictures: each controller has the same colour everywhere, on the screen and in print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ticks that say the numbers that were used."""
+"""Axis ticks at the values that were used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does not change during a run and an independent replay needs beside its rows."""
+"""Constants of a run that an independent replay needs in addition to its rows."""
 
 from __future__ import annotations
 

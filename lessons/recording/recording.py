@@ -19,7 +19,7 @@ class Recording:
     """The rows of one run, one per control tick, and how long the run took in wall time."""
 
     def __init__(self, session: Session, rows: Sequence[Array], wall_s: float) -> None:
-        # What a session has beside what all have is its kind's, and so is who asks for it.
+        # Attributes that only one kind of session has are used only by code for that kind.
         self.session: Any = session
         self.layout: Layout = session.layout
         self.rows = np.array(rows).reshape(len(rows), session.layout.size)

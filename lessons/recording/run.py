@@ -1,4 +1,4 @@
-"""Running a scene headless, as fast as it goes."""
+"""Runs a scene headless, as fast as possible."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def run(
         the rows.
 
     Raises:
-        InputError: settings or duration cannot be, or a controller of one's own failed.
+        InputError: the settings or the duration are invalid, or a user's controller failed.
     """
     seconds = checked_duration(scene.duration if duration is None else duration)
     return record(begin(scene, seed), seconds, progress, to_the_end)
@@ -48,7 +48,7 @@ def record(
     progress: Callable[[float], None] | None = None,
     to_the_end: bool = False,
 ) -> Recording:
-    """The same of a session that has begun."""
+    """Does the same for a session that has begun."""
     rows, elapsed, started = [], 0.0, perf_counter()
     layout = session.layout
     # Half a period's tolerance: a sum of periods carries rounding.

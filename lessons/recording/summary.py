@@ -1,4 +1,4 @@
-"""What a run amounts to: the object of `himpc-lab run --json`."""
+"""The summary of a run: the object of `himpc-lab run --json`."""
 
 from __future__ import annotations
 

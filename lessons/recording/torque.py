@@ -1,4 +1,4 @@
-"""What a torque-level run amounts to beside what every run has."""
+"""The part of a run's summary that only torque-level runs have."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""What a learner has done so far: as the browser keeps it, and as a text to hand in.
+"""The progress of a learner: in the form that the browser stores, and as a text to hand in.
 
-With a key, which an instructor's lab holds, both carry an HMAC of their content: whoever has the key can tell
-that a lab with the same key wrote them. Without one they carry a sum that only tells damage.
+With the key of an instructor's lab, both contain an HMAC of their content: everybody who has the key can
+verify that a lab with the same key wrote them. Without a key they contain a checksum that only detects
+damage.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def kept(progress: LearnerProgress, key: bytes | None) -> str:
 
 
 def found(text: str | None, key: bytes | None) -> LearnerProgress:
-    """What a browser kept; with a key, nothing that was not written with it."""
+    """The progress that a browser stored; with a key, only progress that is signed with it."""
     if key is None or not text:
         return progress_from(text)
     seal, body = text[:64], text[64:]
@@ -77,7 +78,7 @@ def found(text: str | None, key: bytes | None) -> LearnerProgress:
 
 
 def progress_from(text: str | None) -> LearnerProgress:
-    """From the browser's storage, which anybody may have written: what makes no sense is left out."""
+    """Reads the browser's storage, which anybody may have written; invalid entries are left out."""
     try:
         found = json.loads(text or "{}")
     except (ValueError, RecursionError):
@@ -107,7 +108,7 @@ def _of_lessons(found: Any) -> list[tuple[str, Any]]:
 
 @dataclass(frozen=True)
 class HandedIn:
-    """What leaves the browser.
+    """The text that a learner hands in, as data.
 
     Attributes:
         name: as the learner wrote it.

@@ -1,4 +1,4 @@
-"""A run as a short Python script that repeats it."""
+"""Writes a short Python script that repeats a run."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _arguments(run: RunSpec) -> tuple[str | None, ...]:
 
 
 def _measures_time(settings: SceneSettings, events: Log) -> bool:
-    """Whether the clock on the wall ever decided anything."""
+    """Whether the run depended on measured time at any point."""
     for event in (None, *(event for _, event in events)):
         settings = settings if event is None else settings_after(settings, (event,))
         if settings.measures_time:

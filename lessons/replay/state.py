@@ -1,4 +1,4 @@
-"""A whole setting as data, and as a short code to pass on."""
+"""All settings as data, and as a short code to share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VERSION = 1
 """Of the code; it changes when an older himpc-lab could not read it."""
 
 MAX_CODE = 12_000
-"""Characters: a link or a chat line still carries that."""
+"""Characters: a length that still fits into a link or a chat message."""
 _MAX_TEXT = 60_000
 _MAX_ASSIGNMENTS = 500
 _MAX_ASSIGNMENT = 2_000
@@ -35,7 +35,7 @@ _KEYS = {"scene": "s", "urdf": "r", "tip": "t", "set": "a", "seed": "n", "lesson
 
 @dataclass(frozen=True)
 class State:
-    """Everything that is set, and nothing that has happened.
+    """All settings of a run, without its history.
 
     Attributes:
         run: what differs from the scene's own settings is in its assignments; it has no events and lasts as

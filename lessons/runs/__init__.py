@@ -1,1 +1,1 @@
-"""What a run names is found: scenes and tasks by name, or by the path of a file, which is tried first."""
+"""Finds the scenes and tasks of a run, by name or by the path of a file; files are tried out first."""

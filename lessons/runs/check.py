@@ -1,4 +1,4 @@
-"""Whether the scene of a file can be used, before anything is shown of it."""
+"""Checks the scene of a file before it is shown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes and tasks by name or, where whoever started the program said so, by the path of a file."""
+"""Finds scenes and tasks by name or, if the program was started so, by the path of a file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from lessons.settings.assignments import parse_assignment
 from robots import InputError, Robot
 
 TASK_SCENE = "iiwa14-hold"
-"""Where a task of one's own is tried if no scene is named."""
+"""The scene in which a user's task is tried if no scene is named."""
 
 
 def scene_named(
@@ -86,7 +86,7 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
 
 
 def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
-    """The scene, whose stack may now name the tasks of files as well, if it takes torques.
+    """The scene with the tasks of files added to the kinds that its stack may name, if it takes torques.
 
     Raises:
         InputError: a file cannot be used, or its Jacobian is not the task's.
@@ -95,7 +95,7 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
 
 
 def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
-    """Why a robot cannot have the tasks of some files, by file."""
+    """By file, the error of its task on a robot."""
     found = {}
     for name in files:
         try:

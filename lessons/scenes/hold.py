@@ -21,7 +21,7 @@ def hold_of(name: str) -> TorqueScene:
     """The hold scene of a catalog robot.
 
     The iiwa does not keep the paper's M̄ here: it was tuned for one motion, and in a few per cent of the
-    work space (arm folded above the base) its loop is unstable. A dragged target gets everywhere.
+    work space (arm folded above the base) its loop is unstable. A dragged target can get everywhere.
     """
     robot = load_robot(name)
     if name == "iiwa14":

@@ -1,4 +1,4 @@
-"""The scenes by name, one line each: for lists and menus, which need none of them loaded."""
+"""The names of the scenes with one line each, for lists and menus, which load no scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SCENES: dict[str, str] = {
     "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, upright, while joint 1 swings",
     "iiwa14-circle-paper": "the same circle as the paper most likely ran it: weightless, no velocity limits",
 }
-"""Torque level."""
+"""The torque-level scenes."""
 
 VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
@@ -30,7 +30,7 @@ VELOCITY_SCENES: dict[str, str] = {
     "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
     "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
 }
-"""Velocity level."""
+"""The velocity-level scenes."""
 
 ALL_SCENES: dict[str, str] = SCENES | VELOCITY_SCENES
-"""Either."""
+"""The scenes of both levels."""

@@ -25,12 +25,12 @@ OMEGA = 2 * math.pi / 8
 _ARMATURE = (0.05, 0.05, 0.03)
 
 PLANT = PlantSettings(armature=_ARMATURE, damping=(0.15, 0.1, 0.08), friction=(0.1, 0.08, 0.05))
-"""Geared motors and joint friction, our own choice: the paper does not print the arm's mechanics."""
+"""Armature and joint friction are our choice: the paper does not print the arm's mechanics."""
 
 NOMINAL = NominalSettings(
     mass_scale=0.8, inertia_scale=0.8, armature=tuple(0.8 * value for value in _ARMATURE)
 )
-"""The identified model: everything that is inert 20 % light, friction unknown."""
+"""The nominal model: masses and inertias are 20 % too small, friction is unknown."""
 
 CONFLICT_LIMITS = Limits(velocity_approach=8.0)
 """Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other, and
@@ -129,8 +129,8 @@ def planar3_conflict() -> TorqueScene:
     """`planar3-conflict`, RT2: q₁ is asked to swing by −120°, from where the circle cannot be reached.
 
     Else as `planar3-circle`, with velocity bounds approached more slowly. The paper prints no amplitude; −60°
-    and 170° conflict too (`q1_amplitude_deg`). The plant takes any torque, so that what a controller demands
-    is what happens (`plant.saturate`).
+    and 170° conflict too (`q1_amplitude_deg`). The plant applies any torque, so that the demand of a
+    controller acts unchanged (`plant.saturate`).
     """
     scene = planar3_circle()
     settings = replace(

@@ -1,4 +1,4 @@
-"""A run as data: what the command line, a lesson, a job, a state code and a page all stand on."""
+"""A run as data, which the command line, lessons, jobs, state codes and the page use."""
 
 from __future__ import annotations
 
@@ -49,8 +49,9 @@ class RunSpec:
         return with_tasks(scene, self.tasks)
 
     def prepared(self) -> Scene:
-        """The scene with everything in place but the seed. Raises InputError, one sentence, for what cannot
-        be."""
+        """The scene with everything in place but the seed. Raises InputError with one sentence for an invalid
+        run.
+        """
         return self.applied_to(self.loaded())
 
     def applied_to(self, scene: Scene) -> Scene:

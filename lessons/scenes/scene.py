@@ -1,4 +1,4 @@
-"""What a run starts from, as data: what scenes of both kinds share."""
+"""The start of a run as data: the fields that both kinds of scenes share."""
 
 from __future__ import annotations
 

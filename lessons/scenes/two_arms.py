@@ -1,4 +1,6 @@
-"""The robot with two arms: hands that are dragged, that move as with a tray, and that want apart."""
+"""The scenes of the robot with two arms: dragged hands, hands that move as with a tray, and conflicting
+targets.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,11 @@ START_S, EDGE_S = 0.3, 1.2
 _SCRIPT_S = 0.05
 """s between two places that the script puts the tray's target to."""
 PLANT = PlantSettings(armature=0.1)
-"""Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without, a gripper that holds
-nothing turns so easily that no constant M̄ suits both the wrist and the shoulder."""
+"""Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without armature, the inertia of
+an empty gripper is so small that no constant M̄ suits both the wrist and the shoulder.
+"""
 NOMINAL = NominalSettings(armature=0.1)
-"""M̄ knows of the motors, and so do OSF's and HQP's models. The URDF alone gives the last wrist joint
+"""M̄ includes the armature, and so do the models of OSF and HQP. The URDF alone gives the last wrist joint
 6e-4 kg·m²: its motor then gets 1/180 of the torque that (4) asks for, and swings around its target with 7 %
 of critical damping (2° after 4 s)."""
 _M_BAR = (0.21, 0.87, 0.143, 0.242, 0.118, 0.134, 0.11) * 2
@@ -60,12 +63,12 @@ def baxter_hold() -> TorqueScene:
 
 
 def baxter_tray() -> TorqueScene:
-    """`baxter-tray`: level 1 is the pose of the left hand as the right one sees it; level 2 where a tray
-    would be, which the right hand says, and that it is level; level 3 the posture. A script moves the hands
-    along a square once.
+    """`baxter-tray`: level 1 is the pose of the left hand as the right one sees it; level 2 is the
+    place of the tray, which the right hand defines, and its level attitude; level 3 is the posture. A script
+    moves the hands along a square once.
 
-    There is no tray: nothing weighs anything, and nothing but level 1 keeps the hands together. What a real
-    one would add, a load and the forces between the hands, is not simulated."""
+    The tray is not simulated: it adds no load and no forces between the hands, and only level 1 keeps the
+    hands together."""
     robot, K_p, K_v = _robot()
     levels = (
         Level(_grip(K_p, K_v)),

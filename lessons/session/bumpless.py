@@ -1,4 +1,4 @@
-"""Switching the controller while the robot moves: for a moment both control it."""
+"""Switches the controller while the robot moves: for a short time both controllers act."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
 LONGEST_TICK = 0.5
-"""s that one call may take by its own doing, asleep included; a control period is a millisecond or a few."""
+"""s that one call may take itself, sleep included; a control period is a millisecond or a few."""
 
 
 def controller_of(settings: TorqueSettings, robot: Robot) -> Controller:

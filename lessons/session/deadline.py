@@ -1,4 +1,4 @@
-"""Deadlines: what a tick applies when the controller's torque is not ready in time."""
+"""Deadlines: chooses the torque that a tick applies if the controller's torque is not ready in time."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ Array = NDArray[np.float64]
 
 
 class DelayedTorque:
-    """Where a late torque waits for the next tick: a queue of one.
+    """A queue of length one, in which a late torque waits for the next tick.
 
-    A tick whose torque is in time applies it, and what waited is thrown away: nothing old ever acts after
-    something newer. A tick whose torque is late applies what waits, or, if nothing does, holds the torque of
-    the tick before; its own torque then waits. So one late tick costs one tick of holding, and of two late
-    ones in a row the second applies the first one's torque: a controller that is always late acts exactly
-    like one whose torque is delayed by one tick. However late it is, it waits no longer than one tick.
+    A tick whose torque is in time applies it and discards the waiting torque: an old torque never acts after
+    a newer one. A tick whose torque is late applies the waiting torque or, if there is none, holds the torque
+    of the previous tick; its own torque then waits. So one late tick costs one tick of holding, and of two
+    late ones in a row the second applies the first one's torque: a controller that is always late acts
+    exactly like one whose torque is delayed by one tick. However late it is, it waits at most one tick.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A ghost: a session that lives through what another one lives through, with some settings of its own."""
+"""A ghost: a session that gets the same events as another session, but has some different settings."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def ghost_scene(scene: Scene, leader: SceneSettings, own: Sequence[str]) -> Scen
 
 
 class GhostDriver:
-    """Runs a ghost's session up to where the leader is, with each event at the tick at which the leader took
-    it.
+    """Runs a ghost's session up to where the leader is, and applies each event at the same tick as the
+    leader.
 
-    The ghost's settings are, at any time, the leader's with its own assignments on top: a leader that
-    changes what defines the difference changes nothing here, whatever else it changes is changed here, too.
-    With no assignments the rows are the leader's to the last bit.
+    The ghost's settings are, at any time, the leader's with its own assignments on top: if the leader changes
+    a setting that the ghost assigns itself, the ghost does not change; every other change applies to the
+    ghost, too. With no assignments the rows are the leader's to the last bit.
 
-    A reset is taken as soon as it is heard of, even if the follower had not yet come to where the leader was.
+    A reset takes effect at once, even if the ghost had not yet reached the leader's time.
     """
 
     def __init__(self, session: Session, leader: SceneSettings, own: Sequence[str]) -> None:
@@ -56,12 +56,13 @@ class GhostDriver:
 
     @property
     def behind(self) -> float:
-        """s of the leader's time that are still to be run."""
+        """s by which the ghost is behind the leader."""
         return max(0.0, self._until - self.session.t)
 
     def hear(self, script: Iterable[tuple[float, Event]], until: float) -> None:
-        """What the leader's log gained, and the time the leader has come to, s: an event of earlier than
-        that will not come any more."""
+        """Receives the new events of the leader's log and the leader's present time, s; later calls bring no
+        event from before that time.
+        """
         self._script.extend(script)
         self._until = until
         self._skip_to_reset()
@@ -92,7 +93,7 @@ class GhostDriver:
         settings = self._leader = before.after(event)
         try:
             found = _with(self._scene, settings, self._own).settings
-            # A leader that sets what it had already tells its controller all the same: so does a ghost.
+            # A leader configures its controller even if a setting does not change; so does a ghost.
             if found != self.session.settings or settings == before:
                 self.session.adopt(found)
         except InputError as error:
@@ -100,7 +101,7 @@ class GhostDriver:
 
 
 def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
-    """What leader and ghost get when they change sides.
+    """The settings of leader and ghost after they are exchanged.
 
     Args:
         settings: the leader's.

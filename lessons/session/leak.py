@@ -1,4 +1,4 @@
-"""What only someone who knows the plant's inertia can tell."""
+"""Measures the leak between levels, for which the plant's inertia must be known."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ Array = NDArray[np.float64]
 
 
 def dynamic_leak(M: Array, done: AtOnce) -> float:
-    """max over p of ‖J_p M⁻¹(τ − τ_{≤p})‖∞ with the plant's M: what lower levels really do to level p.
+    """max over p of ‖J_p M⁻¹(τ − τ_{≤p})‖∞ with the plant's M: the true effect of the lower levels on level
+    p.
 
     Args:
         M: the plant's mass matrix, (n, n).

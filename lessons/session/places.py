@@ -1,4 +1,4 @@
-"""Where a torque-level session writes into a row of telemetry."""
+"""The indices of the fields that a torque-level session writes into a row of telemetry."""
 
 from __future__ import annotations
 

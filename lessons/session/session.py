@@ -1,4 +1,4 @@
-"""The headless loop, whatever its kind: one scene, one controller, one plant, one mailbox."""
+"""The headless loop of both kinds of scenes: one scene, one controller, one plant, one mailbox."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Session(ABC):
         plant: the simulation.
         plan: the last plan, None before the first tick.
         diverged_at: simulated time at which control was lost, s; None if it was not.
-        failure: why the code of one's own does not control any more, one sentence; None as long as it does.
+        failure: one sentence on why the user's code no longer controls the robot; None as long as it does.
         notices: sentences for the learner (refused events, divergence); drain them.
         log: (time, event) of every event that took effect.
     """
@@ -71,12 +71,12 @@ class Session(ABC):
     @property
     @abstractmethod
     def between(self) -> bool:
-        """Whether a control period has begun and is not over: what is posted now has to wait for its end."""
+        """Whether a control period is in progress: events that are posted now wait for its end."""
 
     @property
     @abstractmethod
     def over(self) -> bool:
-        """Whether there is nothing left to do, which ends a headless run."""
+        """Whether the run is complete, which ends a headless run."""
 
     @abstractmethod
     def advance(self) -> Array | None:
@@ -90,7 +90,7 @@ class Session(ABC):
         return row
 
     def reset(self) -> None:
-        """Back to the scene's start with the settings as they are."""
+        """Returns to the scene's start and keeps the settings."""
         self.diverged_at = self.failure = None
         self._script = deque(self.scene.events)
 
@@ -107,8 +107,9 @@ class Session(ABC):
         self._mailbox.append(event)
 
     def drain(self) -> None:
-        """Lets what waits in the mailbox take effect now, without time passing. A control period does it by
-        itself; a page that is paused does it to show a change at once."""
+        """Applies the events in the mailbox now; simulated time does not advance. A control period calls this
+        itself; a paused page calls it to show a change at once.
+        """
         while self._script and self._script[0][0] <= self.t + 1e-9:
             self._mailbox.append(self._script.popleft()[1])
         while self._mailbox:
@@ -132,7 +133,9 @@ class Session(ABC):
 
     @abstractmethod
     def _happen(self, event: Event) -> None:
-        """An event that changes no settings. Raises InputError for one that this kind does not know."""
+        """Carries out an event that changes no settings. Raises InputError for an event that this kind does
+        not have.
+        """
 
     @abstractmethod
     def adopt(self, settings: Any) -> None:
@@ -143,7 +146,7 @@ class Session(ABC):
 
     @property
     def settings_now(self) -> SceneSettings:
-        """The settings in force, and what else of the run a scene can begin with."""
+        """The settings in force, including the state of the run that a scene can start with."""
         return self.settings
 
     @abstractmethod

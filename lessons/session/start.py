@@ -15,9 +15,9 @@ SESSIONS: Mapping[type[Scene], type[TorqueSession] | type[VelocitySession]] = {
     TorqueScene: TorqueSession,
     VelocityScene: VelocitySession,
 }
-"""What runs a scene of each kind."""
+"""The session class for each kind of scene."""
 
 
 def begin(scene: Scene, seed: int = 0) -> Session:
-    """A scene from its beginning. Raises InputError if its settings do not fit its robot."""
+    """Starts a session for a scene. Raises InputError if its settings do not fit its robot."""
     return SESSIONS[type(scene)](scene, seed)  # pyright: ignore[reportArgumentType]

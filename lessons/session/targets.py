@@ -1,4 +1,4 @@
-"""The hand on a target: where it starts, and what it may be moved to."""
+"""Draggable targets: their start, and the values to which they may be moved."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def target_at(task: Task, value: Array) -> Target:
 
 
 def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
-    """The reference of a task that goes on under a stack of its own making: what the scene gives it, if that
-    has the task's coordinates, else a draggable target at `value`.
+    """The reference of a task in a changed stack: the scene's reference if it has the task's coordinates,
+    else a draggable target at `value`.
 
     Args:
         task: the task.
@@ -70,7 +70,7 @@ def carried(old: Task, reference: Reference, task: Task, value: Array) -> Refere
 def move_target(
     tasks: Mapping[str, Task], references: Mapping[str, Reference], name: str, value: tuple[float, ...]
 ) -> None:
-    """Puts a task's target somewhere: position, point or distance (m), quaternion (x y z w) or joints (rad).
+    """Moves a task's target: position, point or distance (m), quaternion (x y z w) or joints (rad).
 
     Raises:
         InputError: no such task, a reference that is no target, or a value that does not fit the task.

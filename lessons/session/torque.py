@@ -32,7 +32,7 @@ from robots import InputError, Plant, Robot, convergence_gauge
 Array = NDArray[np.float64]
 
 TRUTH_TICKS = 20
-"""What needs the plant's M (the gauge of M̄ and the honest leak) is refreshed every so many ticks."""
+"""Ticks between two updates of the values that need the plant's M (gauge of M̄, true leak)."""
 
 LOST_POSITION = 0.5
 """m: a level-1 position error above this counts as divergence."""
@@ -192,8 +192,7 @@ class TorqueSession(Session):
         self.controller = Handover(self.controller, taking)
 
     def renew(self) -> None:
-        """The code of one's own was changed: it takes over without a bump. Raises InputError if it is wrong;
-        the one before goes on."""
+        """Switches to the user's changed code without a bump. InputError if it is wrong; the old stays."""
         self._hand_over(self._controller_of(self.settings, self.robot))
         self.failure = None
 
@@ -228,12 +227,12 @@ class TorqueSession(Session):
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
             if wild or self._is_far(row):
-                # A hand that drags a target out of reach loses level 1, too: that is no notice.
+                # A target dragged out of reach makes the level-1 error large, too: no notice.
                 self._lost(t, notice=wild)
         return row
 
     def _true(self, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> tuple[float, float, float]:
-        """What only the plant's M can tell: the honest leak and the gauge of M̄, held between refreshes."""
+        """The values that need the plant's M: the true leak and the gauge of M̄, held between updates."""
         if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
             done = None
@@ -253,12 +252,12 @@ class TorqueSession(Session):
         return self.plant.broken or not slow or not math.isfinite(q.dot(q))
 
     def _is_far(self, row: Array) -> bool:
-        """Level 1 is lost."""
+        """Whether level 1 is lost."""
         errors = (row[where] for where in self._hands)
         return any(error.dot(error) > LOST_POSITION**2 for error in errors)
 
     def _first_hands(self) -> tuple[slice, ...]:
-        """Where the errors of the position tasks of the first level that is on stand in a row."""
+        """Columns with the errors of the position tasks of the first enabled level."""
         first = next((level.tasks for level in self.settings.levels if level.enabled), ())
         return tuple(
             self.layout.fields[f"error/{task.name}"] for task in first if isinstance(task, FramePosition)
@@ -287,7 +286,7 @@ class TorqueSession(Session):
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per enabled level the directions it gets where the robot is now, and its rows."""
+        """Per enabled level the number of directions it can control now, and its rows."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 

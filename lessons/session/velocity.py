@@ -59,13 +59,13 @@ class VelocitySession(Session):
         self.layout = layout_of(scene.robot, scene.settings.htmpc.stack)
         self._row = np.full(self.layout.size, np.nan)
         self.plant = VelocityPlant(scene.robot, scene.settings.plant, seed)
-        # What does not fit the robot is refused here, not at the first tick.
+        # Settings that do not fit the robot are refused here, not at the first tick.
         make_velocity_controller(scene.settings.controller, scene.robot, scene.settings.htmpc)
         self.reset()
 
     @property
     def t(self) -> float:
-        # Adding up command periods must not put a tick a rounding before the moment it stands for.
+        # The rounding of added command periods must not put a tick before its exact time.
         return round(self.plant.t, 9)
 
     def reset(self) -> None:
@@ -182,7 +182,7 @@ class VelocitySession(Session):
         return self._row
 
     def _decide(self) -> Commands:
-        """From events and state to a plan; writes what is known at the period's start."""
+        """Computes a plan from events and state; writes the fields that are known at the period's start."""
         self.drain()
         settings = self.settings
         t, q, v = self.t, self.plant.q, self.plant.v
@@ -210,7 +210,7 @@ class VelocitySession(Session):
         return Commands(plan, htmpc.period, self._commanded)
 
     def _finish(self, row: Array, commands: Commands) -> None:
-        """What the period brought."""
+        """Writes the fields that are known at the end of the period."""
         fields, U = self.layout.fields, commands.plan.motion.U
         row[fields["tau"]] = row[fields["tau_demand"]] = commands.last
         row[fields["acceleration"]], row[fields["clearance"]] = commands.sharpest, self._nearest
@@ -248,7 +248,9 @@ class VelocitySession(Session):
         return where(Configuration(self.robot, self._data, q, v), self.roles)
 
     def _is_wild(self, row: Array) -> bool:
-        """Not finite or far too fast. A large error is no sign here: missions send the robot metres away."""
+        """Whether the state is not finite or far too fast. A large error does not count: missions have goals
+        metres away.
+        """
         fields = self.layout.fields
         fastest = float((np.abs(row[fields["v"]]) / self.robot.v_limit).max())
         # A comparison with NaN is false, so "not within" also catches what is not finite.

@@ -65,7 +65,7 @@ FALLBACKS = ("solve", "widened", "keep")
 
 
 def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
-    """Writes what a plan knows into a row filled with NaN; a level that is no role's is left out.
+    """Writes the values of a plan into a row filled with NaN; a level without a role is left out.
 
     delta: δ of (12), m (or rad). It gives `bound`, what the levels below leave of a level's error at knot 1:
     ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such bound.
@@ -99,7 +99,7 @@ def write_truth(
     places: Mapping[str, int],
     references: Mapping[str, Reference],
 ) -> None:
-    """Writes where the points really are, what is asked of them now, and how far apart the two are.
+    """Writes the true positions of the points, their present references, and the errors.
 
     places: of the roles in the window, 1 the first; references: of the same roles.
     """

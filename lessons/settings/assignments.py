@@ -1,4 +1,4 @@
-"""Settings told as assignments "PATH=VALUE": read, written, and what differs between two of them."""
+"""Settings as assignments "PATH=VALUE": reads them, writes them, and finds the difference of two settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people are told of a setting: its label, unit, help and the usual range, one row per setting."""
+"""The description of a setting for users: one row with its label, unit, help text and usual range."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from functools import cached_property
 
 @dataclass(frozen=True)
 class Entry:
-    """A row of a table of settings. What a setting may be at all stands beside its field, see
-    `robots.ranges`; here is what one usually tries.
+    """A row of a table of settings. The allowed values of a setting are declared at its field, see
+    `robots.ranges`; this row gives the usual values.
 
     Attributes:
         path: as of `--set`; "*" stands for a name: "levels.*.Q".
@@ -22,7 +22,7 @@ class Entry:
         shown: the unit that the page shows instead, empty: `unit`.
         factor: how many of `shown` one `unit` is.
         tries: values worth comparing, as typed; the first is seldom a scene's own.
-        name: instead of the label where no heading says what it belongs to.
+        name: used instead of the label where no heading names the group.
     """
 
     path: str

@@ -1,4 +1,4 @@
-"""What can be set, as a list for people: the table of settings with what is allowed and what is now."""
+"""The list of all settings for users, with their allowed and present values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the velocity-level scenes ask of the robot: each scene's choices, and the mission they make."""
+"""The missions of the velocity-level scenes: the options of each scene, and the mission made from them."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class MissionOptions(ABC):
 
     @property
     def decoupled(self) -> bool:
-        """Whether the arm stands still while the base has its task, and the other way round."""
+        """Whether base and arm move in turns: one of them stands still while the other has its task."""
         return False
 
     def person(self, task: str) -> int | None:
-        """Which person a task of the mission goes to, 0 the first; None: to nobody."""
+        """The person that a task of the mission visits, 0 the first; None: nobody."""
         return None
 
 
@@ -75,7 +75,7 @@ class ArchitectureOptions(MissionOptions):
     base_at_rest: bool = False
 
     def __post_init__(self) -> None:
-        """Raises InputError for choices that cannot be."""
+        """Raises InputError for invalid options."""
         check_fields(self)
 
     @property
@@ -178,9 +178,9 @@ CRUISE = 0.5
 HAND_TOLERANCE = 0.02
 """m: a task of the EE is completed within this distance of its goal, whatever the architecture."""
 REST = 0.02
-"""m/s: what is slower is at rest."""
+"""m/s: a slower base counts as at rest."""
 _ANYWHERE = 100.0
-"""m: more than a scene is wide."""
+"""m: larger than any scene."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The settings one most often compares: those whose entry has values worth trying."""
+"""The settings that are most often compared: those whose entry lists values to try."""
 
 from __future__ import annotations
 

@@ -66,18 +66,18 @@ class SceneSettings(ABC):
     """Everything a learner can change of a scene; subclasses are frozen trees of frozen data."""
 
     entries: ClassVar[tuple[Entry, ...]]
-    """What people are told of every path."""
+    """The description of every path for users."""
     controller: str
     levels: Stack
-    """Highest priority first."""
+    """The levels, highest priority first."""
     T_s: float
     """Control period, s."""
     horizon: int
     """N, knots."""
     options: Any
-    """The scene's own choices, None if it has none."""
+    """The options of the scene; None if it has none."""
     plant: Any
-    """What the plant really is."""
+    """The parameters of the simulated plant."""
 
     @property
     @abstractmethod
@@ -91,15 +91,16 @@ class SceneSettings(ABC):
 
     @abstractmethod
     def places(self) -> dict[str, Place]:
-        """Where every path leads, by path."""
+        """The place of every path."""
 
     def elements(self, path: str) -> int:
         """How many numbers a path has that can be changed one by one, as "M_bar.3"; 0: none."""
         return 0
 
     def place(self, path: str) -> Place:
-        """Where a path leads, one that stands in no list as well. Raises InputError, naming the nearest, for
-        one that leads nowhere."""
+        """The place of a path, also of a path that no list contains. Raises InputError, which names the
+        nearest path, for an unknown one.
+        """
         places = self.places()
         if path in places:
             return places[path]
@@ -112,7 +113,7 @@ class SceneSettings(ABC):
         return places[whole].element(int(at) - 1, count)
 
     def entry(self, path: str) -> Entry:
-        """What people are told of a path."""
+        """The description of a path for users."""
         return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
@@ -124,11 +125,11 @@ class SceneSettings(ABC):
         return []
 
     def takes(self, event: Event) -> bool:
-        """Whether an event changes settings, not only what the robot is to do."""
+        """Whether an event changes settings and not only the robot's task."""
         return isinstance(event, Set)
 
     def after(self, event: Event) -> Self:
-        """What an event leaves of the settings when the run is reset. Raises InputError like `changed`."""
+        """The settings that remain after an event when the run is reset. Raises InputError like `changed`."""
         return self.changed(event.path, event.value) if isinstance(event, Set) else self
 
     def changed(self, path: str, value: Any) -> Self:

@@ -1,4 +1,4 @@
-"""The stack as a setting: told as data, and read from data."""
+"""The stack as a setting: converts it to data and back."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _EXAMPLE = 'stack=[{"task": "position", "axes": "xyz"}, {"task": "posture"}]'
 
 
 Own = Mapping[str, Task]
-"""Tasks of files of one's own, by the path of the file: words for kinds that nobody else has."""
+"""Tasks of users' files by the path of the file; they are kinds in addition to the built-in ones."""
 NONE: Own = MappingProxyType({})
 
 
@@ -65,7 +65,7 @@ def told(stack: Stack, own: Own = NONE) -> list[dict[str, Any]]:
 
 
 def same_tasks(one: Stack, other: Stack) -> bool:
-    """Whether two stacks have the same levels of the same tasks, whatever their order, gains and weights."""
+    """Whether two stacks have the same levels with the same tasks; order, gains and weights do not count."""
     return _tasks(one) == _tasks(other)
 
 
@@ -145,7 +145,7 @@ def fields_of(of: type[Task], given: Mapping[str, Any], what: str) -> dict[str, 
 
 
 def _gains(of: type[Task], name: str, before: Stack) -> dict[str, Any]:
-    """Those of the task of that name, else those of the first task: they suit the robot."""
+    """The gains of the task of that name, else those of the first task, which suit the robot."""
     known = {task.name: task for level in before for task in level.tasks}
     like = known.get(name) or next(iter(known.values()), None)
     own = {each.name: each.default for each in fields(of)}
@@ -155,7 +155,7 @@ def _gains(of: type[Task], name: str, before: Stack) -> dict[str, Any]:
 
 
 def _free(word: str, suffixes: tuple[str, ...], taken: list[str]) -> str:
-    """The kind's word, with a number behind it where it is taken."""
+    """The kind's name, followed by a number if that name is taken."""
     word = "rest" if word == DAMPING_LEVEL.name else word
     names = (word, *(f"{word}_{count}" for count in range(2, 2 * MOST_TASKS)))
     return next(name for name in names if not {name + suffix for suffix in suffixes} & set(taken))
@@ -199,7 +199,7 @@ def quoted(value: Any) -> str:
 
 
 def one(value: Any) -> Any:
-    """One number for all coordinates, whose number is about to change."""
+    """One value for all coordinates, whose number is about to change."""
     return value[0] if isinstance(value, tuple) else value
 
 

@@ -1,4 +1,4 @@
-"""What may be done to a stack while the robot moves, part by part."""
+"""The changes of a stack that are allowed while the robot moves."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def add(stack: Stack, value: Any, own: Own = NONE) -> Stack:
 
 
 def remove(stack: Stack, value: Any) -> Stack:
-    """Without the task of that name; a level that is left without tasks goes, too."""
+    """The stack without the task of that name; a level that has no tasks left is removed, too."""
     at, task = _find(stack, value)
     rest = tuple(each for each in stack[at].tasks if each is not task)
     kept = (replace(stack[at], tasks=rest, Q=one(stack[at].Q)),) if rest else ()
@@ -47,7 +47,7 @@ def remove(stack: Stack, value: Any) -> Stack:
 
 
 def rename(stack: Stack, value: Any) -> Stack:
-    """[OLD, NEW] names of a task."""
+    """Renames a task: [OLD, NEW]."""
     if not isinstance(value, (list, tuple)) or len(value) != 2:
         raise InputError(f"stack.rename is {quoted(value)}: give the old and the new name, [OLD, NEW]")
     at, task = _find(stack, value[0])
@@ -94,7 +94,7 @@ def merge(stack: Stack, value: Any) -> Stack:
 CHANGES: Mapping[str, Callable[[Stack, Any], Stack]] = {
     f"stack.{change.__name__}": change for change in (add, remove, rename, edit, split, merge)
 }
-"""What may be done to a stack, by the path that does it."""
+"""The allowed changes of a stack, by path."""
 
 
 def _find(stack: Stack, name: Any) -> tuple[int, Task]:

@@ -40,7 +40,7 @@ from robots.ranges import Range, check_fields, field_types
 
 @dataclass(frozen=True)
 class SceneOptions(ABC):
-    """What a scene lets one choose about its motion: a subclass has one field per choice, with its default.
+    """The options of a scene's motion: a subclass has one field per option, with its default.
 
     Each field is a path of its own (`--set smooth=true`). A change takes effect when a run starts.
     """
@@ -62,12 +62,12 @@ class TorqueSettings(SceneSettings):
         M_bar: diagonal of M̄ before scaling.
         M_bar_scale: factor on all of it.
         M_bar_adapt: let the controller fit it to the payload, see `himpc.controllers.adaptation`.
-        nominal: what model-based controllers believe the plant to be.
+        nominal: the plant as the nominal model of model-based controllers describes it.
         deadline_ms: a torque that is found later than this after its tick began acts one tick later; see
-            `lessons.session.deadline`. 0: lockstep, time stands still while the controller computes.
+            `lessons.session.deadline`. 0: lockstep, simulated time waits while the controller computes.
         solve_ms_per_knot: how long the computer is assumed to take for each of the N knots, so that runs are
             the same everywhere. 0: the time it really takes, and then no two runs are the same.
-        plant: what the plant really is.
+        plant: the parameters of the simulated plant.
         options: the scene's own choices, if it has any.
         files: Python files of one's own that may be its controller. No path reaches them: what comes from
             elsewhere (a code, a page) must not choose which files are run.
@@ -101,7 +101,7 @@ class TorqueSettings(SceneSettings):
         return CONTROLLERS | dict.fromkeys(self.files, "a controller of your own, in a file of this machine")
 
     def for_controller(self) -> ControllerSettings:
-        """The controller's part. Raises InputError for values that cannot be."""
+        """The controller's part. Raises InputError for invalid values."""
         if self.controller not in self.controllers:
             raise unknown_name("controller", self.controller, by_name(self.controllers))
         check_fields(self)
@@ -122,7 +122,7 @@ class TorqueSettings(SceneSettings):
     def is_late(self, measured_ms: float) -> bool:
         """Whether a torque that took so long to compute misses its deadline."""
         assumed = self.solve_ms_per_knot * self.horizon
-        # N times a decimal fraction must not miss a deadline that it exactly meets.
+        # Rounding of N times a decimal fraction must not make a torque late that exactly meets its deadline.
         return 0.0 < self.deadline_ms < (assumed or measured_ms) - 1e-9
 
     @property
@@ -213,7 +213,7 @@ _PARTS = ("limits", "nominal", "plant")
 
 
 def _now(route: Any) -> Any:
-    """Codes and scripts of earlier versions may name a route that another one took the place of."""
+    """Codes and scripts of earlier versions may name a route that was replaced."""
     return "compiled" if route == "structured" else route
 
 

@@ -1,35 +1,36 @@
-"""The settings of torque-level scenes, for people."""
+"""Label, unit, help text and usual range of every setting of torque-level scenes."""
 
 from __future__ import annotations
 
 from lessons.settings.entry import Entry
 
-_BELIEVED = "What model-based controllers believe of it"
+_BELIEVED = "Value in the nominal model, which model-based controllers use"
 
 TORQUE_ENTRIES = (
     Entry("controller", "Controller",
-          "Switch while the robot moves: in a few tenths of a second the torque goes over to the other one"),
-    Entry("horizon", "N", "Knots the controller looks ahead; 1 is the inverse dynamics hierarchy", low=1,
-          high=30, tries=("1", "2", "5", "10", "20"), name="horizon N"),
-    Entry("T_s", "T_s", "Control period, and the budget of every control step", "s", 0.5, 5.0, 0.5,
+          "You can switch the controller while the robot moves; the torque changes over to the new "
+              "controller within a few tenths of a second"),
+    Entry("horizon", "N", "Number of knots of the prediction horizon; 1 is the inverse dynamics hierarchy",
+          low=1, high=30, tries=("1", "2", "5", "10", "20"), name="horizon N"),
+    Entry("T_s", "T_s", "Control period; also the time allowed for each control step", "s", 0.5, 5.0, 0.5,
           shown="ms", factor=1e3, tries=("0.002", "0.004", "0.001"), name="control period T_s, s"),
     Entry("deadline_ms", "Due after",
-          "A torque that is found later acts one tick later; until then the one before is held. 0: "
-              "lockstep, time stands still while the controller computes",
+          "A torque that is computed later than this acts one tick later; until then the previous torque is "
+              "held. 0: simulated time waits while the controller computes",
           "ms", 0.0, 5.0, 0.1),
     Entry("solve_ms_per_knot", "Per knot",
-          "What the computer is assumed to take, times N. 0: what this one really takes", "ms", 0.0, 0.5,
-          0.01),
+          "Assumed computing time per knot of the horizon. 0: the measured computing time of this computer",
+          "ms", 0.0, 0.5, 0.01),
     Entry("M_bar_scale", "M̄ scale", "One factor on the whole diagonal of M̄", "", 0.1, 5.0, 0.05,
           tries=("4", "2", "1", "0.5")),
-    Entry("M_bar_adapt", "M̄ looks after itself",
-          "The controller finds the payload from the torque that gravity asks for, and sets M̄ as large as "
+    Entry("M_bar_adapt", "M̄ adapts to the payload",
+          "The controller estimates the payload from the torque against gravity, and sets M̄ as large as "
               "the nominal model with that payload allows",
           tries=("true", "false"), name="M̄ adapts"),
     Entry("M_bar", "M̄", "The diagonal of M̄, one number per joint, before scaling", "kg·m²"),
     Entry("limits.position", "Position",
-          "viability: a speed from which the joint can still stop. paper: the rows as printed, which a "
-              "few milliseconds of horizon cannot keep: the list of rungs shows it.",
+          "viability: limits the speed to one from which the joint can still stop. paper: the rows as "
+              "printed, which a horizon of a few milliseconds cannot keep; the list of fallbacks shows it.",
           tries=("paper", "off", "viability"), name="position limits"),
     Entry("limits.torque", "Torque", "Impose the torque limits, (32f)", name="torque limits"),
     Entry("limits.velocity", "Velocity", "Impose the velocity limits, (32e)", name="velocity limits"),
@@ -38,58 +39,65 @@ TORQUE_ENTRIES = (
     Entry("limits.velocity_scale", "Velocity scale", "One factor on the robot's velocity limits", "", 0.05,
           2.0, 0.01),
     Entry("limits.velocity_approach", "Approach",
-          "How fast a velocity bound may be approached, as a share of the distance left; 0: (32e) as printed",
+          "Largest rate at which a joint may approach its velocity bound, relative to the remaining "
+              "distance; 0: (32e) as printed",
           "1/s", 0.0, 100.0, 1.0),
-    Entry("route", "Route", "Two ways to the same torque"),
-    Entry("solver", "QP solver", "For the QPs with active bounds; qpoases needs the extra 'bench'"),
-    Entry("R_on", "R weighs", "Δτ as printed, or M̄⁻¹Δτ"),
+    Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
+    Entry("solver", "QP solver", "Solver of the QPs with active bounds; qpoases needs the extra 'bench'"),
+    Entry("R_on", "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ"),
     Entry("damping", "Damp what no level controls",
           "R weighs changes of torque only, so a direction without a task keeps its torque and runs away "
-              "when pushed. This last level brings it to rest. Switch it off and push.",
+              "when pushed. This last level brings it to rest. To see the effect, switch it off and push "
+              "the robot.",
           tries=("false", "true"), name="damping level"),
     Entry("order", "Order", "The levels, highest priority first: a,b,c or a list"),
     Entry("stack", "Stack",
           "The levels with their tasks, highest priority first, as a list; see himpc.tasks.KINDS"),
-    Entry("Q", "Q", "Weight of the residual, of all levels at once", "", 1.0, 1000.0, 1.0),
-    Entry("R", "R", "Weight of the changes of torque, of all levels at once", "", 0.1, 100.0, 0.1),
-    Entry("levels.*.enabled", "Enabled", "Whether it takes part", tries=("false", "true"), name="level * on"),
+    Entry("Q", "Q", "Weight of the residual; sets all levels at once", "", 1.0, 1000.0, 1.0),
+    Entry("R", "R", "Weight of the changes of torque; sets all levels at once", "", 0.1, 100.0, 0.1),
+    Entry("levels.*.enabled", "Enabled", "Whether the level takes part", tries=("false", "true"),
+          name="level * on"),
     Entry("levels.*.Q", "Q", "Weight of the residual", "", 1.0, 1000.0, 1.0,
           tries=("20", "100", "200", "500", "2000"), name="Q of *"),
     Entry("levels.*.R", "R", "Weight of the changes of torque", "", 0.1, 100.0, 0.1,
           tries=("1", "10", "100", "1000"), name="R of *"),
     Entry("levels.*.horizon", "Own N",
-          "Knots this level looks ahead, at most N (Remark 8); null: all of them", name="N of *"),
+          "Number of knots in this level's horizon, at most N (Remark 8); null: N", name="N of *"),
     Entry("levels.*.K_p", "K_P", "Stiffness of all tasks of the level", "1/s²", 0.0, 1000.0, 1.0),
     Entry("levels.*.K_v", "K_V", "Damping of all tasks of the level", "1/s", 0.0, 100.0, 0.5),
     Entry("tasks.*.K_p", "K_P", "Stiffness", "1/s²", 0.0, 1000.0, 1.0, name="K_P of *"),
     Entry("tasks.*.K_v", "K_V", "Damping", "1/s", 0.0, 100.0, 0.5, name="K_V of *"),
     Entry("plant.payload_kg", "Payload", "A mass at the hand that the controller does not know", "kg", 0.0,
           10.0, 0.1, tries=("3", "1", "2", "5", "0"), name="payload, kg"),
-    Entry("plant.friction", "Coulomb friction", "The same at every joint", "N·m", 0.0, 10.0, 0.1),
-    Entry("plant.damping", "Viscous friction", "The same at every joint", "N·m·s/rad", 0.0, 10.0, 0.1),
+    Entry("plant.friction", "Coulomb friction", "Coulomb friction of every joint", "N·m", 0.0, 10.0, 0.1),
+    Entry("plant.damping", "Viscous friction", "Viscous friction of every joint", "N·m·s/rad", 0.0, 10.0,
+          0.1),
     Entry("plant.armature", "Armature", "Reflected inertia of the motors", "kg·m²", 0.0, 1.0, 0.01),
     Entry("plant.mass_scale", "Mass scale", "Factor on the mass of every link", "", 0.2, 3.0, 0.05),
     Entry("plant.inertia_scale", "Inertia scale", "Factor on the rotational inertia of every link",
           "", 0.2, 3.0, 0.05, tries=("0.8", "1.2", "1"), name="true inertias ×"),
     Entry("plant.diagonal_scale", "M(q) diagonal scale",
-          "Factor on the diagonal of M(q) alone, the letter of the paper's Table V: no real arm is like this",
+          "Factor on the diagonal of M(q) alone, as the paper's Table V literally says; no real arm is "
+              "like this",
           "", 0.5, 2.0, 0.05),
-    Entry("plant.encoder_resolution_deg", "Encoder", "Resolution of the joint sensors, 0: ideal", "°", 0.0,
-          20.0, 0.25, shown="10⁻³ °", factor=1e3, tries=("0.005", "0.001", "0.01", "0"),
+    Entry("plant.encoder_resolution_deg", "Encoder", "Resolution of the joint sensors; 0: ideal sensors",
+          "°", 0.0, 20.0, 0.25, shown="10⁻³ °", factor=1e3, tries=("0.005", "0.001", "0.01", "0"),
           name="encoder resolution, °"),
     Entry("plant.torque_lag_ms", "Torque lag", "First-order lag of the motors", "ms", 0.0, 20.0, 0.5),
-    Entry("plant.delay_ms", "Delay", "From command to torque", "ms", 0.0, 10.0, 0.5, tries=("1", "2", "0"),
-          name="delay of the command, ms"),
-    Entry("plant.saturate", "Motors saturate", "Clip the torque at the data sheet's limits",
+    Entry("plant.delay_ms", "Delay", "Time from command to torque", "ms", 0.0, 10.0, 0.5,
+          tries=("1", "2", "0"), name="delay of the command, ms"),
+    Entry("plant.saturate", "Motors saturate", "Clip the torque at the limits of the data sheet",
           tries=("false", "true"), name="torque bound of the motors"),
-    Entry("plant.gravity", "Gravity", "Off: a weightless plant"),
+    Entry("plant.gravity", "Gravity", "Whether gravity acts on the plant"),
     Entry("nominal.payload_kg", "Believed payload", _BELIEVED, "kg", 0.0, 10.0, 0.1),
     Entry("nominal.damping", "Believed viscous friction", _BELIEVED, "N·m·s/rad", 0.0, 10.0, 0.1),
     Entry("nominal.armature", "Believed armature", _BELIEVED, "kg·m²", 0.0, 1.0, 0.01),
     Entry("nominal.mass_scale", "Believed mass scale", _BELIEVED, "", 0.2, 3.0, 0.05),
     Entry("nominal.inertia_scale", "Believed inertia scale", _BELIEVED, "", 0.2, 3.0, 0.05),
     Entry("nominal.gravity", "Believed gravity", _BELIEVED),
-    Entry("q1_amplitude_deg", "Swing of q₁", "How far joint 1 swings and returns", "°", -180.0, 180.0, 5.0),
-    Entry("smooth", "Smooth", "Phase ωt − sin ωt, at rest in the singular point, instead of ωt"),
+    Entry("q1_amplitude_deg", "Swing of q₁", "Angle by which joint 1 swings before it returns", "°", -180.0,
+          180.0, 5.0),
+    Entry("smooth", "Smooth", "Use the phase ωt − sin ωt, which is at rest in the singular point, instead "
+              "of ωt"),
 )  # fmt: skip
-"""In the order of the page. The usual comparisons are those with `tries`."""
+"""The order is that of the page. An entry with `tries` is offered for comparisons."""

@@ -1,4 +1,4 @@
-"""What a setting may be, from how its field is declared; and values a user gives for it, checked."""
+"""Derives the allowed values of a setting from the declaration of its field, and checks users' values."""
 
 from __future__ import annotations
 
@@ -23,14 +23,12 @@ WORD = "word"
 
 @dataclass(frozen=True)
 class Form:
-    """What a setting may be.
-
-    Attributes:
-        kind: NUMBER, WHOLE, SWITCH or WORD; None: a list only.
-        elements: the same of what a list may hold; None: it may be no list.
-        words: the words to choose from; empty: any.
-        null: it may be none at all.
-        range: of every number.
+    """The allowed values of a setting. Attributes:
+    kind: NUMBER, WHOLE, SWITCH or WORD; None: a list only.
+    elements: the form of the elements of a list; None: lists are not allowed.
+    words: the words to choose from; empty: any.
+    null: whether null is allowed.
+    range: of every number.
     """
 
     kind: str | None
@@ -87,7 +85,7 @@ class Form:
 
 @cache
 def form_of(hint: Any) -> Form:
-    """What a field that is declared with a type may be: a number, word or switch, a list of them, null."""
+    """The allowed values of a field of a declared type: a number, word or switch, a list of them, null."""
     inner, allowed = plain(hint)
     kind: str | None = None
     elements: str | None = None

@@ -36,8 +36,8 @@ class VelocitySettings(SceneSettings):
         controller: which of VELOCITY_CONTROLLERS.
         compensate_delay: predict the measured state forward by the plant's lag before planning.
         delay_measured: a plan's commands arrive later by the time its computation really took, on top of
-            `plant.delay_ms`, as on a robot that does not wait; no two runs are the same then.
-        plant: what the plant really is.
+            `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the same.
+        plant: the parameters of the simulated plant.
         options: the scene's own choices.
     """
 
@@ -60,7 +60,7 @@ class VelocitySettings(SceneSettings):
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
 
     def felt(self, solve_ms: float) -> VelocityPlantSettings:
-        """The plant that the commands of a plan meet which took so many ms to compute."""
+        """The plant that the commands of a plan act on, if the plan took this many ms to compute."""
         if not self.delay_measured:
             return self.plant
         return replace(self.plant, delay_ms=min(self.plant.delay_ms + solve_ms, LONGEST_DELAY))
@@ -82,7 +82,7 @@ class VelocitySettings(SceneSettings):
 
     @property
     def lexicographic_delta(self) -> float | None:
-        """δ of (12), m (or rad); None if levels below are held by something else."""
+        """δ of (12), m (or rad); None if another constraint restricts the lower levels."""
         by_error = self.controller in ("htmpc", "htmpc_wpt") and self.htmpc.lexicographic == "per_coordinate"
         return self.htmpc.delta_m if by_error else None
 
@@ -161,7 +161,7 @@ class VelocitySettings(SceneSettings):
         return told
 
     def with_obstacle(self, obstacle: Obstacle) -> VelocitySettings:
-        """The settings with an obstacle more, or instead of the one of its name."""
+        """The settings with an obstacle added, or with the obstacle of this name replaced."""
         obstacles = (*_without(self.htmpc.obstacles, obstacle.name), obstacle)
         return _with_htmpc(self, replace(self.htmpc, obstacles=obstacles))
 

@@ -1,1 +1,1 @@
-"""The kit lessons are made of: steps, claims, predictions, challenges, measures."""
+"""The parts of a lesson: steps, claims, predictions, challenges, measures."""

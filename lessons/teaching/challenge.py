@@ -12,7 +12,7 @@ from lessons.teaching.measure import Measure, RunRows
 
 @dataclass(frozen=True)
 class Score:
-    """Points for how well it was done: 0 at `worst`, 100 at `best` and beyond, straight in between."""
+    """Points for the quality of a solution: 0 at `worst`, 100 at `best` and beyond, linear in between."""
 
     measure: Measure
     worst: float
@@ -26,14 +26,14 @@ class Score:
 
 @dataclass(frozen=True)
 class Result:
-    """What came out of an attempt: which goals are met, and the points (0 unless all are)."""
+    """The result of an attempt: which goals are met, and the points (0 unless all goals are met)."""
 
     met: tuple[bool, ...]
     score: float
 
     @property
     def passed(self) -> bool:
-        """All goals are met."""
+        """Whether all goals are met."""
         return all(self.met)
 
 
@@ -67,7 +67,7 @@ class Challenge:
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """What a run must be measured for."""
+        """The measures that a run needs."""
         return (*(goal.measure for goal in self.goals), self.score.measure)
 
     def grade(self, rows: RunRows) -> Result:

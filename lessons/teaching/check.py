@@ -19,12 +19,10 @@ from lessons.teaching.prediction import Choice, Prediction
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run gave.
-
-    Attributes:
-        values: its measures, without a ghost.
-        refused: how many events of the script were not accepted.
-        error: why there is no run; None if there is one.
+    """The result of a run. Attributes:
+    values: its measures, without a ghost.
+    refused: how many events of the script were not accepted.
+    error: one sentence on why the run failed; None if it did not fail.
     """
 
     values: Mapping[Measure, float]
@@ -34,17 +32,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One thing that was checked.
-
-    Attributes:
-        lesson: name of the lesson.
-        where: the step's title, or "challenge".
-        what: the claim, prediction, script or solution.
-        value, unit: what was measured; NaN where there is nothing to measure.
-        condition: what it was held against.
-        wrong: the setting a claim must fail under, "" for anything else.
-        wrong_value: what was measured there.
-        fault: one sentence, empty if everything is sound.
+    """The result of one check. Attributes:
+    lesson: name of the lesson.
+    where: the step's title, or "challenge".
+    what: the claim, prediction, script or solution.
+    value, unit: what was measured; NaN where there is nothing to measure.
+    condition: the required condition.
+    wrong: the setting a claim must fail under, "" for anything else.
+    wrong_value: the value measured under that setting.
+    fault: one sentence, empty if everything is sound.
     """
 
     lesson: str
@@ -62,7 +58,7 @@ Outcomes = Mapping[RunSpec, Outcome]
 
 
 def measured(piece: tuple[RunSpec, tuple[Measure, ...]]) -> Outcome:
-    """Runs and measures. Raises InputError for what cannot be run."""
+    """Runs and measures. Raises InputError for a run that is not possible."""
     what, measures = piece
     recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}
@@ -86,7 +82,7 @@ def check(
         one verdict per claim, prediction, script and challenge, in the lessons' order.
     """
     wanted = _wanted(lessons)
-    # Long ones first: a core is not left idle at the end.
+    # Long runs go first, to keep all cores busy until the end.
     pieces = sorted(wanted.items(), key=lambda item: -(item[0].duration or 0.0))
     outcomes: dict[RunSpec, Outcome] = {}
     work = [(run, tuple(measures)) for run, measures in pieces]
@@ -99,7 +95,7 @@ def check(
 
 
 def _wanted(lessons: Sequence[Lesson]) -> dict[RunSpec, dict[Measure, None]]:
-    """All runs with what is to be measured in them."""
+    """All runs with the measures that each of them needs."""
     wanted: dict[RunSpec, dict[Measure, None]] = {}
 
     def want(run: RunSpec, measures: Sequence[Measure]) -> None:

@@ -1,4 +1,4 @@
-"""A claim: a measurable sentence about a run, that can fail."""
+"""A claim: a measurable sentence about a run, which can be false."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Claim:
         relation: "at most" or "at least".
         bound: in the measure's unit.
         fails_with: assignments "PATH=VALUE" on top of the step's own under which the sentence is false.
-            Goals of a challenge have none: the challenge's start is where they fail.
+            Goals of a challenge have none: they fail at the challenge's start.
         because: why it is false there, in a few words.
     """
 

@@ -1,4 +1,4 @@
-"""What acts on a run, as data: the few controls that matter for a step, and its script."""
+"""The controls that a step shows and its script of events, as data."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ class Control:
             raise ValueError(f"control '{self.path}' is logarithmic: low must be above 0")
 
     def takes(self, value: Any) -> bool:
-        """Whether it can be set to a value."""
+        """Whether the control can be set to a value."""
         if self.choices:
             return value in self.choices
         return isinstance(value, (int, float)) and self.low <= value <= self.high
 
 
 def chosen(settings: SceneSettings, control: Control) -> Any:
-    """Which of a control's choices the settings have: the one that would change nothing; None if none is."""
+    """The choice of a control that the settings have at present; None if they have none of them."""
     fitting = (each for each in control.choices if settings.changed(control.path, each) == settings)
     return next(fitting, None)
 
 
 def within(settings: SceneSettings, control: Control) -> bool:
-    """Whether a setting stands where its control could have put it."""
+    """Whether the control can set the present value of its setting."""
     if control.choices:
         return chosen(settings, control) is not None
     return control.takes(settings.value_at(control.path))

@@ -16,7 +16,7 @@ from lessons.teaching.prediction import Prediction
 
 @dataclass(frozen=True)
 class Card:
-    """What a lesson is about, at a glance: the docstring of its file.
+    """The card of a lesson: the docstring of its file.
 
     Attributes:
         title: a few words.
@@ -134,7 +134,7 @@ class Lesson:
     urdf: str | None = None
 
     def run_of(self, step: Step | Challenge) -> RunSpec:
-        """What a step, or the start of the challenge, runs."""
+        """The run of a step, or of the start of the challenge."""
         return RunSpec(
             self.scene,
             self.urdf,

@@ -31,7 +31,7 @@ UNITS: dict[str, float] = {
     "%": 100.0,
     "µs": 1.0,
 }
-"""How many of a unit are one of the unit that telemetry records (s, m, rad, N·m, share)."""
+"""Factor from the unit that telemetry records (s, m, rad, N·m, share) to each unit."""
 
 _NAMES = {
     "place": "tasks completed",
@@ -45,7 +45,7 @@ _PER_JOINT = ("q", "v", "tau")
 
 
 class RunRows(Protocol):
-    """A run, finished or still going on: a field of telemetry over time by its name, (ticks, width)."""
+    """A finished or running run: a field of telemetry over time by its name, (ticks, width)."""
 
     def __getitem__(self, field: str, /) -> Array: ...
 
@@ -83,7 +83,7 @@ class Signal:
         """The signal at every tick, (ticks,); NaN where it is not defined."""
         found = DERIVED[self.name](rows) if self.name in DERIVED else rows[self.name]
         one = np.linalg.norm(found, axis=1) if self.column is None else found[:, self.column]
-        # A norm of one component would lose its sign.
+        # The norm of a single component would lose its sign.
         one = found[:, 0] if found.shape[1] == 1 else one
         return UNITS[self.unit] * one
 
@@ -125,7 +125,7 @@ class Measure:
         return replace(self, over_ghost=False)
 
     def value(self, rows: RunRows, ghost: RunRows | None = None) -> float:
-        """The number so far; NaN as long as there is nothing to measure. `rows` may be a run half done."""
+        """The value so far; NaN as long as there is nothing to measure. `rows` may be an unfinished run."""
         own = self._of(rows)
         if not self.over_ghost:
             return own

@@ -1,4 +1,4 @@
-"""Predictions: what a learner says before the run, and how it compares with what the run shows."""
+"""Predictions: a learner's answer before the run, and its comparison with the result of the run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lessons.teaching.measure import Measure, RunRows, Signal
 
 @dataclass(frozen=True)
 class PredictionResult:
-    """How a prediction did.
+    """The grade of a prediction.
 
     Attributes:
         score: 0 (far off) to 1 (right).
@@ -41,7 +41,7 @@ class Choice:
         question: one sentence.
         options: their intervals do not overlap.
         measure: the number that decides.
-        tempting: place of the answer that many would give, and that is wrong.
+        tempting: index of a wrong answer that many learners give.
     """
 
     question: str
@@ -50,7 +50,7 @@ class Choice:
     tempting: int
 
     def right(self, value: float) -> int | None:
-        """Place of the option that a measured number makes right; None if there is none."""
+        """Index of the option that is right for a measured number; None if there is none."""
         return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
 
     def grade(self, picked: int, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:

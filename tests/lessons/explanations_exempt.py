@@ -46,7 +46,7 @@ TEXTS = (
         ("deadlines/2", "So let $\\bar M$ be twice as large."),
         ("inside-the-qp/1", "It wants *two* numbers, so look"),
         ("further/deliveries", "So ask whether they were"),
-        ("contributing", "A sentence that gives a reason gets a run"),
+        ("contributing", "Each sentence that gives a reason needs a run"),
     )),
     Exempt("definition", "", (
         ("further/deliveries", "The base waits at the edge, $\\rho = 1.2$ m"),
@@ -131,7 +131,7 @@ TEXTS = (
     )),
     # ---------------------------------------- what the program does
     Exempt("software", LESSONS + "grade_attacks.py::test_a_table_of_grades_is_no_program_of_a_spreadsheet", (
-        ("instructors", "A file that is not UTF-8 is a sentence in the table"),
+        ("instructors", "A file that is not UTF-8 gets an error message in the table"),
     )),
     Exempt("software", LESSONS + "own_tasks.py::test_a_code_tells_an_own_task_by_its_content", (
         ("instructors", "A state code (*Export*, *Write it down*) says"),
@@ -147,7 +147,7 @@ TEXTS = (
     Exempt("software", (
         "tests/app/test_app_opening.py::test_no_argument_list_holds_what_the_browser_is_opened_with"
     ), (
-        ("serving", "It begins with a file that only you can read, since"),
+        ("serving", "It first opens a file that only you can read, since"),
     )),
     Exempt("software", "tests/app/test_app_guard.py::test_cookies_of_two_servers_live_in_one_jar", (
         ("serving", "Browsers send cookies of one host to the servers at all its ports"),

@@ -114,7 +114,7 @@ def test_the_table_is_what_was_measured() -> None:
 
 
 def test_the_payloads_are_what_was_measured() -> None:
-    """M̄ that looks after itself: the whole table, three digits each."""
+    """M̄ that adapts to the payload: the whole table, three digits each."""
 
     def cell(case: Case, words: str, what: str) -> str:
         value = of("himpc-adaptation", quantity(case, words, what))

@@ -1,1 +1,1 @@
-"""What `himpc-lab new` writes: short files that already run."""
+"""The template files of `himpc-lab new`: short programs that already run."""

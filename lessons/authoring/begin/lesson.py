@@ -9,7 +9,7 @@ You need: nothing
 # The text above is the lesson's card: title, question, how long it takes, what one must know before.
 #
 #     himpc-lab --lesson FILE.py             opens it
-#     himpc-lab lessons --check FILE.py      runs every claim, and shows that it fails where it says so
+#     himpc-lab lessons --check FILE.py runs every claim, and shows that it fails under its `fails_with`
 
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
@@ -40,7 +40,7 @@ LOAD = Step(
             Measure(HAND),
             "at most",
             0.1,
-            # A claim says where it is false: the check runs that, too.
+            # A claim names a setting under which it is false; the check runs this setting, too.
             fails_with=("controller=osf",),
             because="OSF believes in its model, and the load is not in it",
         ),

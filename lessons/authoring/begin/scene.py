@@ -1,4 +1,4 @@
-"""A scene: a robot, a hierarchy of tasks, what each is to do, and what happens meanwhile.
+"""A scene: a robot, a hierarchy of tasks with their references, and timed events.
 
 himpc-lab run FILE.py
 himpc-lab --scene FILE.py
@@ -12,7 +12,7 @@ from himpc.references import Circle, Phase
 from lessons import load_scene
 from lessons.events import Push
 
-# Begin with a scene there is (himpc-lab scenes) and change what should be different.
+# Begin with an existing scene (himpc-lab scenes lists them) and change its fields.
 START = load_scene("planar3-hold")
 
 

@@ -1,4 +1,4 @@
-"""A task: coordinates of the robot with their Jacobian. This one: how far the tip is from the robot's axis.
+"""A task: coordinates of the robot with their Jacobian. This task is the distance of the tip from the z axis.
 
     himpc-lab run FILE.py
 

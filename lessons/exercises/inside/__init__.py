@@ -1,1 +1,1 @@
-"""What stands in the process of a submission, and nothing else of the lab: the pipe, `now`, the limits."""
+"""The code of the lab that runs in the process of a submission: the pipe, `now`, the limits."""

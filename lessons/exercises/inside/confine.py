@@ -1,4 +1,4 @@
-"""What the process of a submission gives up before it runs a line of it, as far as the system allows."""
+"""Takes rights away from the process of a submission before its code runs, as far as the system allows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 
 LAB = ("robots", "himpc", "lessons", "app")
 HANDED = ("himpc", "himpc.qp")
-"""Of the lab a solution may import these."""
+"""The modules of the lab that a solution may import."""
 _PARENT_DIES = 1  # PR_SET_PDEATHSIG of Linux
 _LIBRARIES = ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/usr/local/lib")
 _SINGLE = (
@@ -51,7 +51,7 @@ _SYSCALLS = (
 
 
 class RefusedCalls(list[str]):
-    """What was tried and refused, in order."""
+    """The refused calls, in order."""
 
 
 def limited(memory: int, parent: int) -> None:
@@ -71,7 +71,7 @@ def limited(memory: int, parent: int) -> None:
         ):
             hard = resource.getrlimit(what)[1]
             most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            with suppress(ValueError, OSError):  # macOS knows no limit of the address space
+            with suppress(ValueError, OSError):  # macOS has no limit of the address space
                 resource.setrlimit(what, (most, most))
 
 
@@ -111,9 +111,9 @@ def _files(places: Sequence[Path]) -> bool:
             reading = AccessFs.READ_FILE | AccessFs.READ_DIR if path.is_dir() else AccessFs.READ_FILE
             rules.add_path_rule(path, access=reading)
         for folder in filter(os.path.isdir, sys.path):
-            rules.add_path_rule(folder, access=AccessFs.READ_DIR)  # an import looks what there is
+            rules.add_path_rule(folder, access=AccessFs.READ_DIR)  # an import lists folders
         rules.apply()
-    except Exception:  # each kernel, container and version has reasons of its own
+    except Exception:  # the reasons differ between kernels, containers and versions
         return False
     return True
 
@@ -155,7 +155,7 @@ def _without_calls(sec: Any) -> bool:
 
 
 class _Hidden(importlib.abc.MetaPathFinder):
-    """Finds nothing of the lab, and says so."""
+    """An import finder that refuses the lab's modules with a message."""
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> None:
         if fullname.partition(".")[0] in LAB:
@@ -173,7 +173,7 @@ def hide_the_lab() -> None:
 
 def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
     """From now on Python itself refuses what the system may not: opening files that no import reads,
-    programs, signals, the network; in every thread. Alone this is politeness, no prison.
+    programs, signals, the network; in every thread. On its own it does not stop hostile code.
 
     Args:
         places: where imports may read.

@@ -34,7 +34,7 @@ def numbers_of(now: Any) -> list[Array]:
 
 
 def shape_of(now: Any) -> dict[str, Any]:
-    """What is to be known to read them: names, the shape of each, and what is no array."""
+    """The data needed to read the arrays: their names and shapes, and the values that are not arrays."""
     return {
         "T_s": now.T_s,
         "N": now.N,
@@ -57,7 +57,7 @@ class Part(SimpleNamespace):
 
 @final
 class Now(SimpleNamespace):
-    """What `himpc.controllers.view.View` shows, in a process that does not have it."""
+    """The attributes of `himpc.controllers.view.View`, in a process that cannot import it."""
 
     __setattr__ = _read_only
     q: Array

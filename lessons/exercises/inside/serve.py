@@ -1,7 +1,7 @@
 """The process of a submission: numbers of `now` come in, a torque goes out.
 
-It imports what a solution may need and nothing that runs or judges a robot: whatever a submission climbs to,
-replaces or ends here, plant, checks and right answers are elsewhere.
+It imports what a solution may need, and nothing that runs or judges a robot: the plant, the checks and the
+right answers are in another process, which a submission cannot read, replace or end.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from robots import InputError
 
 Law = Callable[[Any], Any]
 ROOT = str(Path(__file__).parents[3])
-"""Where the lab lies; who starts this puts it first in `sys.path`."""
+"""The folder of the lab; the starting process puts it first in `sys.path`."""
 
 
 def serve(parent: int, memory: int, kernel: bool) -> None:
-    """Answers messages until there are none.
+    """Answers messages until the pipe closes.
 
     Args:
         parent: process with which it ends.

@@ -1,1 +1,1 @@
-"""The exercises' files with the hole in them; they run, and fail their checks."""
+"""The exercises' files with missing lines; they run, and fail their checks."""

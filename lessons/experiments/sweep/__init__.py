@@ -1,4 +1,6 @@
-"""A grid of runs over one or more settings. A run that fails or loses control is a cell, not the end."""
+"""A grid of runs over one or more settings. A run that fails or loses control becomes a cell, and the sweep
+continues.
+"""
 
 from lessons.experiments.sweep.cells import Cell, best_cell, check_metric, metrics
 from lessons.experiments.sweep.folder import carry_on, finished_cells, usual_folder

@@ -1,4 +1,4 @@
-"""A finished cell and what can be read from it."""
+"""A finished cell and its metrics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Cell:
 
     @property
     def diverged(self) -> bool:
-        """Ran, and lost control."""
+        """Whether the run lost control."""
         return self.summary is not None and bool(self.summary["diverged"])
 
     def value(self, metric: str) -> float:
@@ -36,11 +36,11 @@ class Cell:
 
 
 _NO_METRIC = ("seed", "duration_s", "level", "finite", "diverged")
-"""Numbers of a summary that are not worth a map."""
+"""Numbers of a summary that are not offered as a metric."""
 
 
 def metrics(sweep: Sweep) -> list[str]:
-    """What can be shown of a cell, the default first; found by running one tick of the base scene."""
+    """The metrics of a cell, the default first; one tick of the base scene is run to find them."""
     scene = sweep.base.prepared()
     recording = run(scene, scene.settings.T_s, sweep.base.seed)
     found = dict(_numbers(_without_timing(summary(recording))))
@@ -84,7 +84,7 @@ def _without_timing(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def perform_cell(spec: RunSpec) -> dict[str, Any]:
-    """The summary of a run, without its timing. Raises InputError for what cannot be."""
+    """The summary of a run, without its timing. Raises InputError for an invalid run."""
     return _without_timing(summary(run(spec.prepared(), None, spec.seed)))
 
 

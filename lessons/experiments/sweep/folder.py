@@ -1,4 +1,4 @@
-"""The folder of a sweep, so that a stopped one goes on where it was.
+"""Stores the finished cells of a sweep in a folder; a stopped sweep continues from there.
 
 It holds `sweep.json` (what is swept), `cells.jsonl` (one line per finished cell, appended as it finishes)
 and, at the end, `results.json` (the cells in the order of the grid).
@@ -23,7 +23,7 @@ from robots import InputError
 
 
 def usual_folder(sweep: Sweep) -> Path:
-    """Where a sweep goes if nobody says: of its own for each, so that the same one carries on there."""
+    """The default folder of a sweep. Each sweep has a different one, in which the same sweep continues."""
     wanted = json.dumps(sweep.as_data(), sort_keys=True)
     names = "-".join([Path(sweep.base.scene).stem, *(axis.path for axis in sweep.axes)])
     readable = re.sub(r"[^\w.-]+", "_", names, flags=re.ASCII)[:80]
@@ -53,7 +53,7 @@ def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
         written = file.read_bytes()
         whole = written[: written.rfind(b"\n") + 1]
         if len(whole) < len(written):
-            # Whoever was stopped while writing left a torn line at the end: that cell is run again.
+            # A sweep that was stopped while writing leaves an incomplete last line; that cell is run again.
             os.truncate(file, len(whole))
         cells = [Cell(**json.loads(line)) for line in whole.splitlines()]
     except OSError as error:

@@ -13,7 +13,7 @@ from lessons.plots.heat import draw_map
 
 
 def draw_sweep(sweep: Sweep, cells: Sequence[Cell], metric: str, folder: Path) -> Path | None:
-    """Draws `map.png` and returns it; None for more than two axes, which no sheet of paper has."""
+    """Draws `map.png` and returns its path; returns None for more than two axes."""
     if len(sweep.axes) > 2:
         return None
     shape = tuple(len(axis.values) for axis in sweep.axes)

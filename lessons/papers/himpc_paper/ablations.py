@@ -1,4 +1,4 @@
-"""What the text of the paper argues without numbers: Remarks 5, 6 and 8, and section IV-C."""
+"""Measures the statements that the paper makes without numbers: Remarks 5, 6 and 8, and section IV-C."""
 
 from __future__ import annotations
 

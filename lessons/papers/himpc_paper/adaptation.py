@@ -1,5 +1,6 @@
-"""Not in the paper: M̄ that looks after itself (`himpc.controllers.adaptation`), under payloads that nobody
-told of."""
+"""Not in the paper: M̄ that adapts to the payload (`himpc.controllers.adaptation`), under payloads that the
+controller does not know.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ _HOLD = "iiwa14-hold"
 
 
 class Case(NamedTuple):
-    """A run with and without.
+    """A run with and without adaptation.
 
     Attributes:
         words: what is unusual about it.
@@ -87,5 +88,5 @@ def _section(results: Results, quick: bool) -> Section:
 
 
 ITEMS = (
-    Item("himpc-adaptation", "M̄ that looks after itself", "not in the paper; Remark 4", _jobs, _section),
+    Item("himpc-adaptation", "M̄ that adapts to the payload", "not in the paper; Remark 4", _jobs, _section),
 )

@@ -1,4 +1,4 @@
-"""What section IV-C argues against: ‖τ‖² in the cost instead of ‖Δτ‖²."""
+"""‖τ‖² in the cost instead of ‖Δτ‖², which section IV-C argues against."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the texts of "Where we disagree with the papers" rest on and no table of the paper asks for."""
+"""Measurements for the texts of "Where we disagree with the papers" that belong to no table of the paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What our departures from the limits (32d) and (32e) as printed are worth, on several plants."""
+"""Measures the effect of our departures from the printed limits (32d) and (32e), on several plants."""
 
 from __future__ import annotations
 

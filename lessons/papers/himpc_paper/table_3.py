@@ -201,7 +201,7 @@ def _conflict_checks(results: Results) -> Sequence[PaperCheck]:
                 f"{name(controller)}, RT2: loses level 1 (error > 3 cm, or torque demand > 4 × its bound)",
                 demand,
                 bool(error > LOST_LEVEL_1 or demand > LOST_TORQUE),
-                band=None,  # how far a lost run gets is chance
+                band=None,  # how long a run lasts before it loses control is chance
             )
         )
     return checks
