@@ -155,9 +155,11 @@ def _recovers(
     if not eventually(says, LONG):
         return False
     label, value = ("Playback", "Reset all") if by_reset else ("Start again", True)
-    button = page.find(label)
-    if button is None:
+    # A page that was built anew a moment ago may not have its buttons yet.
+    if not eventually(lambda: page.find(label) is not None, LONG):
         return False
+    button = page.find(label)
+    assert button is not None
     page.write(button, value=value)
     return eventually(lambda: learner.pid != pid and learner.ready is not ready and _runs(learner), LONG)
 

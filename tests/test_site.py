@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from app.__main__ import main
-from browsing.browser_actions import SLOW
+from browsing.browser_actions import SLOW, eventually
 from docs.build import build
 from docs.further import further
 from docs.pages.lessons import MEASURED, measured
@@ -147,6 +147,7 @@ def test_the_site_in_a_browser(
     answer.locator("summary").click()
     assert answer.evaluate("each => each.open && each.innerText.length") > 60
     page.locator("button[data-film]").click()
+    assert eventually(page, lambda: any("player.html" in each.url for each in page.frames))
     (frame,) = [each for each in page.frames if "player.html" in each.url]
     frame.wait_for_function(
         "() => window.__viserMutable?.nodeRefFromName['/robot/2'] && window.__VISER_EMBED_DATA__.length"

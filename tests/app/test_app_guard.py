@@ -408,12 +408,12 @@ def test_a_page_that_is_gone_is_forgotten_at_once(plain: PageServer) -> None:
         gc.collect()
         return sum(type(each) is GuardedConnection for each in gc.get_objects())
 
-    assert wait_until(lambda: not held(), FIRST_WORD / 3, 0.5)
+    assert wait_until(lambda: not held(), 0.6 * FIRST_WORD, 0.5)
     for _ in range(3):
         with dial(plain) as page:
             page.send(pack(camera()))
             page.recv(timeout=LONG)
-    assert wait_until(lambda: not held(), FIRST_WORD / 3, 0.5)
+    assert wait_until(lambda: not held(), 0.6 * FIRST_WORD, 0.5)
 
 
 def test_whoever_needs_longer_than_the_handshake_is_let_go(plain: PageServer) -> None:
