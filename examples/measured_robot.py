@@ -1,8 +1,7 @@
 """A robot that is measured, not simulated: feed q and v from your own source, take the torque to your bus.
 
-`read` and `write` are all that the loop needs of a robot: joints in the order of the URDF, rad, rad/s, N·m.
-The ones here stand for a driver with encoders of 0.001° that once breaks a reading. Prints the number of
-ticks, how many came late, what happened at the broken reading, and where the hand is at the end.
+All that the loop needs of a robot is `read` and `write`: joints in the order of the URDF, rad, rad/s, N·m.
+Here they stand for a driver with encoders of 0.001° that once gives a broken reading.
 """
 
 from __future__ import annotations

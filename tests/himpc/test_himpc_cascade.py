@@ -13,12 +13,12 @@ from cascade_checks import (
     off,
     second_opinion,
 )
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from problems import Hierarchy, level_problem, quadratic, random_hierarchy, shifted, singular_hierarchy
 
-from himpc.cascade.level import LevelProblem
+from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.cascade.null_space import RANK_TOLERANCE
 from himpc.limits import Rows
 from himpc.qp import is_installed
@@ -52,18 +52,25 @@ def test_the_random_hierarchies_bind() -> None:
     assert share > 0.6
 
 
-@given(seeds, st.integers(2, 7), st.integers(1, 5), st.integers(1, 3))
-@settings(max_examples=60)
-def test_proxqp_agrees_where_it_solves(seed: int, n: int, N: int, levels: int) -> None:
-    """ProxQP on the explicit QPs finds the same increments wherever its point is accurate."""
-    hierarchy = random_hierarchy(seed, n, N, levels)
-    proxqp = hierarchy.solve("explicit", "proxqp")
-    # A point passes at a scaled residual of 1e-6, which leaves more than 1e-6 N·m where H ≥ R is flat.
-    for problem, solution in zip(hierarchy.problems, proxqp, strict=True):
-        H, f = quadratic(problem)
-        scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(solution.U)), float(np.linalg.norm(f)))
-        assume(solution.fallback == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6)
-    assert_agree(hierarchy.solve("compiled"), proxqp)
+def test_proxqp_agrees_where_it_solves() -> None:
+    """ProxQP on the explicit QPs finds the same increments wherever its point is accurate, and it is often
+    enough: of these stacks about one in eight."""
+    compared = 0
+    for seed in range(200):
+        n, N, levels = np.random.default_rng(seed).integers((2, 1, 1), (8, 6, 4)).tolist()
+        hierarchy = random_hierarchy(seed, n, N, levels)
+        proxqp = hierarchy.solve("explicit", "proxqp")
+        if all(accurate(problem, found) for problem, found in zip(hierarchy.problems, proxqp, strict=True)):
+            compared += 1
+            assert_agree(hierarchy.solve("compiled"), proxqp)
+    assert compared >= 10
+
+
+def accurate(problem: LevelProblem, solution: LevelSolution) -> bool:
+    """A point passes at a scaled residual of 1e-6, which leaves more than 1e-6 N·m where H ≥ R is flat."""
+    H, f = quadratic(problem)
+    scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(solution.U)), float(np.linalg.norm(f)))
+    return solution.fallback == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6
 
 
 @pytest.mark.skipif(not is_installed("qpoases"), reason="CasADi, which brings qpOASES, is not installed")

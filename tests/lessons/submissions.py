@@ -346,7 +346,7 @@ SUBMISSIONS: dict[str, Submission] = {
         f"LOG = [{_LOG}]\n\nclass Controller:\n    tick = -1\n\n    def torque(self, now):\n"
         "        self.tick += 1\n        return (LOG[self.tick % len(LOG)] * 3)[: now.n]\n",
         0,
-        "A new posture",
+        "a new posture",
     ),
     "wrong_sleeps": _bad("import time; time.sleep(0.7)", 0, "takes longer than 0.5 s"),
     "wrong_exits": _bad("raise SystemExit", 0, "it ends the program"),
