@@ -71,7 +71,6 @@ _QUICK = (
     "tests/himpc/test_himpc_limits.py",
     "tests/himpc/test_himpc_one_step.py",
     "tests/himpc/test_himpc_prediction.py",
-    "tests/himpc/test_himpc_references.py",
     "tests/himpc/test_himpc_tasks.py",
     "tests/himpc/test_himpc_cascade.py",
     "tests/himpc/test_htmpc_active_set.py",
