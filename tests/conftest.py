@@ -67,7 +67,6 @@ _LONG = (
 
 _QUICK = (
     "tests/test_structure.py",
-    "tests/himpc/test_himpc_errors.py",
     "tests/himpc/test_himpc_limits.py",
     "tests/himpc/test_himpc_one_step.py",
     "tests/himpc/test_himpc_prediction.py",
