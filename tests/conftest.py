@@ -82,6 +82,13 @@ _QUICK = (
 """Files of the mark `quick`."""
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With `-m quick` no other file is read."""
+    if config.getoption("markexpr") != "quick" or collection_path.suffix != ".py":
+        return None
+    return True if collection_path.relative_to(_ROOT).as_posix() not in _QUICK else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     def rank(item: pytest.Item) -> int:
         return next((k for k, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG))
