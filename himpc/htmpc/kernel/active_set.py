@@ -157,7 +157,7 @@ def solve(
         active, side, count: the rows held, room for n; those of the QP before.
         cholesky_factor, orthonormal_basis: the same, see `linear`, room for n + 1.
         scratch: (SCRATCH, n + 1).
-        watched, projected_jacobian: scratch, as long as A; seen is zero.
+        watched, seen: scratch, as long as A; seen is zero.
         x: (n,), the result.
         multipliers: as long as A, zero; the result.
     """

@@ -31,7 +31,7 @@ def model(
 
     Args:
         J, Q, e, T_q, effort, share, ridge: see there.
-        weighted, multiplier: J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero.
+        weighted, pull: J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero.
         H, g: the result; g is zero.
     """
     N, m, n = J.shape
