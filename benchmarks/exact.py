@@ -1,11 +1,11 @@
 """The optimum of every level of a hierarchy to far more digits than a double has: the reference for both
 routes.
 
-Only the problem's data come from `himpc`. A set of active rows is guessed. Under these rows the optimality
-conditions of (32) or (34), with (33) as printed, are linear: they are solved in doubles, and corrected until
-their residuals, evaluated in integers of several hundred bits, vanish. The guess was right if no other row
-exceeds its bound and every multiplier has the right sign. The cost is strictly convex, so a point that
-satisfies the conditions is the optimum, whatever the guess was.
+Only the problem's data come from `himpc`. Under a set of active rows the optimality conditions of (32) or
+(34), with (33) as printed, are linear: they are solved in doubles, and corrected until their residuals,
+evaluated in integers of several hundred bits, vanish. The dual method of Goldfarb and Idnani finds the set.
+It starts from a guess if all multipliers of the guess have the right signs, and without any row otherwise.
+The cost is strictly convex, so a point that satisfies the conditions is the optimum, whatever the guess was.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _BITS = 300
 _RANK = 1e-10
 """A direction whose effect on a level is below this share of its rows is left to lower levels, as in
 himpc."""
-_DEPENDENT = 1e-9
+_DEPENDENT = 1e-13
 """A bound depends on the rows that are held if at most this share of it is independent of them."""
 _BEYOND = 1e-11
 """N·m by which a dependent row may exceed its bound, since the data are doubles."""
 _CORRECTIONS = 60
-_CHANGES = 60
+_CHANGES = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def times(a: Fixed, b: Fixed) -> Fixed:
 def optimum(
     problem: LevelProblem, rows: Rows, above: Sequence[tuple[LevelProblem, Exact]], guess: ActiveRows
 ) -> Exact | None:
-    """The optimum of Problem i; None if the initial guess and `_CHANGES` changes of it do not lead to one.
+    """The optimum of Problem i; None if `_CHANGES` changes of the rows that are held do not lead to it.
 
     Args:
         problem: its data.
@@ -82,24 +82,69 @@ def optimum(
     system = _System(problem, rows, above)
     side = np.zeros(rows.lower.shape)
     side[guess.row, guess.joint] = np.sign(guess.multiplier)
+    side[~system.independent(side)] = 0.0
+    start = system.solve(side)
+    if start is None or (side * start.multipliers).min() < -1e-13 * np.abs(start.multipliers).max():
+        side[:] = 0.0
+        start = system.solve(side)
+    return None if start is None else _dual_method(system, start, side)
+
+
+def _dual_method(system: _System, point: _Point, side: Array) -> Exact | None:
+    """Goldfarb and Idnani's method, from a point whose multipliers have the right signs.
+
+    On the way to the point that holds one more row, multipliers change linearly. Where the first of them
+    vanishes, its row is released, and the way goes on from there.
+    """
     for _ in range(_CHANGES):
-        found = system.solve(side)
-        if found is None:
-            return None
-        U, held, pull = found
-        wrong = np.where(held, -side * pull, 0.0)
-        side = np.where(held, side, 0.0)  # rows that depend on those held are satisfied without being held
-        if wrong.max(initial=0.0) > 1e-13 * np.abs(pull).max():
-            side[np.unravel_index(wrong.argmax(), side.shape)] = 0.0
-            continue
-        value = times(system.L, U)
+        value = times(system.L, point.U)
         over, under = rounded(value - system.upper), rounded(system.lower - value)
-        beyond = np.where(held, 0.0, np.maximum(over, under))
-        if beyond.max() <= _BEYOND:
-            return Exact(rounded(U), U, int(held.sum()))
-        worst = np.unravel_index(beyond.argmax(), side.shape)
-        side[worst] = 1.0 if over[worst] > under[worst] else -1.0
+        beyond = np.where(side != 0.0, 0.0, np.maximum(over, under))
+        new = np.unravel_index(beyond.argmax(), side.shape)
+        if beyond[new] <= _BEYOND:
+            return Exact(rounded(point.U), point.U, int((side != 0.0).sum()))
+        sign, multipliers = 1.0 if over[new] > under[new] else -1.0, point.multipliers
+        while True:
+            shares = system.dependence(side, new)
+            if shares is None:
+                side[new] = sign
+                following = system.solve(side)
+                if following is None:
+                    return None
+                change = following.multipliers - multipliers
+            else:  # the point stays, and multipliers move from the rows that are held to the new one
+                following, change = None, sign * shares
+            step, leaving = _first_to_vanish(side, new, multipliers, change)
+            if following is not None and step >= 1.0:
+                point = following
+                break
+            if leaving is None:  # no point satisfies this row and those held
+                return None
+            multipliers = multipliers + step * change
+            multipliers[leaving] = side[leaving] = 0.0
     return None
+
+
+def _first_to_vanish(
+    side: Array, new: tuple[Any, ...], multipliers: Array, change: Array
+) -> tuple[float, tuple[Any, ...] | None]:
+    """The step at which the first multiplier of a row that is held vanishes, and that row."""
+    shrinks = (side != 0.0) & (side * change < 0.0)
+    shrinks[new] = False
+    if not shrinks.any():
+        return np.inf, None
+    steps = np.full(side.shape, np.inf)
+    steps[shrinks] = np.abs(multipliers[shrinks]) / np.abs(change[shrinks])
+    leaving = np.unravel_index(steps.argmin(), side.shape)
+    return float(steps[leaving]), leaving
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """The solution of the conditions for a set of rows that are held: U (N, n), and a multiplier per row."""
+
+    U: Fixed
+    multipliers: Array
 
 
 class _Corrector:
@@ -170,12 +215,11 @@ class _System:
                 left = scaled - (scaled @ basis) @ basis.T
         return chosen
 
-    def solve(self, side: Array) -> tuple[Fixed, NDArray[np.bool_], Array] | None:
-        """U (N, n), which rows are held, and all multipliers, for rows held at their upper (1) or lower (−1)
-        bounds; None if the conditions do not determine them."""
+    def solve(self, side: Array) -> _Point | None:
+        """The point for independent rows that are held at their upper (1) or lower (−1) bounds; None if the
+        conditions do not determine it."""
         K, n = self._K, self._n
-        held = self._independent(side)
-        row, joint = np.nonzero(held)
+        row, joint = np.nonzero(side)
         bound = np.where(side > 0, self.upper, self.lower)[row, joint]
         if any(abs(b) >= int(1e29) << _BITS for b in bound):
             return None
@@ -206,7 +250,7 @@ class _System:
             return None
         multipliers = np.zeros(side.shape)
         multipliers[row, joint] = rounded(pull[: len(row)])
-        return U, held, multipliers
+        return _Point(U, multipliers)
 
     def _missing(
         self, U: Fixed, e: Fixed, pull: Fixed, row: NDArray[Any], joint: NDArray[Any], bound: Fixed
@@ -258,21 +302,44 @@ class _System:
             at += len(each)
         return rows.reshape(len(rows), K * n)
 
-    def _independent(self, side: Array) -> NDArray[np.bool_]:
-        """The rows to be held that depend neither on (33) nor on one another."""
+    def independent(self, side: Array) -> NDArray[np.bool_]:
+        """As many of the given rows as depend neither on (33) nor on one another."""
         row, joint = np.nonzero(side)
         held = np.zeros(side.shape, bool)
         if not len(row):
             return held
-        rows = self._scaled_rows(row, joint)
-        bounds, kept = rows[: len(row)], rows[len(row) :]
-        bounds = bounds / np.maximum(np.linalg.norm(bounds, axis=1, keepdims=True), 1e-300)
-        if len(kept):
-            basis, _ = np.linalg.qr((kept / np.linalg.norm(kept, axis=1, keepdims=True)).T)
-            for _ in range(2):
-                bounds = bounds - (bounds @ basis) @ basis.T
+        bounds, basis, _ = self._directions(row, joint, len(row))
+        for _ in range(2):
+            bounds = bounds - (bounds @ basis) @ basis.T
         factors: Any = qr(bounds.T, mode="economic", pivoting=True)
         R, order = factors[1:]
         chosen = order[: len(R)][np.abs(np.diag(R)) > _DEPENDENT]
         held[row[chosen], joint[chosen]] = True
         return held
+
+    def dependence(self, side: Array, new: tuple[Any, ...]) -> Array | None:
+        """How multipliers of the rows that are held make room for one of the new row, if it depends on them
+        and on (33); None if it is independent."""
+        held = side != 0.0
+        held[new] = False
+        row, joint = (np.append(*pair) for pair in zip(new, np.nonzero(held), strict=True))
+        (direction,), basis, size = self._directions(row, joint, 1)
+        left = direction
+        for _ in range(2):
+            left = left - basis @ (basis.T @ left)
+        if np.linalg.norm(left) > _DEPENDENT:
+            return None
+        others = self._scaled_rows(row, joint)[1:] / size[1:, None]
+        parts = np.linalg.lstsq(others.T, direction, rcond=None)[0][: len(row) - 1]
+        shares = np.zeros(side.shape)
+        shares[row[1:], joint[1:]] = -parts * size[0] / size[1 : len(row)]
+        shares[new] = 1.0
+        return shares
+
+    def _directions(self, row: NDArray[Any], joint: NDArray[Any], count: int) -> tuple[Array, Array, Array]:
+        """The first rows as unit vectors, an orthonormal basis of all the others, and the rows' lengths."""
+        rows = self._scaled_rows(row, joint)
+        size = np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
+        unit = rows / size[:, None]
+        basis = np.linalg.qr(unit[count:].T)[0] if len(unit) > count else np.zeros((rows.shape[1], 0))
+        return unit[:count], basis, size

@@ -103,6 +103,19 @@ def test_the_judge_needs_no_good_guess(seed: int) -> None:
             assert cost(beside) > cost(exact)
 
 
+def test_the_judge_decides_where_rows_nearly_depend() -> None:
+    """A row of level 3 is independent of those held by 1e-10 of its length: the optimum is found, and bounds
+    hold it. The explicit route is right to 1e-5 N·m there; the compiled one exceeds the row by less than
+    1e-10 N·m, which is worth 0.04 N·m."""
+    stack = random_stack("baxter", 163, 30)
+    assert stack is not None
+    levels = judged(stack)
+    assert levels is not None
+    assert levels[2].active > 0
+    assert levels[2].explicit is not None
+    assert levels[2].explicit <= 1e-5
+
+
 @pytest.mark.parametrize(
     ("seed", "n", "N", "levels", "position_rows", "room"),
     [
