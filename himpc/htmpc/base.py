@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import InputError, Robot
+from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]
 Base = Literal["holonomic", "unicycle"]
@@ -32,7 +32,7 @@ def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:
     return np.eye(robot.n)
 
 
-@lru_cache(maxsize=64)
+@per_robot
 def base_joints(robot: Robot) -> tuple[int, ...]:
     """Columns of the joints that make up a mobile base: the unbounded ones at the root of the tree."""
     count = 0

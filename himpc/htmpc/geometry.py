@@ -3,7 +3,6 @@ joints."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from himpc.htmpc.kernel.kinematics import frame_along, place_all
 from himpc.kinematics.geometry import Geometry, geometry
 from himpc.tick.kernel.kinematics import ORIENTATION, POSITION
 from robots import Robot
+from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -59,7 +59,7 @@ def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
     return found
 
 
-@lru_cache(maxsize=256)
+@per_robot
 def _mounted(robot: Robot, name: str) -> tuple[Indices, Array, Array]:
     """The joint that carries a frame, and the frame's axes and origin in the joint's."""
     frame = robot.model.frames[robot.frame_id(name or robot.tip)]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.prediction import Start
 from himpc.htmpc.settings import MotionBounds
 from robots import Robot
+from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]
 
@@ -34,7 +33,7 @@ def plausible(robot: Robot, q: Array, v: Array) -> bool:
     return bool(((q >= lower) & (q <= upper) & (np.abs(v) <= fastest)).all())
 
 
-@lru_cache(maxsize=32)
+@per_robot
 def _believable(robot: Robot) -> tuple[Array, Array, Array]:
     """Least and greatest positions and greatest speeds that a measurement may show, (n,) each."""
     lower = np.where(np.isfinite(robot.q_lower), robot.q_lower - _OUTSIDE, -_FARTHEST)

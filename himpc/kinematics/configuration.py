@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, final
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from robots import Robot
 from robots.errors import unknown_name
+from robots.per_robot import per_robot
 
 if TYPE_CHECKING:
     from himpc.references import Preview
@@ -133,7 +133,7 @@ class Configuration:
         return _joint_selection(self.robot, joints, self.horizon)
 
 
-@lru_cache(maxsize=256)
+@per_robot
 def joint_indices(robot: Robot, joints: tuple[str, ...]) -> list[int]:
     """Columns of the named joints; all of them for an empty tuple.
 
@@ -146,7 +146,7 @@ def joint_indices(robot: Robot, joints: tuple[str, ...]) -> list[int]:
     return [robot.joint_names.index(joint) for joint in joints] or list(range(robot.n))
 
 
-@lru_cache(maxsize=256)
+@per_robot
 def _joint_selection(robot: Robot, joints: tuple[str, ...], N: int) -> Array:
     selection = np.eye(robot.n)[joint_indices(robot, joints)]
     return np.broadcast_to(selection, (N, *selection.shape))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from robots import Robot
+from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -34,7 +34,7 @@ class Geometry(NamedTuple):
     moves: Array
 
 
-@lru_cache(maxsize=32)
+@per_robot
 def geometry(robot: Robot) -> Geometry:
     """The tables of a robot."""
     model, n = robot.model, robot.n
