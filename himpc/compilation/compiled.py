@@ -23,6 +23,8 @@ GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 
 inline_kernel = chain.inline_kernel
 """Compiles a function as a part of every `kernel` that calls it, wherever that stands."""
+always_inline_kernel = chain.always_inline_kernel
+"""The same for a function of many arrays: LLVM, left to itself, would pass all of them through memory."""
 kernel = chain.kernel
 """(*argument types): compiles a function, with every `inline_kernel` that it calls, for arguments of these
 types, and for no others, when its module is first imported."""

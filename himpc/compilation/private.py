@@ -29,6 +29,7 @@ except ImportError:  # a system without it: two processes may then compile the s
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
 inline_kernel = njit(**_PIECE)
+always_inline_kernel = njit(**_PIECE, forceinline=True)
 """See `compiled`."""
 
 

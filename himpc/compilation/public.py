@@ -15,6 +15,7 @@ from himpc.compilation.sources import digest_of
 
 config: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 inline_kernel = njit(**OPTIONS)
+always_inline_kernel = njit(**OPTIONS, forceinline=True)
 """See `compiled`."""
 
 

@@ -14,7 +14,8 @@ from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
 from himpc.limits.rows import Kind, coming_to_rest
 from himpc.prediction.joint import JointState
-from himpc.tick.kernel.arena import PERIOD, T_S, Arena, Array
+from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import PERIOD, T_S, Array
 from himpc.tick.kernel.cascade import ALONE, LAST, SOFTENED
 from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
 from himpc.tick.kernel.solve_level import solve_level

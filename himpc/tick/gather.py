@@ -9,7 +9,8 @@ import numpy as np
 from himpc.tasks import Damping, FrameOrientation
 from himpc.telemetry import Layout
 from himpc.tick.configure import Span, is_built_in
-from himpc.tick.kernel.arena import AT, Arena, Whole
+from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import AT, Whole
 
 _LIMITS = ("tau_lower", "tau_upper", "v_limit", "", "", "", "q_lower", "q_upper")
 """Telemetry fields of the rows of `limits`; an empty name means that the row (stops, decelerations) has no

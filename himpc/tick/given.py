@@ -13,7 +13,8 @@ from himpc.tasks import FrameOrientation, OrientationTask, Task
 from himpc.tasks.axes import AXES
 from himpc.tasks.seen import at_rest, rests
 from himpc.tick.configure import Span, is_built_in, write_motion
-from himpc.tick.kernel.arena import Arena, Array
+from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import Array
 from robots import Robot
 
 

@@ -11,7 +11,7 @@ from himpc.formulation.forms import StackForm
 from himpc.references import Preview
 from himpc.tasks import Damping, FrameOrientation, Task
 from himpc.tick.configure import write_tasks
-from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.linearize import linearize
 from robots import Robot
 

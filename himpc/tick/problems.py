@@ -9,7 +9,8 @@ import numpy as np
 from himpc.cascade.level import NO_ROWS, ActiveRows, Fallback, LevelProblem, LevelSolution
 from himpc.limits.rows import Rows
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
-from himpc.tick.kernel.arena import Arena, Array, Snapshot
+from himpc.tick.kernel.arena import Arena, Snapshot
+from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.tables import LevelTable, budget_of, sizes, write_effects, write_levels

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from himpc.qp import KKT_TOLERANCE
-from himpc.tick.kernel.arena import Arena, Array
+from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm
 
 BUDGET = 36e6
-"""Multiplications that the changes of active rows may cost in one tick: some twelve milliseconds, less than
+"""Multiplications that the changes of active rows may cost in one tick: some ten milliseconds, less than
 twenty on a slower core. A count, not a clock: the same seed gives the same run."""
 _ROUNDS = 12_000
 """Changes of active rows in a tick; the longest run is some milliseconds."""

@@ -22,7 +22,8 @@ from himpc.tick.configure import arena_for, write_curve, write_limits, write_pre
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
-from himpc.tick.kernel.arena import NOW, Array, Snapshot
+from himpc.tick.kernel.arena import Snapshot
+from himpc.tick.kernel.arrays import NOW, Array
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.references import SAMPLED

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
@@ -51,13 +51,30 @@ class ActiveSet(NamedTuple):
     change: Array
 
 
+class LevelBounds(NamedTuple):
+    """The bounds of a level, low ≤ L U ≤ high.
+
+    Attributes:
+        L: (b, N).
+        low, high: (b, n) N·m.
+        value: L U, (b, n) N·m.
+        length: scratch, (b, n).
+    """
+
+    L: Array
+    low: Array
+    high: Array
+    value: Array
+    length: Array
+
+
 @inline_kernel
-def normal_of(level: LevelQP, active: ActiveSet, index: int, L: Array, low: Array, high: Array) -> None:
+def normal_of(level: LevelQP, active: ActiveSet, index: int, bounds: LevelBounds) -> None:
     """Coefficients, scaled coefficients and target of row `index`."""
     r, a = active.row[index], active.joint[index]
     normal, scaled_normal = active.normal[index], active.scaled_normal[index]
     N = len(level.start)
-    limit = high[r, a] if active.side[index] > 0 else low[r, a]
+    L, limit = bounds.L, bounds.high[r, a] if active.side[index] > 0 else bounds.low[r, a]
     for j in range(N):
         limit -= L[r, j] * level.fixed[j, a]
         weight = L[r, j] * level.metric[a]
@@ -128,23 +145,23 @@ def without(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> Non
 
 
 @inline_kernel
-def update_multipliers(level: LevelQP, active: ActiveSet, k: int, ideal: Array) -> None:
-    """Multipliers of k rows as equalities; `ideal` is the white point without any row."""
+def update_multipliers(level: LevelQP, active: ActiveSet, k: int) -> None:
+    """Multipliers of k rows as equalities."""
     d = level.offset[len(level.start)]
     for p in range(k):
-        active.multiplier[p] = dot(active.scaled_normal[p], ideal, d) - active.target[p]
+        active.multiplier[p] = dot(active.scaled_normal[p], level.ideal, d) - active.target[p]
     forward(active.cholesky_factor, active.multiplier, k)
     backward(active.cholesky_factor, active.multiplier, k)
 
 
 @inline_kernel
-def point_from_multipliers(level: LevelQP, active: ActiveSet, k: int, ideal: Array) -> None:
+def point_from_multipliers(level: LevelQP, active: ActiveSet, k: int) -> None:
     """The point that belongs to the multipliers of k rows."""
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
     x = level.x
     for c in range(D):
-        x[c] = ideal[c] if c < d else 0.0
+        x[c] = level.ideal[c] if c < d else 0.0
     for p in range(k):
         subtract(active.multiplier[p], active.scaled_normal[p], x, D)
     backward(level.F, x, d)

@@ -6,7 +6,7 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.constants import RANK_TOLERANCE
-from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.linear import dot, subtract
 
 

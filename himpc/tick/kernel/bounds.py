@@ -6,7 +6,7 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.constants import RETURN_RATE
-from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.arrays import Array
 
 VIABILITY, PAPER, OFF = range(3)
 """How position limits are kept."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.active_set import ActiveSet
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.active_set import LevelBounds
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.bases import no_directions, projected_rows, take_directions
 from himpc.tick.kernel.bounds import constraint_values
-from himpc.tick.kernel.goldfarb_idnani import FAILED, optimum
-from himpc.tick.kernel.level import LevelQP, prepare
+from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import copy_rows, dot
 
 FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
@@ -94,80 +93,43 @@ def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Wh
 
 
 @inline_kernel
-def solve_problem(
+def widen(
     index: int,
     levels: Whole,
     level: LevelQP,
-    active: ActiveSet,
-    B: Array,
-    free: Array,
-    root_Q: Array,
-    U: Array,
-    count: int,
-    row: Whole,
-    joint: Whole,
-    warm_multiplier: Array,
-    L: Array,
+    bounds: LevelBounds,
     lower: Array,
     upper: Array,
-    low: Array,
-    high: Array,
-    value: Array,
-    length: Array,
-    ideal: Array,
-    budget: Array,
+    U: Array,
     room: float,
-) -> tuple[float, int]:
-    """Problem i, whose directions are known, into U[i]: its KKT residual and how many rows hold it; FAILED if
-    no optimum was found.
+) -> bool:
+    """The bounds of Problem i, and what (33) fixes of its increments, into U[i] if it leaves nothing: False
+    then.
 
     Args:
         index, levels: i and the table of levels.
-        level, active, ideal, value, length: scratch, see `optimum`.
-        B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
+        level, bounds: the results.
+        lower, upper: all bounds, (b, n) N·m.
         U: (r, N, n) increments of all levels, those above known.
-        count, row, joint, warm_multiplier: the rows active a tick ago.
-        L, lower, upper: all bounds.
-        low, high: what they are for this level.
-        budget: multiplications left.
         room: N·m, how far bounds give way around U_{i−1}.
     """
-    _, N, n = U.shape
-    alone = index == 0 or levels[index, ALONE] == 1
-    knots = levels[index, KNOTS]
-    if alone:
+    if index == 0 or levels[index, ALONE] == 1:
         level.fixed[:] = 0.0
-        copy_rows(lower, low)
-        copy_rows(upper, high)
-    else:
-        keep_above(level, U[index - 1], knots)
-        # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
-        constraint_values(U[index - 1], value)
-        for r in range(len(value)):
-            for a in range(n):
-                low[r, a] = min(lower[r, a], value[r, a] - room)
-                high[r, a] = max(upper[r, a], value[r, a] + room)
-        if level.rest[N] == 0:
-            copy_rows(U[index - 1], U[index])
-            return 0.0, 0
-    if not prepare(level, B, free, root_Q, ideal):
-        return FAILED, 0
-    return optimum(
-        level,
-        active,
-        count,
-        row,
-        joint,
-        warm_multiplier,
-        L,
-        low,
-        high,
-        ideal,
-        U[index],
-        value,
-        length,
-        budget,
-    )
+        copy_rows(lower, bounds.low)
+        copy_rows(upper, bounds.high)
+        return True
+    keep_above(level, U[index - 1], levels[index, KNOTS])
+    # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
+    value = bounds.value
+    constraint_values(U[index - 1], value)
+    for r in range(len(value)):
+        for a in range(U.shape[2]):
+            bounds.low[r, a] = min(lower[r, a], value[r, a] - room)
+            bounds.high[r, a] = max(upper[r, a], value[r, a] + room)
+    if level.rest[U.shape[1]] > 0:
+        return True
+    copy_rows(U[index - 1], U[index])
+    return False
 
 
 @inline_kernel

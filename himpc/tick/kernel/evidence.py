@@ -6,7 +6,7 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.cascade import OWN_FIRST, OWN_LAST
 from himpc.tick.kernel.kinematics import ORIENTATION
 

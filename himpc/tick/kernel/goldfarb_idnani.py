@@ -12,6 +12,7 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.active_set import (
     ActiveSet,
+    LevelBounds,
     fix,
     move,
     normal_of,
@@ -21,7 +22,7 @@ from himpc.tick.kernel.active_set import (
     update_multipliers,
     without,
 )
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.level import LevelQP, increments
 from himpc.tick.kernel.linear import backward
@@ -50,13 +51,11 @@ FAILED = -1.0
 def warm_start(
     level: LevelQP,
     active: ActiveSet,
+    bounds: LevelBounds,
     count: int,
     row: Whole,
     joint: Whole,
-    warm_multiplier: Array,
-    L: Array,
-    low: Array,
-    high: Array,
+    multiplier: Array,
     budget: Array,
 ) -> int:
     """Takes the rows that pressed a tick ago, but for those that depend on others; returns how many."""
@@ -65,11 +64,11 @@ def warm_start(
     k = 0
     for p in range(count):
         active.row[k], active.joint[k] = row[p], joint[p]
-        active.side[k] = 1 if warm_multiplier[p] > 0.0 else -1
-        bound = high[row[p], joint[p]] if warm_multiplier[p] > 0.0 else low[row[p], joint[p]]
+        active.side[k] = 1 if multiplier[p] > 0.0 else -1
+        bound = (bounds.high if multiplier[p] > 0.0 else bounds.low)[row[p], joint[p]]
         if k >= D or not math.isfinite(bound) or budget[0] < enough:
             continue
-        normal_of(level, active, k, L, low, high)
+        normal_of(level, active, k, bounds)
         budget[0] -= 0.5 * d * d
         length = resolve(active, k, D, budget)
         if length > 0.0:
@@ -79,7 +78,7 @@ def warm_start(
 
 
 @inline_kernel
-def release(level: LevelQP, active: ActiveSet, k: int, ideal: Array, budget: Array) -> int:
+def release(level: LevelQP, active: ActiveSet, k: int, budget: Array) -> int:
     """Lets rows go until the multipliers of all that stay push the right way; returns how many stay.
 
     Those that pull hardest go first: where a row goes, the multipliers of its neighbours often turn, and rows
@@ -100,7 +99,7 @@ def release(level: LevelQP, active: ActiveSet, k: int, ideal: Array, budget: Arr
             return k
         k = kept
         budget[0] -= k * (d + float(k))
-        update_multipliers(level, active, k, ideal)
+        update_multipliers(level, active, k)
 
 
 @inline_kernel
@@ -156,42 +155,26 @@ def take(level: LevelQP, active: ActiveSet, k: int, excess: float, budget: Array
 
 @inline_kernel
 def optimum(
-    level: LevelQP,
-    active: ActiveSet,
-    count: int,
-    row: Whole,
-    joint: Whole,
-    warm_multiplier: Array,
-    L: Array,
-    low: Array,
-    high: Array,
-    ideal: Array,
-    U: Array,
-    value: Array,
-    length: Array,
-    budget: Array,
+    level: LevelQP, active: ActiveSet, bounds: LevelBounds, k: int, U: Array, budget: Array
 ) -> tuple[float, int]:
-    """The level's optimum under low ≤ L U ≤ high: its KKT residual and how many rows hold it; FAILED if none
-    was found, and how many rows it got to within the budget, 0 if more of it would be of no help.
+    """The level's optimum under its bounds: its KKT residual and how many rows hold it; FAILED if none was
+    found, and how many rows it got to within the budget, 0 if more of it would be of no help.
 
     Args:
         level: prepared.
-        active: scratch; holds the active rows and their multipliers afterwards.
-        count, row, joint, warm_multiplier: the rows active a tick ago and their multipliers.
-        L, low, high: all bounds.
-        ideal: from `prepare`.
+        active: the k rows to begin with, from `warm_start`; holds the active rows and their multipliers
+            afterwards.
+        bounds: gives way by rounding where nothing else can.
         U: the increments found, (N, n).
-        value: L U, (b, n).
-        length: scratch, (b, n).
         budget: how many multiplications are left, one number: time, but the same on every machine.
     """
+    low, high, value = bounds.low, bounds.high, bounds.value
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
     evaluation_cost = float(d * d + U.size * U.shape[1] + 4 * value.size)
-    k = warm_start(level, active, count, row, joint, warm_multiplier, L, low, high, budget)
-    update_multipliers(level, active, k, ideal)
-    k = release(level, active, k, ideal, budget)
-    point_from_multipliers(level, active, k, ideal)
+    update_multipliers(level, active, k)
+    k = release(level, active, k, budget)
+    point_from_multipliers(level, active, k)
     changes = 0
     while True:
         budget[0] -= 3.0 * evaluation_cost + 4.0 * k * D
@@ -200,10 +183,10 @@ def optimum(
             return FAILED, k
         if kkt < 0.0:
             return FAILED, 0
-        kept = release(level, active, k, ideal, budget)
+        kept = release(level, active, k, budget)
         if kept < k:
             k = kept
-            point_from_multipliers(level, active, k, ideal)
+            point_from_multipliers(level, active, k)
             continue
         increments(level, U)
         constraint_values(U, value)
@@ -216,12 +199,12 @@ def optimum(
                 return FAILED, 0
             changes += 1
             if changes == _MANY:
-                lengths(level, active, k, length, budget)
+                lengths(level, active, k, bounds.length, budget)
             if changes >= _MANY:
-                excess, r, a, side = farthest(value, low, high, length, TOLERANCE if exact else _ROUGH)
+                excess, r, a, side = farthest(value, low, high, bounds.length, TOLERANCE if exact else _ROUGH)
             active.row[k], active.joint[k], active.side[k] = r, a, side
             budget[0] -= evaluation_cost + 2.0 * k * D
-            normal_of(level, active, k, L, low, high)
+            normal_of(level, active, k, bounds)
             met, k = take(level, active, k, excess, budget)
             if not met:
                 if budget[0] < 0.0:
@@ -232,9 +215,9 @@ def optimum(
                     high[r, a] += excess
                 elif exact:
                     low[r, a] -= excess
-                update_multipliers(level, active, k, ideal)
-                k = release(level, active, k, ideal, budget)
-            point_from_multipliers(level, active, k, ideal)
+                update_multipliers(level, active, k)
+                k = release(level, active, k, budget)
+            point_from_multipliers(level, active, k)
             if not met and not exact:
                 break  # at a vertex the rounding of a point that is not refined looks like an excess
             increments(level, U)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import copy
 
 POSITION, ORIENTATION, JOINTS, DAMPING, GIVEN = range(5)

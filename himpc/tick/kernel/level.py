@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import dot, factorise, forward
 from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian
 
@@ -23,6 +23,7 @@ class LevelQP(NamedTuple):
         rho: ρ, the weight of the increments.
         accuracy: the gradient that its point may have.
         C, S, row_knots: see `residual`.
+        B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
         projected_jacobian: B in coordinates, (N, m, n).
         e_0, e_1: √Q e for x = 0, and at the point, (N, m).
         pushed: scratch, (N, m).
@@ -32,6 +33,7 @@ class LevelQP(NamedTuple):
         fixed: (N, n) what the levels above keep, N·m.
         Q, metric: directions (N, n, n), and the joints' units of effort, (n,).
         F: the Cholesky factor of ρ + GᵀG.
+        ideal: the optimum without any row of bounds, in white coordinates Fᵀx.
         x: the point, own coordinates and those beyond.
         z: scratch.
         slope: the gradient.
@@ -45,6 +47,9 @@ class LevelQP(NamedTuple):
     C: Array
     S: Array
     row_knots: Whole
+    B: Array
+    free: Array
+    root_Q: Array
     projected_jacobian: Array
     e_0: Array
     e_1: Array
@@ -56,6 +61,7 @@ class LevelQP(NamedTuple):
     Q: Array
     metric: Array
     F: Array
+    ideal: Array
     x: Array
     z: Array
     slope: Array
@@ -63,16 +69,15 @@ class LevelQP(NamedTuple):
 
 
 @inline_kernel
-def prepare(level: LevelQP, B: Array, free: Array, root_Q: Array, ideal: Array) -> bool:
-    """e₀, the factor F and `ideal`, the optimum without any row in white coordinates Fᵀx. False if the
-    Hessian is not positive: nothing is finite then."""
+def prepare(level: LevelQP) -> bool:
+    """e₀, the factor F and `ideal`. False if the Hessian is not positive: nothing is finite then."""
     first, last = level.first, level.last
     N = len(level.start)
     total = 0.0
-    effects(B, level.fixed, first, last, level.pushed)
+    effects(level.B, level.fixed, first, last, level.pushed)
     for i in range(first, last):
         for k in range(N):
-            level.e_0[k, i] = root_Q[i] * free[k, i] if k < level.row_knots[i] else 0.0
+            level.e_0[k, i] = level.root_Q[i] * level.free[k, i] if k < level.row_knots[i] else 0.0
     add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_0)
     for k in range(N):
         total += dot(level.e_0[k, first:last], level.e_0[k, first:last], last - first)
@@ -86,8 +91,8 @@ def prepare(level: LevelQP, B: Array, free: Array, root_Q: Array, ideal: Array) 
     if not factorise(level.F, d):
         return False
     for c in range(d):
-        ideal[c] = -level.slope[c]
-    forward(level.F, ideal, d)
+        level.ideal[c] = -level.slope[c]
+    forward(level.F, level.ideal, d)
     return True
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.arrays import Array
 
 
 @inline_kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 
 SAMPLED, UNIFORM, EASED = range(3)
 """Where a task's reference comes from: samples that Python wrote, or a curve whose phase is φ = ωt + φ₀ or

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arena import Array, Whole
+from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import dot
 
 

@@ -6,7 +6,7 @@ import math
 
 from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.constants import APPROACH_RATE, STILL, VELOCITY_RATE
-from himpc.tick.kernel.arena import Array
+from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.kinematics import turned_away
 from himpc.tick.kernel.linear import copy, dot
 

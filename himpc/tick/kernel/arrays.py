@@ -1,0 +1,191 @@
+"""Every array of a tick: its name, shape and unit, and which files write and read it."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Annotated, Any, NamedTuple, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Whole = Any
+"""Whole numbers, NDArray[np.intp]: an element of them is a number, which type checkers do not know."""
+
+
+class TickArrays(NamedTuple):
+    """The arrays of a tick; each annotation says the shape, the unit, and "the files that write it → those
+    that read it", where those that write may read as well.
+
+    Units are those of revolute joints and of positions: with prismatic joints and angles rad, m and N·m, N
+    change places.
+
+    Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
+    F frames; G rows that are given; J = n + 1 places, the world first; b rows of bounds (kinds · N); w =
+    N · n coordinates of a level, and k = w + 1 rows that can hold its point, one of them about to be
+    replaced.
+    """
+
+    # What a tick is given.
+    q: Annotated[Array, "n", "rad", "kinematics tick → fallbacks given finish_tick linearize solve_level"]
+    v: Annotated[Array, "n", "rad/s", "kinematics tick → fallbacks given finish_tick linearize"]
+    tau_0: Annotated[Array, "n", "N·m", "tick → gather finish_tick linearize"]
+    x_d: Annotated[Array, "M", "m, rad", "configure linearize kinematics tick → gather"]
+    R_d: Annotated[Array, "T 3 3", "1", "configure kinematics tick → finish_tick linearize"]
+    # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
+    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize → gather tick"]
+    given: Annotated[Array, "N1 G n", "m, 1", "given → linearize"]
+    curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
+    pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
+    # What is remembered from the tick before.
+    q_was: Annotated[Array, "n", "rad", "finish_tick tick → given linearize"]
+    v_was: Annotated[Array, "n", "rad/s", "finish_tick tick → fallbacks given linearize"]
+    x_dot_was: Annotated[Array, "M", "m/s", "finish_tick linearize tick → itself"]
+    path: Annotated[Array, "N1 n", "rad", "finish_tick kinematics tick → given linearize"]
+    warm_multiplier: Annotated[Array, "r k", "1/N·m", "finish_tick solve_level problems → itself"]
+    U_was: Annotated[Array, "r N n", "N·m", "finish_tick problems tick → fallbacks"]
+    # The settings.
+    M_bar: Annotated[
+        Array, "n", "kg·m²", "configure kinematics problems tick → fallbacks finish_tick linearize"
+    ]
+    K_p: Annotated[Array, "M", "1/s²", "configure → linearize"]
+    K_v: Annotated[Array, "M", "1/s", "configure → linearize"]
+    root_Q: Annotated[Array, "M", "s²/m", "tables → finish_tick solve_level printed"]
+    C: Annotated[Array, "M N", "s²/m", "tables → finish_tick solve_level printed"]
+    S: Annotated[Array, "M N N", "s⁴/m²", "tables → solve_level"]
+    on_velocity: Annotated[Array, "N M", "1/s", "configure → linearize"]
+    on_acceleration: Annotated[Array, "N M", "1", "configure → linearize"]
+    rho: Annotated[Array, "r", "1/(N·m)²", "tables → solve_level printed"]
+    metric: Annotated[Array, "r n", "1", "tables → solve_level printed"]
+    R: Annotated[Array, "r n", "1/(N·m)²", "tables → finish_tick"]
+    accuracy: Annotated[Array, "r", "1", "tables → solve_level"]
+    limits: Annotated[
+        Array, "8 n", "N·m, rad/s, rad, rad/s²", "configure problems → gather finish_tick linearize"
+    ]
+    L: Annotated[Array, "b N", "1", "configure problems → fallbacks solve_level tick"]
+    approach: Annotated[Array, "N", "1", "configure → linearize"]
+    scalars: Annotated[
+        Array, "4", "s", "configure finish_tick kinematics problems tick → fallbacks linearize"
+    ]
+    # The robot.
+    rotation: Annotated[Array, "J 3 3", "1", "configure → linearize"]
+    translation: Annotated[Array, "J 3", "m", "configure → linearize"]
+    axis: Annotated[Array, "J 3", "1", "configure → linearize"]
+    frame_rotation: Annotated[Array, "F 3 3", "1", "configure → linearize"]
+    frame_translation: Annotated[Array, "F 3", "m", "configure → linearize"]
+    # What a tick finds; one piece, so that a plan takes its copy at once.
+    tau: Annotated[Array, "n", "N·m", "finish_tick → gather tick"]
+    U: Annotated[Array, "r N n", "N·m", "fallbacks solve_level → finish_tick problems tables tick"]
+    predicted: Annotated[Array, "N1 n", "rad", "finish_tick → tick"]
+    value: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
+    error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
+    R_now: Annotated[Array, "T 3 3", "1", "given linearize → finish_tick kinematics tick"]
+    lower: Annotated[Array, "b n", "N·m", "fallbacks linearize problems → solve_level tables tick"]
+    upper: Annotated[Array, "b n", "N·m", "fallbacks linearize problems → solve_level tick"]
+    stopping: Annotated[Array, "2 n", "1", "linearize → finish_tick tick"]
+    cost: Annotated[Array, "r", "1", "finish_tick → gather problems"]
+    kkt: Annotated[Array, "r", "1", "fallbacks solve_level → gather problems"]
+    leak: Annotated[Array, "r", "m/s²", "finish_tick → gather problems"]
+    multiplier: Annotated[Array, "r k", "1/N·m", "fallbacks solve_level → finish_tick problems"]
+    slack: Annotated[Array, "r k", "N·m", "fallbacks solve_level → problems"]
+    # What else telemetry tells of it; nothing is NaN.
+    quaternion: Annotated[Array, "T 4", "1", "finish_tick → gather"]
+    quaternion_d: Annotated[Array, "T 4", "1", "finish_tick → gather"]
+    delta_tau: Annotated[Array, "n", "N·m", "finish_tick → gather"]
+    at_bound: Annotated[Array, "n", "1", "finish_tick → gather"]
+    priority_leak: Annotated[Array, "1", "m/s²", "finish_tick → gather"]
+    active: Annotated[Array, "r", "1", "finish_tick → gather"]
+    rung: Annotated[Array, "r", "1", "fallbacks → gather finish_tick"]
+    time_us: Annotated[Array, "r", "µs", "fallbacks → gather"]
+    nothing: Annotated[Array, "1", "1", "configure → gather"]
+    # Scratch.
+    placed: Annotated[Array, "J 12", "1, m", "linearize → itself"]
+    axis_now: Annotated[Array, "J 3", "1", "linearize → itself"]
+    point: Annotated[Array, "F 3", "m", "linearize → itself"]
+    x_dot: Annotated[Array, "M", "m/s", "linearize → finish_tick"]
+    B: Annotated[
+        Array,
+        "N M n",
+        "m/s²/N·m",
+        "linearize problems → fallbacks finish_tick solve_level kinematics printed tick",
+    ]
+    free: Annotated[Array, "N M", "m/s²", "linearize problems → finish_tick solve_level printed tick"]
+    Q: Annotated[Array, "N n n", "1", "solve_level → itself"]
+    reflector: Annotated[Array, "N n n", "1", "solve_level → itself"]
+    projected_jacobian: Annotated[Array, "N M n", "m/s²/N·m", "solve_level → itself"]
+    fixed: Annotated[Array, "N n", "N·m", "solve_level → finish_tick linearize"]
+    e_0: Annotated[Array, "N M", "1", "solve_level → itself"]
+    e_1: Annotated[Array, "N M", "1", "finish_tick solve_level → itself"]
+    pushed: Annotated[Array, "N M", "m/s²", "solve_level → itself"]
+    H: Annotated[Array, "w w", "1/(N·m)²", "solve_level → itself"]
+    low: Annotated[Array, "b n", "N·m", "solve_level → itself"]
+    high: Annotated[Array, "b n", "N·m", "solve_level → itself"]
+    reached: Annotated[Array, "b n", "N·m", "solve_level → itself"]
+    length: Annotated[Array, "b n", "N·m", "solve_level → itself"]
+    effect: Annotated[Array, "r N M", "m/s²", "finish_tick → itself"]
+    normal: Annotated[Array, "k w", "1", "solve_level → itself"]
+    scaled_normal: Annotated[Array, "k w", "N·m", "solve_level → itself"]
+    orthonormal_basis: Annotated[Array, "k w", "1", "solve_level → itself"]
+    cholesky_factor: Annotated[Array, "k k", "N·m", "solve_level → itself"]
+    target: Annotated[Array, "k", "N·m", "solve_level → itself"]
+    violation: Annotated[Array, "k", "N·m", "solve_level → itself"]
+    trial_multiplier: Annotated[Array, "k", "1/N·m", "solve_level → itself"]
+    change: Annotated[Array, "k", "1/N·m", "solve_level → itself"]
+    x: Annotated[Array, "w", "N·m", "solve_level → itself"]
+    z: Annotated[Array, "w", "N·m", "linearize solve_level → itself"]
+    slope: Annotated[Array, "w", "1/N·m", "linearize solve_level → itself"]
+    ideal: Annotated[Array, "w", "1", "solve_level → itself"]
+    size: Annotated[Array, "2", "1/N·m, 1", "solve_level → itself"]
+    budget: Annotated[Array, "1", "1", "solve_level problems tick → itself"]
+    sizes: Annotated[Whole, "11", "1", "configure tables → fallbacks finish_tick linearize"]
+    # What is remembered, and whether `x_dot_was` and `U_was` are known.
+    known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
+    warm_row: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
+    warm_joint: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
+    warm_count: Annotated[Whole, "r", "1", "finish_tick solve_level problems tick → itself"]
+    # The settings.
+    task: Annotated[Whole, "T 4", "1", "configure → finish_tick linearize"]
+    part: Annotated[Whole, "M", "1", "configure → linearize"]
+    law: Annotated[Whole, "T", "1", "configure tick → linearize"]
+    row_knots: Annotated[Whole, "M", "1", "tables → finish_tick solve_level printed"]
+    level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level printed"]
+    # The robot.
+    parent: Annotated[Whole, "J", "1", "configure → linearize"]
+    is_revolute: Annotated[Whole, "J", "1", "configure → linearize"]
+    frame_joint: Annotated[Whole, "F", "1", "configure → linearize"]
+    # What a tick finds.
+    active_row: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]
+    active_joint: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]
+    active_count: Annotated[Whole, "r", "1", "fallbacks solve_level → finish_tick problems"]
+    left: Annotated[Whole, "r", "1", "solve_level → problems"]
+    # Scratch.
+    end: Annotated[Whole, "N", "1", "solve_level → itself"]
+    start: Annotated[Whole, "N", "1", "solve_level → itself"]
+    offset: Annotated[Whole, "N1", "1", "solve_level → itself"]
+    rest: Annotated[Whole, "N1", "1", "solve_level → itself"]
+    held_row: Annotated[Whole, "k", "1", "solve_level → itself"]
+    held_joint: Annotated[Whole, "k", "1", "solve_level → itself"]
+    held_side: Annotated[Whole, "k", "1", "solve_level → itself"]
+
+
+def _shapes(kind: Any) -> dict[str, str]:
+    """The shapes of all arrays of a kind."""
+    hints = get_type_hints(TickArrays, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
+
+
+def _numbered(name: str, shapes: dict[str, str]) -> Any:
+    """The place of every array among all. A module: what that holds is a constant to the compiler, which
+    would write a whole tuple down anew wherever one of its numbers is used."""
+    places = ModuleType(name)
+    vars(places).update({each: place for place, each in enumerate(shapes)})
+    return places
+
+
+NUMBERS, WHOLES = _shapes(Array), _shapes(Whole)
+"""Every array of numbers, and of whole numbers, and its shape."""
+AT, WHOLE_AT = _numbered("AT", NUMBERS), _numbered("WHOLE_AT", WHOLES)
+"""Where in `Arena.where` and `Arena.whole_where` the place of an array is noted."""
+
+PERIOD, T_S, REACTION, NOW = range(4)
+"""What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t."""
