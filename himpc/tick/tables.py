@@ -15,7 +15,7 @@ from himpc.tick.kernel.arrays import Array
 if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm
 
-BUDGET = 36e6
+BUDGET = 42e6
 """Multiplications that the changes of active rows may cost in one tick: some ten milliseconds, less than
 twenty on a slower core. A count, not a clock: the same seed gives the same run."""
 _ROUNDS = 12_000
