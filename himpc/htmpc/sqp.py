@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.avoidance import PENALTY
-from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC
 from himpc.htmpc.problem import Iterate, Problem
 from himpc.htmpc.rows import ConstraintRows
-from himpc.htmpc.working_set import solve_by_working_set
-from himpc.qp import QPSolution
+from himpc.qp import QPSolution, solve_qp
 
 Array = NDArray[np.float64]
 
@@ -141,8 +139,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
             solution = problem.tick.method.solve(g, rows, problem.unchanging)
             if solution.solved or solution.status == CONTRADICTION:
                 return solution
-        first = rows.kind == LEXICOGRAPHIC
-        return solve_by_working_set(H, g, rows.A, rows.lower, rows.upper, first, solver)
+        return solve_qp(H, g, rows.A, rows.lower, rows.upper, solver)
     if own:
         # No slack is bought where the rows can be met and cost less than its price.
         solution = problem.tick.method.solve(g, rows, 0)
@@ -159,8 +156,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
     lower = np.concatenate([rows.lower, np.zeros(N)])
     upper = np.concatenate([rows.upper, np.full(N, np.inf)])
     price = np.concatenate([g, np.full(N, PENALTY)])
-    first = np.arange(len(A)) >= len(A) - N
-    return solve_by_working_set(extended, price, A, lower, upper, first, solver)
+    return solve_qp(extended, price, A, lower, upper, solver)
 
 
 def _price(solution: QPSolution, rows: ConstraintRows, bought: int) -> float:
