@@ -52,14 +52,13 @@ def run(
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
-    from lessons.runs.named import tasks_named
 
     spec = _given(scene, urdf, tip, state)
     if controller is not None:  # replaces the seed of the state code
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
     seed = spec.seed if seed is None else seed
-    spec = replace(spec.but(*set), duration=duration, seed=seed, tasks=(*task, *tasks_named(set)))
+    spec = replace(spec, duration=duration, seed=seed, tasks=task).admitting(*set)
     loaded = spec.prepared()
     if settings:
         return _list(loaded, json)
