@@ -78,7 +78,7 @@ class HTMPCSettings:
         gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last one serves all
             further levels.
         rho: of HTIDKC only, ρ: weight of ‖q̇‖² in every level.
-        solver: name of the QP solver, one of himpc.qp.SOLVERS.
+        solver: name of the QP solver, see himpc.qp.Solver.
     """
 
     stack: Stack
