@@ -161,9 +161,6 @@ LESSONS = {
     "authoring": ("course", "exercises", "teaching", "runs", "scenes", "events", "own"),
     "replay": ("course", "scenes/run_spec", "scenes", "settings", "events", "own"),
     "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots"),
-    "headless": ("recording", "runs", "scenes"),
-    "kinds": ("recording", "scenes"),
-    "mobile": ("events",),
 }
 """What each part of lessons/ may import beside itself. A run names its scene, which may be that of a file:
 only trying it out in a session shows whether it can be used, and so runs stand above sessions."""
