@@ -138,8 +138,9 @@ def _show(result: dict[str, Any]) -> None:
             for kind in limits
             if limits[kind]["max_ratio"] is not None
         ),
-        "QPs": f"{solver['solves']} ({solver['backend']}, {solver['route']}), unsolved {solver['unsolved']}, "
-        f"fallbacks {fallbacks}, largest KKT residual {_figure(solver['max_kkt_residual'])}",
+        "QPs": f"{solver['solves']} ({solver['backend'] or 'no QP solver'}, {solver['route']}), "
+        f"unsolved {solver['unsolved']}, fallbacks {fallbacks}, "
+        f"largest KKT residual {_figure(solver['max_kkt_residual'])}",
         **_ranks(result),
         "leak into higher levels": _leak(result),
         **_mission(result),

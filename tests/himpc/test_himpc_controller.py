@@ -131,7 +131,7 @@ def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
             horizon=N,
             T_s=T_s,
             route=route,
-            solver=solver,
+            solver=solver if route == "explicit" else "daqp",
             limits=limits,
             M_bar=tuple(10 ** rng.uniform(-5, 3, 7)),
             R_on=rng.choice(["torque", "acceleration"]),
