@@ -76,6 +76,18 @@ def test_imports_go_one_way(package: str) -> None:
     assert not wrong
 
 
+def test_himpc_is_tested_without_lessons_and_app() -> None:
+    """Its tests show how it is used alone."""
+    files = sources("tests/himpc")
+    assert files
+    assert not {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, "lessons") or within(name, "app")
+    }
+
+
 APP = {
     "commands": ("server", "html", "link", "__main__"),
     "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
