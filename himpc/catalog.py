@@ -28,3 +28,16 @@ VELOCITY_CONTROLLERS: dict[str, str] = {
 
 Route = Literal["compiled", "explicit"]
 """How a tick is computed: by the kernel, or with all rows as printed."""
+
+OWN_METHOD = "goldfarb-idnani"
+"""The active-set method of the compiled code, which needs no QP solver."""
+
+
+def qp_method(controller: str, route: Route, solver: str) -> str | None:
+    """The method that solves the QPs of a torque-level controller: `OWN_METHOD`, the solver, or None for a
+    controller that solves none. A level without an optimum may ask DAQP besides."""
+    if controller == "hqp":
+        return solver
+    if controller not in ("himpc", "hiqp", "nhimpc", "weighted"):
+        return None
+    return solver if route == "explicit" else OWN_METHOD

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Solver = Literal["daqp", "proxqp", "qpoases"]
-SOLVERS: tuple[Solver, ...] = ("daqp", "proxqp", "qpoases")
 """The names of the solvers. `qpoases`, which the paper uses, is part of CasADi and needs it installed, see
 `is_installed`."""
 
@@ -70,7 +69,7 @@ def solve_qp(
         f: (k,).
         A: (r, k).
         lower, upper: (r,), ±inf where there is no bound.
-        solver: name of the solver, one of SOLVERS.
+        solver: name of the solver.
         iterations: largest number of iterations of all attempts of DAQP together; None: no limit.
 
     Returns:

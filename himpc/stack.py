@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from himpc.tasks import Damping, Task
@@ -16,7 +15,6 @@ from himpc.tasks.task import GAINS
 from robots import InputError, Robot
 from robots.ranges import Range, check_fields, check_numbers
 
-Array = NDArray[np.float64]
 Weight = float | tuple[float, ...]
 
 

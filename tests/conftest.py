@@ -68,7 +68,7 @@ _LONG = (
 _QUICK = (
     "tests/test_structure.py",
     "tests/himpc/test_himpc_limits.py",
-    "tests/himpc/test_himpc_one_step.py",
+    "tests/lessons/test_lessons_one_step.py",
     "tests/himpc/test_himpc_prediction.py",
     "tests/himpc/test_himpc_tasks.py",
     "tests/himpc/test_himpc_cascade.py",

@@ -76,6 +76,18 @@ def test_imports_go_one_way(package: str) -> None:
     assert not wrong
 
 
+def test_himpc_is_tested_without_lessons_and_app() -> None:
+    """Its tests show how it is used alone."""
+    files = sources("tests/himpc")
+    assert files
+    assert not {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, "lessons") or within(name, "app")
+    }
+
+
 APP = {
     "commands": ("server", "html", "link", "__main__"),
     "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
@@ -161,9 +173,6 @@ LESSONS = {
     "authoring": ("course", "exercises", "teaching", "runs", "scenes", "events", "own"),
     "replay": ("course", "scenes/run_spec", "scenes", "settings", "events", "own"),
     "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots"),
-    "headless": ("recording", "runs", "scenes"),
-    "kinds": ("recording", "scenes"),
-    "mobile": ("events",),
 }
 """What each part of lessons/ may import beside itself. A run names its scene, which may be that of a file:
 only trying it out in a session shows whether it can be used, and so runs stand above sessions."""

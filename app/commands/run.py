@@ -52,14 +52,13 @@ def run(
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
-    from lessons.runs.named import tasks_named
 
     spec = _given(scene, urdf, tip, state)
     if controller is not None:  # replaces the seed of the state code
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
     seed = spec.seed if seed is None else seed
-    spec = replace(spec.but(*set), duration=duration, seed=seed, tasks=(*task, *tasks_named(set)))
+    spec = replace(spec, duration=duration, seed=seed, tasks=task).admitting(*set)
     loaded = spec.prepared()
     if settings:
         return _list(loaded, json)
@@ -139,8 +138,9 @@ def _show(result: dict[str, Any]) -> None:
             for kind in limits
             if limits[kind]["max_ratio"] is not None
         ),
-        "QPs": f"{solver['solves']} ({solver['backend']}, {solver['route']}), unsolved {solver['unsolved']}, "
-        f"fallbacks {fallbacks}, largest KKT residual {_figure(solver['max_kkt_residual'])}",
+        "QPs": f"{solver['solves']} ({solver['backend'] or 'no QP solver'}, {solver['route']}), "
+        f"unsolved {solver['unsolved']}, fallbacks {fallbacks}, "
+        f"largest KKT residual {_figure(solver['max_kkt_residual'])}",
         **_ranks(result),
         "leak into higher levels": _leak(result),
         **_mission(result),

@@ -55,11 +55,9 @@ def sweep(
         usual_folder,
     )
     from lessons.parallel import on_cores
-    from lessons.runs.named import tasks_named
     from lessons.scenes.run_spec import RunSpec
 
-    own = tasks_named(set)
-    base = RunSpec(scene, controller=controller, set=tuple(set), duration=duration, seed=seed, tasks=own)
+    base = RunSpec(scene, controller=controller, duration=duration, seed=seed).admitting(*set)
     definition = make_sweep(base, over)
     choices = metrics(definition)
     shown = check_metric(metric or choices[0], choices)

@@ -181,7 +181,7 @@ class SceneChoice:
     def scene(self) -> Scene:
         """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
         choice = self.resolved()
-        return choice.run.applied_to(choice._bare())
+        return choice.run.prepared(choice._bare())
 
     def fitted(self) -> tuple[SceneChoice, Scene, tuple[str, ...]]:
         """Returns the choice without the tasks of files that its robot cannot have, its scene, and one reason
@@ -194,9 +194,9 @@ class SceneChoice:
         out = misfits(bare.robot, run.tasks)
         kept = replace(run, tasks=tuple(each for each in run.tasks if each not in out))
         try:
-            scene = kept.applied_to(bare)
+            scene = kept.prepared(bare)
         except InputError:
-            scene = run.applied_to(bare)  # raises the error that names the task's problem
+            scene = run.prepared(bare)  # raises the error that names the task's problem
         return replace(choice, run=kept), scene, tuple(out.values())
 
     def _bare(self) -> Scene:

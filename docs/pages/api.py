@@ -16,7 +16,6 @@ INSIDE = (
     "lessons.course",
     "lessons.papers",
     "lessons.examples",
-    "lessons.mobile",
     "lessons.plots",
 )
 """What nobody imports from outside."""

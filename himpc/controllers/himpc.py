@@ -16,7 +16,7 @@ from himpc.controllers.base import TorqueController
 from himpc.controllers.period import PeriodResult, PeriodState
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.formulation.memory import Memory
-from himpc.formulation.settings import Settings
+from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
@@ -79,6 +79,7 @@ class HIMPC(TorqueController):
                     self._weight[task.name] = 0.0
 
     def _apply(self, settings: Settings) -> None:
+        check_solver(settings, settings.route == "explicit")
         self._form, self._idle, self._off = prepare(self.robot, settings)
         self._M_bar_set = np.array(settings.M_bar)
         self._M_bar = self._M_bar_set

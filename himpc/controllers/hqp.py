@@ -52,6 +52,7 @@ class HQP(OneStepController):
     """
 
     clips = True
+    solves = True
 
     def _adopt(self, settings: Settings) -> None:
         self._nominal = NominalModel(self.robot, settings.nominal)

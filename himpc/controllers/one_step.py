@@ -15,7 +15,7 @@ from himpc.cascade.level import NO_ROWS, LevelSolution
 from himpc.controllers.answers import no_rows
 from himpc.controllers.base import TorqueController
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
-from himpc.formulation.settings import Settings
+from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
@@ -72,6 +72,8 @@ class OneStepController(TorqueController):
 
     clips: bool = False
     """Whether the torque bounds are imposed; otherwise the plan's torque is the demand of the law."""
+    solves: bool = False
+    """Whether the law solves QPs, by `Settings.solver`."""
     incremental: bool = False
     """Whether the bias contains τ₀: the bias is then continuous, and only the rest of the torque can jump."""
 
@@ -91,6 +93,7 @@ class OneStepController(TorqueController):
         self._changed = True
 
     def _apply(self, settings: Settings) -> None:
+        check_solver(settings, self.solves)
         prepared = prepare(self.robot, settings)
         self._adopt(settings)
         self._form, self._idle, self._off = prepared

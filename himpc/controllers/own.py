@@ -15,7 +15,7 @@ from himpc.controllers.base import TorqueController
 from himpc.controllers.one_step import leak as leak_of
 from himpc.controllers.view import Bounds, LevelView, View, read_only
 from himpc.formulation.forms import StackForm, measure, prepare, usable
-from himpc.formulation.settings import Settings
+from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, in_force, ramp, viability_bounds
 from himpc.limits.rows import reaction
@@ -80,6 +80,7 @@ class OwnController(TorqueController):
         self._share = _FIRST_SHARE
 
     def _apply(self, settings: Settings) -> None:
+        check_solver(settings, False)
         prepared = prepare(self.robot, settings)
         self._nominal = NominalModel(self.robot, settings.nominal)
         self._form, self._idle, self._off = prepared

@@ -30,7 +30,8 @@ class Settings:
             torques, see `himpc.controllers.adaptation`.
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
-        solver: "daqp", "proxqp" or, with CasADi installed, "qpoases".
+        solver: "daqp", "proxqp" or, with CasADi installed, "qpoases": solves the QPs of the explicit route
+            and of hqp. Where it would change nothing, only "daqp" is accepted, see `check_solver`.
         R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ (HQP:
             with its model's M_n).
         damping: add the damping level whenever the enabled levels leave freedom.
@@ -56,3 +57,12 @@ class Settings:
                 f"solver '{self.solver}' needs CasADi, which is not here: pip install casadi, or take daqp"
             )
         check_names(self.stack)
+
+
+def check_solver(settings: Settings, used: bool) -> None:
+    """Raises InputError for a QP solver other than the default where none is used."""
+    if settings.solver != "daqp" and not used:
+        raise InputError(
+            f"solver={settings.solver} changes nothing here: only hqp uses a QP solver, and himpc, hiqp, "
+            "nhimpc and weighted with route=explicit do; choose solver=daqp, or one of these"
+        )

@@ -78,7 +78,8 @@ class HTMPCSettings:
         gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last one serves all
             further levels.
         rho: of HTIDKC only, ρ: weight of ‖q̇‖² in every level.
-        solver: name of the QP solver, one of himpc.qp.SOLVERS.
+        solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its relatives solve
+            by a compiled method, and by "daqp" where that finds no solution; another solver replaces both.
     """
 
     stack: Stack

@@ -54,11 +54,6 @@ class Rows(NamedTuple):
         """The rows with both bounds moved outward by `slack`, (r, n) ≥ 0."""
         return self._replace(lower=self.lower - slack, upper=self.upper + slack)
 
-    def torque_only(self) -> Rows:
-        """The torque rows (32f) alone."""
-        N = self.L.shape[1]
-        return Rows(self.L[:N], self.lower[:N], self.upper[:N], self.kinds[:1])
-
 
 BRAKING = 20.0
 """1/s: decay rate of the velocity of a braking joint, which is almost at rest after a quarter of a second."""

@@ -14,7 +14,6 @@ from contextlib import suppress
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.view import View
@@ -27,8 +26,6 @@ from lessons.session.controllers import LONGEST_TICK
 from robots import InputError
 from robots.errors import shortened
 from robots.processes.family import end_family, has_ended, memory_of, spent
-
-Array = NDArray[np.float64]
 
 LOADING = 10.0
 """s that loading the file may take, the start of the process not included."""

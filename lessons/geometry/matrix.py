@@ -12,8 +12,6 @@ from himpc.cascade.explicit import quadratic
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.limits.rows import Kind, Rows
 
-Array = NDArray[np.float64]
-
 LARGEST = 64
 """Rows and columns that are shown; of a larger Hessian as many whole knots as fit, the first ones."""
 DECADES = 6

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from types import ModuleType
 
 from lessons.own.files import Source
 from lessons.own.kinds import Kind, kind_of
@@ -12,18 +11,13 @@ from lessons.own.load import load
 from robots import InputError
 from robots.processes.isolation import Allowance, Fault, isolated
 
-
-def judged(source: Source) -> Kind:
-    """What the file is. Raises InputError, one sentence, for one that cannot be loaded within the limits."""
-    return _judged(source)
-
-
 LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
 """Limits for loading a file before it is known to be harmless."""
 
 
 @lru_cache(maxsize=64)
-def _judged(source: Source) -> Kind:
+def judged(source: Source) -> Kind:
+    """What the file is. Raises InputError, one sentence, for one that cannot be loaded within the limits."""
     try:
         return isolated(_kind, source, within=LOADING, copied=True)
     except Fault as fault:
@@ -32,14 +26,3 @@ def _judged(source: Source) -> Kind:
 
 def _kind(source: Source) -> Kind:
     return kind_of(load(source, math.inf))
-
-
-def loaded(source: Source) -> ModuleType:
-    """The module of a file, after `judged` has accepted it. Raises InputError like `judged`."""
-    judged(source)
-    return _loaded(source)
-
-
-@lru_cache(maxsize=64)
-def _loaded(source: Source) -> ModuleType:
-    return load(source)

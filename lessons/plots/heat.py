@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -17,8 +18,11 @@ from lessons.plots.style import RC
 from lessons.plots.ticks import label_values
 
 Array = NDArray[np.float64]
-_LOST, _FAILED = "#F3D9D6", "#D5D9DE"
-_EDGE = "#B3261E"
+_HATCHED: dict[str, Any] = {"edgecolor": "#B3261E", "linewidth": 0.0}
+_LOST = {"facecolor": "#F3D9D6", "hatch": "////", **_HATCHED}
+_FAILED = {"facecolor": "#D5D9DE", "hatch": "xxxx", **_HATCHED}
+Marks = tuple[tuple[NDArray[np.bool_], dict[str, Any]], ...]
+"""Cells without a value, and how they are drawn."""
 
 
 def draw_map(
@@ -41,22 +45,19 @@ def draw_map(
         z: metric, (n,) or (n_1, n_2); NaN where there is none.
         diverged, failed: cells that lost control, and that could not be run; shaped as z.
     """
+    marks = ((diverged, _LOST), (failed, _FAILED))
     with mpl.rc_context(RC):
         figure = Figure(figsize=(7.2, 5.0 if z.ndim == 2 else 3.4), dpi=150, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots()
         axes.set_title(title)
         if z.ndim == 2:
-            _two(figure, axes, metric, labels, values, log, z, diverged, failed)
+            _two(figure, axes, metric, labels, values, log, z, marks)
         else:
-            _one(axes, metric, labels[0], values[0], log[0], z, diverged, failed)
+            _one(axes, metric, labels[0], values[0], log[0], z, marks)
+        names = ("control lost", "could not be run")
         handles = [
-            Patch(facecolor=face, edgecolor=_EDGE, hatch=hatch, linewidth=0.0, label=label)
-            for mask, face, hatch, label in (
-                (diverged, _LOST, "////", "control lost"),
-                (failed, _FAILED, "xxxx", "could not be run"),
-            )
-            if mask.any()
+            Patch(label=name, **how) for (mask, how), name in zip(marks, names, strict=True) if mask.any()
         ]
         if handles:
             figure.legend(handles=handles, loc="outside lower center", ncols=2)
@@ -91,21 +92,13 @@ def _two(
     values: tuple[tuple[float, ...], ...],
     log: tuple[bool, ...],
     z: Array,
-    diverged: NDArray[np.bool_],
-    failed: NDArray[np.bool_],
+    marks: Marks,
 ) -> None:
     x, y = (_edges(each, is_log) for each, is_log in zip(values, log, strict=True))
     shown = axes.pcolormesh(x, y, np.ma.masked_invalid(z.T), norm=_norm(z), cmap="viridis_r", rasterized=True)
-    for mask, face, hatch in ((diverged, _LOST, "////"), (failed, _FAILED, "xxxx")):
+    for mask, how in marks:
         for i, j in np.argwhere(mask):
-            axes.fill(
-                [x[i], x[i + 1], x[i + 1], x[i]],
-                [y[j], y[j], y[j + 1], y[j + 1]],
-                facecolor=face,
-                edgecolor=_EDGE,
-                hatch=hatch,
-                linewidth=0.0,
-            )
+            axes.fill([x[i], x[i + 1], x[i + 1], x[i]], [y[j], y[j], y[j + 1], y[j + 1]], **how)
     axes.set(xscale="log" if log[0] else "linear", yscale="log" if log[1] else "linear")
     label_values(axes.xaxis, values[0], log[0])
     label_values(axes.yaxis, values[1], log[1])
@@ -121,21 +114,13 @@ def _one(
     values: tuple[float, ...],
     log: bool,
     z: Array,
-    diverged: NDArray[np.bool_],
-    failed: NDArray[np.bool_],
+    marks: Marks,
 ) -> None:
     edges = _edges(values, log)
     axes.plot(values, z, "-o", color="#0057B8", markersize=4, linewidth=1.2, zorder=3)
-    for mask, face, hatch in ((diverged, _LOST, "////"), (failed, _FAILED, "xxxx")):
+    for mask, how in marks:
         for i in np.flatnonzero(mask):
-            axes.axvspan(
-                float(edges[i]),
-                float(edges[i + 1]),
-                facecolor=face,
-                edgecolor=_EDGE,
-                hatch=hatch,
-                linewidth=0.0,
-            )
+            axes.axvspan(float(edges[i]), float(edges[i + 1]), **how)
     axes.set_xscale("log" if log else "linear")
     label_values(axes.xaxis, values, log)
     if isinstance(_norm(z), LogNorm):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.catalog import qp_method
 from himpc.telemetry import FALLBACKS
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
@@ -27,7 +28,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "average_cost": [_average_cost(recording, level.name) for level in settings.levels if level.enabled],
         "limits": _limits(recording),
         "solver": {
-            "backend": settings.solver,
+            "backend": qp_method(settings.controller, settings.route, settings.solver),
             "route": settings.route,
             **qp_figures(recording, FALLBACKS),
             "iterations": {"mean": float(iterations.mean()), "max": float(iterations.max())},

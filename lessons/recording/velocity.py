@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.catalog import OWN_METHOD
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
 from lessons.session.velocity_rows import FALLBACKS
 from lessons.settings.values import peak
+from lessons.settings.velocity import VelocitySettings
 
 Array = NDArray[np.float64]
 
@@ -35,7 +37,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "average_cost": [_mean(recording[f"cost/{name}"]) for name in layout.levels],
         "limits": _limits(recording),
         "solver": {
-            "backend": session.settings.htmpc.solver,
+            "backend": _qp_method(session.settings),
             "route": "condensed",
             **qp_figures(recording, FALLBACKS),
         },
@@ -86,3 +88,9 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
             "acceleration": {"max_ratio": peak(np.abs(recording["acceleration"]) / bounds.a)},
             "jerk": {"max_ratio": peak(np.abs(recording["jerk"]) / bounds.j)},
         }
+
+
+def _qp_method(settings: VelocitySettings) -> str:
+    """The method that solves the QPs; where the compiled one finds no solution, DAQP is asked."""
+    solver = settings.htmpc.solver
+    return OWN_METHOD if solver == "daqp" and settings.controller != "htidkc" else solver

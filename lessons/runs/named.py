@@ -18,10 +18,9 @@ from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
 from lessons.own.load import alone, load
 from lessons.runs.check import check_scene
-from lessons.scenes.catalog import as_torque_scene, load_scene, with_own_tasks
+from lessons.scenes.catalog import as_torque_scene, attached, load_scene
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
-from lessons.settings.assignments import parse_assignment
 from robots import InputError, Robot
 
 TASK_SCENE = "iiwa14-hold"
@@ -91,7 +90,17 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
     Raises:
         InputError: a file cannot be used, or its Jacobian is not the task's.
     """
-    return with_own_tasks(scene, {name: _task_for(scene.robot, name) for name in files})
+    return with_files(scene, (), files)
+
+
+def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -> Scene:
+    """The scene with users' files attached: those that its controller may be, and those of tasks that its
+    stack may name. A scene at velocity level takes no files.
+
+    Raises:
+        InputError: the file of a task cannot be used, or its Jacobian is not the task's.
+    """
+    return attached(scene, controllers, {name: _task_for(scene.robot, name) for name in tasks})
 
 
 def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
@@ -110,24 +119,6 @@ def _task_for(robot: Robot, name: str) -> Task:
     task = task_in(name)
     called(read(name), partial(check_task, task, robot, name))
     return task
-
-
-def tasks_named(assignments: Iterable[str]) -> tuple[str, ...]:
-    """The Python files that assignments of a stack name as tasks."""
-    found: list[str] = []
-
-    def look(value: Any) -> None:
-        if isinstance(value, dict):
-            word = value.get("task")
-            if isinstance(word, str) and is_file(word):
-                found.append(word)
-        for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-            look(each)
-
-    for text in assignments:
-        if text.startswith(("stack=", "stack.add=")):
-            look(parse_assignment(text)[1])
-    return tuple(dict.fromkeys(found))
 
 
 def check_task(task: Task, robot: Robot, name: str) -> None:

@@ -85,20 +85,14 @@ def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
     return scene
 
 
-def with_controllers(scene: Scene, files: Iterable[str]) -> Scene:
-    """The scene, under whose controllers are now those of files as well, if it takes torques."""
+def attached(scene: Scene, controllers: Iterable[str], tasks: Mapping[str, Task]) -> Scene:
+    """The scene, whose controllers now include those of files, and whose stack may name tasks of one's own by
+    the path of their file, if it takes torques."""
     if not isinstance(scene, TorqueScene):
         return scene
-    return replace(scene, settings=admitted(scene.settings, files))
-
-
-def with_own_tasks(scene: Scene, own: Mapping[str, Task]) -> Scene:
-    """The scene, whose stack may now name tasks of one's own by the path of their file, if it takes
-    torques."""
-    if not own or not isinstance(scene, TorqueScene):
-        return scene
-    known = {**dict(scene.settings.own_tasks), **own}
-    return replace(scene, settings=replace(scene.settings, own_tasks=tuple(known.items())))
+    settings = admitted(scene.settings, controllers)
+    own = {**dict(settings.own_tasks), **tasks}
+    return replace(scene, settings=replace(settings, own_tasks=tuple(own.items())))
 
 
 def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:

@@ -28,7 +28,7 @@ def hold_of(name: str) -> TorqueScene:
         safe = suggest_M_bar(robot.model, robot.q_lower, robot.q_upper)
         robot = replace(robot, M_bar=np.minimum(robot.M_bar, safe))
     plant = PLANAR3_PLANT if name == "planar3" else PlantSettings()
-    return replace(_hold(robot, plant), name=f"{name}-hold", sources={})
+    return replace(_hold(robot, plant), name=f"{name}-hold")
 
 
 def hold(
@@ -60,7 +60,6 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
         q_0=robot.home,
         v_0=np.zeros(robot.n),
         duration=4.0,
-        sources={"urdf_text": robot.urdf_text, "tip": robot.tip},
     )
 
 

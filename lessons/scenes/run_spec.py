@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
@@ -9,6 +11,9 @@ from typing import TYPE_CHECKING, final
 if TYPE_CHECKING:
     from lessons.events import Event
     from lessons.scenes.scene import Scene
+
+_TASK_FILE = re.compile(r'"task"\s*:\s*("(?:[^"\\]|\\.)*\.py")')
+"""A task of a stack that is named by its file, as JSON."""
 
 
 @final
@@ -40,27 +45,24 @@ class RunSpec:
     files: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()
 
-    def loaded(self) -> Scene:
-        """The scene without controller and assignments. Raises InputError if it cannot be loaded."""
-        from lessons.runs.named import scene_named, with_tasks
-        from lessons.scenes.catalog import with_controllers
+    def loaded(self, bare: Scene | None = None) -> Scene:
+        """The scene without controller and assignments; the run's files are attached to it. Raises InputError
+        if it cannot be loaded.
 
-        scene = with_controllers(scene_named(self.scene, self.urdf, self.tip), self.files)
-        return with_tasks(scene, self.tasks)
-
-    def prepared(self) -> Scene:
-        """The scene with everything in place but the seed. Raises InputError with one sentence for an invalid
-        run.
+        bare: the scene without the files, if it is loaded already.
         """
-        return self.applied_to(self.loaded())
+        from lessons.runs.named import scene_named, with_files
 
-    def applied_to(self, scene: Scene) -> Scene:
-        """The scene, however it was loaded, with all that the run says besides."""
-        from lessons.runs.named import with_tasks
-        from lessons.scenes.catalog import prepared, with_controllers
+        scene = scene_named(self.scene, self.urdf, self.tip) if bare is None else bare
+        return with_files(scene, self.files, self.tasks)
 
-        scene = with_tasks(with_controllers(scene, self.files), self.tasks)
-        scene = prepared(scene, self.controller, self.set)
+    def prepared(self, bare: Scene | None = None) -> Scene:
+        """The scene with everything in place but the seed. Raises InputError with one sentence for an invalid
+        run. bare: as for `loaded`.
+        """
+        from lessons.scenes.catalog import prepared
+
+        scene = prepared(self.loaded(bare), self.controller, self.set)
         if self.events is not None:
             scene = replace(scene, events=self.events)
         return scene if self.duration is None else replace(scene, duration=self.duration)
@@ -68,6 +70,13 @@ class RunSpec:
     def but(self, *assignments: str) -> RunSpec:
         """The same run with further assignments."""
         return replace(self, set=(*self.set, *assignments))
+
+    def admitting(self, *assignments: str) -> RunSpec:
+        """The same run with further assignments by the person who started the program: the Python files that
+        their stacks name are admitted as tasks."""
+        stacks = (text for text in assignments if text.startswith(("stack=", "stack.add=")))
+        words = (word for text in stacks for word in _TASK_FILE.findall(text))
+        return replace(self.but(*assignments), tasks=(*self.tasks, *dict.fromkeys(map(_unquoted, words))))
 
     def command_line(self) -> str:
         """The line for a shell that does it; events cannot be told there."""
@@ -84,3 +93,11 @@ class RunSpec:
         for each in assignments:
             words += ["--set", each]
         return shlex.join(words)
+
+
+def _unquoted(word: str) -> str:
+    """The text of a JSON string; what is not one is left for the stack to refuse."""
+    try:
+        return json.loads(word)
+    except ValueError:
+        return word

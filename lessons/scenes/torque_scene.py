@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -30,14 +30,12 @@ class TorqueScene(Scene):
             takes it from them.
         v_0: initial velocities, (n,) rad/s.
         tau_0: torque acting at the start, (n,) N·m; None: the plant's holding torque.
-        sources: catalog name or URDF path and tip, so that a child process can load the same scene.
     """
 
     settings: TorqueSettings
     references: References
     v_0: Array
     tau_0: Array | None = None
-    sources: Mapping[str, str | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.settings.options is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from himpc.telemetry import Layout
 from lessons.events import Event, Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.settings.settings import SceneSettings
-from robots import InputError, Robot
+from robots import InputError, Plant, Robot, VelocityPlant
 
 Array = NDArray[np.float64]
 
@@ -33,19 +32,17 @@ class Session(ABC):
         settings: the settings in force.
         layout: where the fields of a row lie.
         plant: the simulation.
-        plan: the last plan, None before the first tick.
         diverged_at: simulated time at which control was lost, s; None if it was not.
         failure: one sentence on why the user's code no longer controls the robot; None as long as it does.
         notices: sentences for the learner (refused events, divergence); drain them.
         log: (time, event) of every event that took effect.
     """
 
-    settings: Any
     layout: Layout
-    plant: Any
-    plan: Any
 
-    def __init__(self, scene: Scene, seed: int) -> None:
+    def __init__(self, scene: Scene, seed: int, plant: Plant | VelocityPlant) -> None:
+        self.settings = scene.settings
+        self.plant = plant
         self.scene = scene
         self.seed = seed
         self.robot: Robot = scene.robot
@@ -138,7 +135,7 @@ class Session(ABC):
         """
 
     @abstractmethod
-    def adopt(self, settings: Any) -> None:
+    def adopt(self, settings: SceneSettings) -> None:
         """Takes over settings of the scene's kind at once, as an event that changed them would. Raises
         InputError if they do not fit."""
 

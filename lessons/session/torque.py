@@ -25,6 +25,7 @@ from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.places import Places
 from lessons.session.session import LOST_SPEED, Session
 from lessons.session.targets import carried, kept, move_target, target_at
+from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Plant, Robot, convergence_gauge
@@ -51,7 +52,6 @@ class TorqueSession(Session):
     """A run whose controller gives torques: every step is a control tick.
 
     Attributes:
-        plant: the simulation.
         plan: the last plan, None before the first tick.
         given: what it was made from.
     """
@@ -68,10 +68,8 @@ class TorqueSession(Session):
     ) -> None:
         """controllers: makes the controller that settings name. Raises InputError if the scene's settings do
         not fit its robot."""
-        super().__init__(scene, seed)
+        super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant))
         self._controller_of = controllers
-        self.settings = scene.settings
-        self.plant = Plant(scene.robot, scene.settings.plant)
         self.controller = self._controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
         self._data = scene.robot.model.createData()
@@ -170,7 +168,8 @@ class TorqueSession(Session):
             case _:
                 raise InputError("This scene has no mission: choose one of the HTMPC scenes.")
 
-    def adopt(self, settings: TorqueSettings) -> None:
+    def adopt(self, settings: SceneSettings) -> None:
+        assert isinstance(settings, TorqueSettings)
         layout, references = self.layout, self.references
         recomposed = not same_tasks(settings.levels, self.settings.levels)
         if recomposed:

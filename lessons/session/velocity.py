@@ -23,6 +23,7 @@ from lessons.session.session import LOST_SPEED, Session
 from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
 from lessons.session.velocity_rows import layout_of, write_bounds, write_plan, write_truth
 from lessons.settings.missions import OrderOptions
+from lessons.settings.settings import SceneSettings
 from lessons.settings.velocity import VelocitySettings
 from robots import InputError, VelocityPlant
 from robots.errors import unknown_name
@@ -39,7 +40,6 @@ class VelocitySession(Session):
     `advance` is one of them.
 
     Attributes:
-        plant: the simulation.
         bounds: the bounds in force.
         roles: the tasks of the scene's levels by name: what a mission can move.
         progress: how far the mission has come.
@@ -52,13 +52,12 @@ class VelocitySession(Session):
 
     def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
-        super().__init__(scene, seed)
+        super().__init__(scene, seed, VelocityPlant(scene.robot, scene.settings.plant, seed))
         self._take_settings(scene.settings)
         self._data = scene.robot.model.createData()
         self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
         self.layout = layout_of(scene.robot, scene.settings.htmpc.stack)
         self._row = np.full(self.layout.size, np.nan)
-        self.plant = VelocityPlant(scene.robot, scene.settings.plant, seed)
         # Settings that do not fit the robot are refused here, not at the first tick.
         make_velocity_controller(scene.settings.controller, scene.robot, scene.settings.htmpc)
         self.reset()
@@ -113,7 +112,8 @@ class VelocitySession(Session):
             case _:
                 raise InputError("this scene is driven by velocity servos: a push would not move it")
 
-    def adopt(self, settings: VelocitySettings) -> None:
+    def adopt(self, settings: SceneSettings) -> None:
+        assert isinstance(settings, VelocitySettings)
         # A controller that refuses them leaves everything as it is; the window's order comes with the tick.
         fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
         if settings.controller != self.settings.controller:

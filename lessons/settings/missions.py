@@ -20,7 +20,6 @@ from robots.ranges import Range, check_fields
 Array = NDArray[np.float64]
 Home = Mapping[str, Array]
 Architecture = Literal["hierarchical", "single_task", "decoupled"]
-ARCHITECTURES: tuple[Architecture, ...] = ("hierarchical", "single_task", "decoupled")
 """How a sequence is carried out: two tasks at a time (L = 2); one at a time by the whole body (L = 1); or one
 at a time by a part of it: the base drives with the arm at rest, then the arm moves and the base may turn. In
 the last one nothing plans for the arm: folded against its limits it may not get to a goal behind it."""
@@ -65,7 +64,7 @@ class ArchitectureOptions(MissionOptions):
     completed, so it is a choice, and one for all of them.
 
     Attributes:
-        architecture: one of ARCHITECTURES.
+        architecture: see `Architecture`.
         base_tolerance: a task of the base is completed within this distance of its place, m.
         base_at_rest: and slower than REST; otherwise at any speed.
     """

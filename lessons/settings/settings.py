@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -27,8 +27,8 @@ class Place:
         read: the value in some settings.
         write: the settings with a value instead, which `fit` returned.
         form: what the value may be.
-        own_fit: the value as it is stored, where the form does not tell. Raises InputError for one that
-            cannot be, naming the path.
+        own_fit: from settings, path and value the value as it is stored, where the form does not tell.
+            Raises InputError for one that cannot be, naming the path.
         shorthand: a second way to what other paths reach, or to several values at once; `read` then gives the
             first of them.
     """
@@ -36,12 +36,13 @@ class Place:
     read: Callable[[Any], Any]
     write: Callable[[Any, Any], Any]
     form: Form
-    own_fit: Callable[[str, Any], Any] | None = None
+    own_fit: Callable[[Any, str, Any], Any] | None = None
     shorthand: bool = False
 
-    def fit(self, path: str, value: Any) -> Any:
-        """The value as it is stored. Raises InputError, naming the path and what is allowed, for others."""
-        return self.form.fit(path, value) if self.own_fit is None else self.own_fit(path, value)
+    def fit(self, settings: Any, path: str, value: Any) -> Any:
+        """The value as some settings store it. Raises InputError, naming the path and what is allowed, for
+        others."""
+        return self.form.fit(path, value) if self.own_fit is None else self.own_fit(settings, path, value)
 
     def element(self, at: int, count: int) -> Place:
         """Where one of the `count` numbers of a list leads; one number for all is spread over it first, and
@@ -90,8 +91,9 @@ class SceneSettings(ABC):
         """Whether the clock on the wall decides anything, so that no two runs are the same."""
 
     @abstractmethod
-    def places(self) -> dict[str, Place]:
-        """The place of every path."""
+    def places(self) -> Mapping[str, Place]:
+        """The place of every path. A table serves all settings whose levels, tasks and options have the same
+        names."""
 
     def elements(self, path: str) -> int:
         """How many numbers a path has that can be changed one by one, as "M_bar.3"; 0: none."""
@@ -139,7 +141,7 @@ class SceneSettings(ABC):
             InputError: unknown path (naming the nearest), or a value of the wrong type or range.
         """
         place = self.place(path)
-        return place.write(self, place.fit(path, value))
+        return place.write(self, place.fit(self, path, value))
 
     def as_data(self) -> dict[str, Any]:
         """All of it as JSON-ready data."""
@@ -160,12 +162,12 @@ Whole = Callable[[S, Any], S]
 
 
 def field_places(
-    owner: Any, read: Part[S], write: Whole[S], prefix: str = "", without: tuple[str, ...] = ()
+    owner: type[Any], read: Part[S], write: Whole[S], prefix: str = "", without: tuple[str, ...] = ()
 ) -> dict[str, Place]:
     """A place for each field of a dataclass that is itself part of settings, typed by its annotation.
 
     Args:
-        owner: the dataclass as it is now.
+        owner: the dataclass.
         read: the owner in some settings.
         write: the settings with another owner.
         prefix: of the paths.
@@ -179,7 +181,7 @@ def field_places(
             form=form_of(hint),
         )
 
-    hints = field_types(type(owner))
+    hints = field_types(owner)
     names = [each.name for each in fields(owner) if each.name not in without]
     return {prefix + name: place(name, hints[name]) for name in names}
 
@@ -204,7 +206,10 @@ def level_key(name: str) -> LevelKey:
 
 
 def level_places(
-    stack: Stack, keys: Mapping[str, LevelKey], read: Callable[[S], Stack], write: Callable[[S, Stack], S]
+    names: Sequence[str],
+    keys: Mapping[str, LevelKey],
+    read: Callable[[S], Stack],
+    write: Callable[[S, Stack], S],
 ) -> dict[str, Place]:
     """Places "levels.NAME.KEY" and, as shorthands, "levels.PLACE.KEY" with 1 for the highest priority."""
 
@@ -224,25 +229,22 @@ def level_places(
     def by_name(name: str) -> Callable[[Stack], int]:
         return lambda levels: next(at for at, level in enumerate(levels) if level.name == name)
 
-    named = {
-        f"levels.{level.name}.{key}": place(by_name(level.name), keys[key], False)
-        for level in stack
-        for key in keys
-    }
+    named = {f"levels.{name}.{key}": place(by_name(name), keys[key], False) for name in names for key in keys}
     placed = {
         f"levels.{at + 1}.{key}": place(lambda _, at=at: at, keys[key], True)
-        for at in range(len(stack))
+        for at in range(len(names))
         for key in keys
     }
     return {**named, **placed}
 
 
-def every_level(stack: Stack, key: str, read: Callable[[S], Stack], write: Callable[[S, Stack], S]) -> Place:
+def every_level(key: str, read: Callable[[S], Stack], write: Callable[[S, Stack], S]) -> Place:
     """A weight of all levels at once: one number, or one per level."""
 
     form = form_of(field_types(Level)[key])
 
-    def fit(path: str, value: Any) -> list[Any]:
+    def fit(settings: S, _: str, value: Any) -> list[Any]:
+        stack = read(settings)
         values = value if isinstance(value, (list, tuple)) else [value] * len(stack)
         if len(values) != len(stack):
             raise InputError(f"{key} has {len(values)} values: give one number, or one per level")

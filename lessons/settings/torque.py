@@ -5,7 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
 from himpc.catalog import CONTROLLERS, Route
@@ -29,7 +30,7 @@ from lessons.settings.settings import (
     level_key,
     level_places,
 )
-from lessons.settings.stack import read_stack, same_tasks, told
+from lessons.settings.stack import Own, read_stack, same_tasks, told
 from lessons.settings.stack_changes import CHANGES, add
 from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.settings.values import WORD, Form, form_of
@@ -137,49 +138,15 @@ class TorqueSettings(SceneSettings):
             return replace(self, levels=moved(self.levels, event.level, event.to))
         return super().after(event)
 
-    def places(self) -> dict[str, Place]:
+    def places(self) -> Mapping[str, Place]:
         """Fields ("horizon", "M_bar", …) and those of the scene's options; "stack", a list of levels as
         `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". Where a
         value holds one number per joint, a place 1 … n behind it is that joint's alone: "M_bar.3"."""
-        without = ("levels", "options", "files", "own_tasks", *_PARTS)
-        own = field_places(self, lambda settings: settings, lambda _, new: _checked(new), without=without)
-        options = {}
-        if self.options is not None:
-            options = field_places(self.options, _part("options"), _with("options"))
-        parts = [field_places(getattr(self, part), _part(part), _with(part), f"{part}.") for part in _PARTS]
-        form = Form(WORD, words=tuple(self.controllers))
-        own["controller"] = replace(own["controller"], form=form, own_fit=partial(_known, form))
-        fit = own["route"].fit
-        own["route"] = replace(own["route"], own_fit=lambda path, value: fit(path, _now(value)))
-        return {
-            **own,
-            **options,
-            "order": Place(
-                lambda s: tuple(level.name for level in s.levels),
-                _with("levels"),
-                Form(None, WORD),
-                lambda _, value: ordered(self.levels, value),
-            ),
-            "stack": Place(
-                lambda s: told(s.levels, dict(s.own_tasks)),
-                _with("levels"),
-                Form(None, WORD),
-                lambda _, value: read_stack(value, self.levels, dict(self.own_tasks)),
-                shorthand=True,
-            ),
-            **{key: every_level(self.levels, key, _levels, _with("levels")) for key in ("Q", "R")},
-            **level_places(self.levels, _LEVEL_KEYS, _levels, _with("levels")),
-            **{
-                f"tasks.{task.name}.{key}": _gain(task.name, key)
-                for level in self.levels
-                for task in level.tasks
-                for key in _GAINS
-            },
-            **{path: place for part in parts for path, place in part.items()},
-        }
+        levels = tuple((level.name, tuple(task.name for task in level.tasks)) for level in self.levels)
+        return _places(levels, type(self.options), tuple(self.controllers))
 
     def elements(self, path: str) -> int:
         form = self.places()[path].form
@@ -188,17 +155,7 @@ class TorqueSettings(SceneSettings):
 
     def place(self, path: str) -> Place:
         """As in `Settings`; besides "stack.add" and the other `CHANGES`, which change the stack in part."""
-        if path not in CHANGES:
-            return super().place(path)
-        own = {"own": dict(self.own_tasks)} if CHANGES[path] is add else {}
-        change = partial(CHANGES[path], **own)
-        return Place(
-            _levels,
-            _with("levels"),
-            Form(None, WORD),
-            lambda _, value: change(self.levels, value),
-            shorthand=True,
-        )
+        return _CHANGE_PLACES.get(path) or super().place(path)
 
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:
         return (
@@ -209,7 +166,7 @@ class TorqueSettings(SceneSettings):
 
 
 _GAINS = ("K_p", "K_v")
-_PARTS = ("limits", "nominal", "plant")
+_PARTS = {"limits": Limits, "nominal": NominalSettings, "plant": PlantSettings}
 
 
 def _now(route: Any) -> Any:
@@ -271,3 +228,48 @@ def _gain(name: str, key: str) -> Place:
         return replace(settings, levels=tuple(levels))
 
     return Place(lambda settings: getattr(task(settings), key), write, _GAIN_FORMS[key])
+
+
+def _stack_place(change: Callable[[TorqueSettings, Any], Stack], read: Callable[..., Any] = _levels) -> Place:
+    """A place whose value changes the stack."""
+    return Place(
+        read, _with("levels"), Form(None, WORD), lambda s, _, value: change(s, value), shorthand=True
+    )
+
+
+def _own(settings: TorqueSettings) -> Own:
+    return dict(settings.own_tasks)
+
+
+_CHANGE_PLACES = {
+    **{path: _stack_place(lambda s, value, to=to: to(s.levels, value)) for path, to in CHANGES.items()},
+    "stack.add": _stack_place(lambda s, value: add(s.levels, value, _own(s))),
+}
+
+
+@lru_cache(maxsize=64)
+def _places(
+    levels: tuple[tuple[str, tuple[str, ...]], ...], options: type[Any], controllers: tuple[str, ...]
+) -> Mapping[str, Place]:
+    """`TorqueSettings.places` for the names of the levels and of their tasks."""
+    without = ("levels", "options", "files", "own_tasks", *_PARTS)
+    found = field_places(TorqueSettings, lambda s: s, lambda _, new: _checked(new), without=without)
+    form, route = Form(WORD, words=controllers), found["route"].form
+    found["controller"] = replace(
+        found["controller"], form=form, own_fit=lambda _, path, name: _known(form, path, name)
+    )
+    found["route"] = replace(found["route"], own_fit=lambda _, path, value: route.fit(path, _now(value)))
+    if options is not type(None):
+        found |= field_places(options, _part("options"), _with("options"))
+    order = _stack_place(lambda s, value: ordered(s.levels, value), lambda s: tuple(l.name for l in s.levels))
+    found["order"] = replace(order, shorthand=False)
+    found["stack"] = _stack_place(
+        lambda s, value: read_stack(value, s.levels, _own(s)), lambda s: told(s.levels, _own(s))
+    )
+    found |= {key: every_level(key, _levels, _with("levels")) for key in ("Q", "R")}
+    found |= level_places([name for name, _ in levels], _LEVEL_KEYS, _levels, _with("levels"))
+    for task in (task for _, tasks in levels for task in tasks):
+        found |= {f"tasks.{task}.{key}": _gain(task, key) for key in _GAINS}
+    for part, of in _PARTS.items():
+        found |= field_places(of, _part(part), _with(part), f"{part}.")
+    return MappingProxyType(found)

@@ -43,7 +43,9 @@ TORQUE_ENTRIES = (
               "distance; 0: (32e) as printed",
           "1/s", 0.0, 100.0, 1.0),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
-    Entry("solver", "QP solver", "Solver of the QPs with active bounds; qpoases needs the extra 'bench'"),
+    Entry("solver", "QP solver",
+          "Solver of the QPs of hqp and of the explicit route; controllers without QPs and the compiled "
+              "route, which has its own method, accept daqp only. qpoases needs the extra 'bench'"),
     Entry("R_on", "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ"),
     Entry("damping", "Damp what no level controls",
           "R weighs changes of torque only, so a direction without a task keeps its torque and runs away "

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from himpc.catalog import VELOCITY_CONTROLLERS
-from himpc.htmpc import HTMPCSettings
+from himpc.htmpc import HTMPCSettings, MotionLimits
 from himpc.stack import Stack
 from lessons.events import Appear, Event
 from lessons.settings.entry import Entry
@@ -96,39 +98,12 @@ class VelocitySettings(SceneSettings):
     def after(self, event: Event) -> VelocitySettings:
         return self.with_obstacle(event.ball()) if isinstance(event, Appear) else super().after(event)
 
-    def places(self) -> dict[str, Place]:
+    def places(self) -> Mapping[str, Place]:
         """A field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
         "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order"
         takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation
         brings its own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r."""
-        htmpc, options = self.htmpc, self.options
-        own = field_places(self, lambda s: s, lambda _, new: new, without=("htmpc", "plant", "options"))
-        found = {
-            **own,
-            "controller": replace(
-                own["controller"],
-                write=_with_controller,
-                form=Form(WORD, words=tuple(self.controllers)),
-            ),
-            **field_places(options, lambda s: s.options, lambda s, new: replace(s, options=new)),
-            **field_places(htmpc, _htmpc, _with_htmpc, without=("stack", "limits", "obstacles", "delay_s")),
-            **field_places(
-                htmpc.limits,
-                lambda s: s.htmpc.limits,
-                lambda s, new: _with_htmpc(s, replace(s.htmpc, limits=new)),
-                "limits.",
-            ),
-            **field_places(self.plant, lambda s: s.plant, lambda s, new: replace(s, plant=new), "plant."),
-            "Q": every_level(htmpc.stack, "Q", _stack, _with_stack),
-            **level_places(htmpc.stack, _LEVEL_KEYS, _stack, _with_stack),
-        }
-        found["formulation"] = replace(found["formulation"], write=_with_formulation)
-        if "order" in found:
-            found["order"] = replace(found["order"], own_fit=self._order)
-        return found
-
-    def _order(self, path: str, value: Any) -> tuple[str, ...]:
-        return tuple(level.name for level in ordered(self.htmpc.stack, value))
+        return _places(tuple(level.name for level in self.levels), type(self.options))
 
     def elements(self, path: str) -> int:
         return max(len(self.htmpc.gains), len(self.levels)) if path == "gains" else 0
@@ -139,9 +114,9 @@ class VelocitySettings(SceneSettings):
         head, _, name = path.partition(".")
         if head != "obstacles" or not name:
             return super().place(path)
-        known = {each.name: each for each in self.htmpc.obstacles if not isinstance(each, Floor)}
 
-        def fit(path: str, value: Any) -> Obstacle | None:
+        def fit(settings: VelocitySettings, path: str, value: Any) -> Obstacle | None:
+            known = {each.name: each for each in settings.htmpc.obstacles if not isinstance(each, Floor)}
             if value is None and name not in known:
                 raise unknown_name("obstacle", name, known)
             return None if value is None else _obstacle(known, path, name, value)
@@ -199,6 +174,39 @@ def _with_formulation(settings: VelocitySettings, name: Any) -> VelocitySettings
 
 _LEVEL_KEYS = {key: level_key(key) for key in ("Q", "enabled")}
 _BALL = Form(None, NUMBER, null=True)
+
+
+@lru_cache(maxsize=64)
+def _places(levels: tuple[str, ...], options: type[MissionOptions]) -> Mapping[str, Place]:
+    """`VelocitySettings.places` for the names of the levels."""
+    found = {
+        **field_places(
+            VelocitySettings, lambda s: s, lambda _, new: new, without=("htmpc", "plant", "options")
+        ),
+        **field_places(options, lambda s: s.options, lambda s, new: replace(s, options=new)),
+        **field_places(
+            HTMPCSettings, _htmpc, _with_htmpc, without=("stack", "limits", "obstacles", "delay_s")
+        ),
+        **field_places(
+            MotionLimits,
+            lambda s: s.htmpc.limits,
+            lambda s, new: _with_htmpc(s, replace(s.htmpc, limits=new)),
+            "limits.",
+        ),
+        **field_places(
+            VelocityPlantSettings, lambda s: s.plant, lambda s, new: replace(s, plant=new), "plant."
+        ),
+        "Q": every_level("Q", _stack, _with_stack),
+        **level_places(levels, _LEVEL_KEYS, _stack, _with_stack),
+    }
+    words = Form(WORD, words=tuple(VELOCITY_CONTROLLERS))
+    found["controller"] = replace(found["controller"], write=_with_controller, form=words)
+    found["formulation"] = replace(found["formulation"], write=_with_formulation)
+    if "order" in found:
+        found["order"] = replace(
+            found["order"], own_fit=lambda s, _, value: tuple(l.name for l in ordered(_stack(s), value))
+        )
+    return MappingProxyType(found)
 
 
 def _seen(settings: VelocitySettings, name: str) -> Any:

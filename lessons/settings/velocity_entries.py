@@ -49,7 +49,9 @@ VELOCITY_ENTRIES = (
           "Hand and forearm avoid collisions with the platform"),
     Entry("hold", "Hold", "Names of the joints that stay at rest"),
     Entry("base", "Base", "Type of motion of the base"),
-    Entry("solver", "QP solver", "Solver that is used if the compiled method finds no solution"),
+    Entry("solver", "QP solver",
+          "daqp: used by HTIDKC, and by the others if the compiled method finds no solution. proxqp and "
+              "qpoases solve all QPs"),
     Entry("compensate_delay", "Compensate delay",
           "Predict the measured state forward by the plant's lag before planning", tries=("false", "true"),
           name="delay compensated"),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from app.link.choice import SceneChoice
 from app.link.messages import Load, Loading, Quit, Tell, Told
 from app.link.wire import Wire
-from lessons.kinds import find_scene
+from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
 
 
@@ -18,7 +18,7 @@ def warm(say: Callable[[str], None]) -> None:
 
 def main(wire: Wire) -> None:
     choice = SceneChoice(RunSpec("planar3-hold"))
-    settings = find_scene("planar3-hold").settings
+    settings = load_scene("planar3-hold").settings
     while True:
         command = wire.recv()
         match command:

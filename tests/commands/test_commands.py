@@ -141,7 +141,7 @@ def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
     assert set(solver) == {
         *("backend", "route", "solves", "unsolved", "fallbacks", "max_kkt_residual", "iterations"),
     }
-    assert (solver["backend"], solver["route"], solver["solves"]) == ("daqp", "compiled", 150)
+    assert (solver["backend"], solver["route"], solver["solves"]) == ("goldfarb-idnani", "compiled", 150)
     assert set(result["step_ms"]) == {"median", "p99", "max"}
 
 

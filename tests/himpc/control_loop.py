@@ -1,4 +1,4 @@
-"""What tests of the controller in its loop share: rows of a session, a stack for the iiwa, references."""
+"""What tests of the controller in its loop share: a stack for the iiwa, references."""
 
 from __future__ import annotations
 
@@ -10,18 +10,9 @@ from numpy.typing import NDArray
 from himpc import FrameOrientation, FramePosition, Joints, Level, Settings
 from himpc.kinematics.configuration import Configuration
 from himpc.references import Hold, Preview
-from lessons.session.torque import TorqueSession
 from robots import Robot
 
 Array = NDArray[np.float64]
-
-
-def rows_of(session: TorqueSession, ticks: int) -> Array:
-    return np.array([session.tick().copy() for _ in range(ticks)])
-
-
-def field(session: TorqueSession, rows: Array, name: str) -> Array:
-    return rows[:, session.layout.fields[name]]
 
 
 def iiwa_settings(robot: Robot, **changes: Any) -> Settings:

@@ -3,68 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from control_loop import field, holds, iiwa_settings, rows_of
+from control_loop import holds, iiwa_settings
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc import HIMPC, Joints, Level, Limits
-from lessons.events import MoveTarget, Set
-from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
-from lessons.session.torque import TorqueSession
-from robots import Robot, load_robot
+from himpc import HIMPC, FramePosition, Joints, Level, Limits
+from robots import InputError, Robot
 
 Array = NDArray[np.float64]
 
 
 # ------------------------------------------------------------------ what it works with
-
-
-@pytest.mark.parametrize("name", ["iiwa14-hold", "planar3-hold"])
-@pytest.mark.parametrize("horizon", [1, 2, 20])
-def test_any_horizon_holds_and_follows(name: str, horizon: int) -> None:
-    """N = 1 (HIQP) and long horizons keep the arm on its targets and bring it to a moved one."""
-    scene = torque_scene(name)
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=horizon)))
-    target = session.target("position")
-    assert target is not None
-    goal = target.value.copy()
-    goal[0] -= 0.05
-    session.tick()
-    session.post(MoveTarget("position", tuple(goal)))
-    rows = rows_of(session, 1500)
-    assert np.abs(field(session, rows, "error/position")[-1]).max() < 2e-3
-    assert np.linalg.norm(field(session, rows, "x/position")[-1] - goal) < 4e-3
-    assert np.nansum(field(session, rows, "unsolved")) == 0
-
-
-def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> None:
-    """A 6-DoF arm under 3+3+1 rows: level 3 has no freedom, changes nothing and breaks nothing."""
-    robot = load_robot(example_urdf("ur_description/urdf/ur10_robot.urdf"))
-    assert robot.n == 6
-    scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
-    third = Level((Joints(name="q1", joints=robot.joint_names[:1]),))
-    settings = replace(scene.settings, levels=(*scene.settings.levels[:2], third))
-    for route in ("compiled", "explicit"):
-        session = TorqueSession(replace(scene, settings=replace(settings, route=route)))
-        start = session.robot.home
-        session.post(Set("levels.q1.K_p", 400))
-        rows = rows_of(session, 300)
-        assert session.plan is not None
-        assert [level.name for level in session.plan.levels] == ["position", "orientation", "q1"]
-        last = session.plan.levels[-1]
-        assert (last.fallback, last.status) == ("solve", "empty")
-        np.testing.assert_array_equal(last.U, session.plan.levels[1].U)
-        assert np.nanmax(field(session, rows, "priority_leak")) <= 1e-6
-        assert np.nansum(field(session, rows, "unsolved")) == 0
-        assert np.abs(session.plant.q - start).max() < 0.02
 
 
 def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
@@ -131,7 +86,7 @@ def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
             horizon=N,
             T_s=T_s,
             route=route,
-            solver=solver,
+            solver=solver if route == "explicit" else "daqp",
             limits=limits,
             M_bar=tuple(10 ** rng.uniform(-5, 3, 7)),
             R_on=rng.choice(["torque", "acceleration"]),
@@ -187,26 +142,30 @@ def test_the_controller_sees_no_mass(iiwa: Robot) -> None:
         np.testing.assert_array_equal(one.tau, other.tau)
 
 
+def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
+    """A refused configure leaves the controller as it was, to the bit."""
+    one, other = HIMPC(iiwa, iiwa_settings(iiwa)), HIMPC(iiwa, iiwa_settings(iiwa))
+    previews = holds(iiwa, 5)
+    for _ in range(3):
+        one.step(iiwa.home, np.full(7, 0.01), previews)
+        other.step(iiwa.home, np.full(7, 0.01), previews)
+    good = iiwa_settings(iiwa)
+    bad = [
+        replace(good, M_bar=good.M_bar[:-1]),
+        replace(good, stack=(Level((FramePosition(name="p", frame="nowhere"),)),)),
+        replace(good, stack=(Level((Joints(name="j", joints=("nothing",)),)),)),
+        replace(good, stack=(Level((FramePosition(name="p"),), Q=(1.0, 2.0)),)),
+        replace(good, stack=(*good.stack, Level((FramePosition(name="p"),), R=(1.0, 2.0), enabled=False))),
+    ]
+    for each in bad:
+        with pytest.raises(InputError):
+            one.configure(each)
+    assert one.settings == good
+    now, then = (c.step(iiwa.home + 0.01, np.zeros(7), previews) for c in (one, other))
+    np.testing.assert_array_equal(now.tau, then.tau)
+
+
 # ------------------------------------------------------------------ evidence
-
-
-def test_binding_constraints_are_named(iiwa_scene: TorqueScene) -> None:
-    """While a fast move presses on a velocity bound the plan names level, joint, kind, side and pressure."""
-    session = TorqueSession(iiwa_scene)
-    session.post(Set("limits.velocity_scale", 0.05))
-    session.tick()
-    session.post(MoveTarget("position", (0.4, 0.4, 0.5)))
-    rows_of(session, 900)
-    bindings = session.binding()
-    assert bindings
-    first = bindings[0]
-    assert first.level in ("position", "orientation", "posture")
-    assert first.joint in session.robot.joint_names
-    assert {binding.kind for binding in bindings} == {"velocity"}
-    assert first.side in ("upper", "lower")
-    assert first.multiplier > 0
-    assert abs(first.slack) < 1e-6
-    assert 1 <= first.knot <= session.settings.horizon
 
 
 def test_a_plan_carries_its_evidence(iiwa: Robot) -> None:

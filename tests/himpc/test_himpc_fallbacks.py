@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import daqp
 import numpy as np
 import pytest
 from broken_solver import NONSENSE, break_kernel, break_solver
-from cascade_checks import assert_within, largest_difference
+from cascade_checks import assert_within, largest_difference, torque_rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -20,11 +19,6 @@ from himpc.cascade.last_resort import containing
 from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.braking import least_slack
-from himpc.references import Outlook
-from himpc.tick import fallbacks
-from himpc.tick.tables import BUDGET, budget_of
-from lessons.scenes.catalog import torque_scene
-from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]
 
@@ -127,7 +121,7 @@ def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
         )
         moved = Hierarchy(pressed.problems, rows._replace(lower=lower))
         assert not least_slack(moved.rows).any()
-        assert_within(moved.rows.torque_only(), np.zeros((N, n)))
+        assert_within(torque_rows(moved), np.zeros((N, n)))
     break_solver(monkeypatch, "unsolved")
     solutions = moved.solve("explicit", "daqp", sound)
     assert solutions[0].fallback == "brake"
@@ -184,7 +178,7 @@ def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, posit
         assert np.isfinite(solution.U).all()
         assert solution.kkt_residual <= 1e-6
         assert solution.leak <= 1e-6
-        assert_within(contradictory.rows.torque_only(), solution.U)
+        assert_within(torque_rows(contradictory), solution.U)
 
 
 @given(seeds, st.integers(1, 6), st.integers(1, 6), st.booleans())
@@ -237,62 +231,3 @@ def test_a_qp_takes_no_more_iterations_than_it_may(monkeypatch: pytest.MonkeyPat
     assert sum(used) <= limit + len(used)
     assert qp.solve_qp(np.eye(k), f, A, np.full(2 * k, -width), np.full(2 * k, width)).solved
     assert not found.solved or sum(used) > limit
-
-
-def test_a_cycle_at_a_small_problem_ends_early() -> None:
-    """At N = 1 a planar arm thrown about does not go round and round until a large problem's budget is spent
-    (44 ms once; seen in `benchmarks.fuzz`)."""
-    scene = torque_scene("planar3-singular")
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=1)))
-    session.tick()
-    kernel = getattr(session.controller, "kernel")  # noqa: B009  (other controllers have none)
-    rounds = budget_of(kernel.arena) / (3 * 3 + 4.0 * kernel.arena.f["lower"].size)
-    assert rounds <= 12_000
-    assert budget_of(kernel.arena) < 0.1 * BUDGET
-
-
-@pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
-def test_a_hostile_state_costs_no_more_than_the_budget_of_a_tick(controller: str) -> None:
-    """Whatever the state, the kernel's changes of active rows stay within the tick's multiplications."""
-    scene = torque_scene("iiwa14-hold")
-    session = TorqueSession(
-        replace(scene, settings=replace(scene.settings, horizon=20, controller=controller))
-    )
-    session.tick()
-    kernel = getattr(session.controller, "kernel")  # noqa: B009  (other controllers have none)
-    rng, spent = np.random.default_rng(0), []
-    for k in range(60):
-        q = session.plant.q + rng.normal(0, 10.0 ** (k % 6 - 3), 7)
-        v = session.robot.v_limit * rng.normal(0, 10.0 ** (k % 4 - 2), 7)
-        outlook = Outlook(session.references, session.t, 1e-3, 20)
-        plan = session.controller.step(q, v, outlook, session.robot.tau_limit * rng.normal(size=7))
-        assert (np.abs(plan.tau) <= session.robot.tau_limit).all()
-        spent.append(BUDGET - kernel.arena.f["budget"][0])
-    # What is begun is ended: one change of rows is far less than a tenth.
-    assert max(spent) <= 1.1 * BUDGET
-    assert max(spent) > 0.0
-
-
-def test_nhimpc_asks_the_printed_route_a_few_times_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ten iterations of three levels that the kernel gives up could ask thirty times, a millisecond or more
-    each (seen in `benchmarks.fuzz`: 24 times, 33 ms)."""
-    asked: list[str] = []
-
-    def counted(*given: Any) -> Any:
-        asked.append("printed")
-        return solves(*given)
-
-    solves = fallbacks.solve_explicit
-    monkeypatch.setattr(fallbacks, "solve_explicit", counted)
-    monkeypatch.setattr(fallbacks, "solve_level", lambda *_: False)
-    scene = torque_scene("iiwa14-circle-paper")
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=3, controller="nhimpc")))
-    rng, most = np.random.default_rng(0), 0
-    for _ in range(10):
-        asked.clear()
-        q = session.plant.q + 0.1 * rng.normal(size=7)
-        v = 2.0 * session.robot.v_limit * rng.normal(size=7)
-        outlook = Outlook(session.references, session.t, 1e-3, 3)
-        session.controller.step(q, v, outlook, session.plant.tau)
-        most = max(most, len(asked))
-    assert 0 < most <= 3

@@ -16,12 +16,9 @@ from himpc import FrameOrientation, FramePosition, Joints, Level, Settings
 from himpc.controllers import Controller, hqp, make_controller
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import Limits
-from himpc.plan import Plan
 from himpc.qp import QPSolution
-from himpc.references import Hold, Preview
+from himpc.references import Preview
 from himpc.rotation import log3
-from lessons.scenes.catalog import torque_scene
-from lessons.session.torque import TorqueSession
 from robots import InputError, NominalModel, NominalSettings, Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -223,70 +220,7 @@ def test_hqp_meets_its_kkt_conditions(solver: Any, share: float) -> None:
 # ------------------------------------------------------------------ what they read
 
 
-def torques(name: str, scene: str = "planar3-circle", ticks: int = 60, **changes: Any) -> Array:
-    loaded = torque_scene(scene)
-    session = TorqueSession(replace(loaded, settings=replace(loaded.settings, controller=name, **changes)))
-    return np.array([session.tick()[session.layout.fields["tau_demand"]].copy() for _ in range(ticks)])
-
-
-@pytest.mark.parametrize("name", ["himpc", "hiqp", "weighted", "nhimpc", "tdeosf", "tdeosf_damped"])
-def test_model_free_controllers_never_read_the_nominal_model(name: str) -> None:
-    """The same torques to the bit whatever the nominal model is."""
-    np.testing.assert_array_equal(torques(name), torques(name, nominal=HEAVY))
-
-
-@pytest.mark.parametrize("name", MODEL_BASED)
-def test_model_based_controllers_do_read_it(name: str) -> None:
-    assert np.abs(torques(name) - torques(name, nominal=HEAVY)).max() > 1e-3
-
-
-@pytest.mark.parametrize("name", RIVALS)
-def test_same_start_same_torques(name: str) -> None:
-    np.testing.assert_array_equal(torques(name), torques(name))
-
-
 # ------------------------------------------------------------------ singular, failing, not finite
-
-
-def straight(name: str, **changes: Any) -> Plan:
-    """One tick of the planar arm, straight, asked to pull its tip towards the base."""
-    loaded = torque_scene("planar3-singular")
-    chosen = replace(loaded.settings.for_controller(), **changes)
-    pulled = {
-        "position": Hold(np.array([0.85, 0.0])).preview(0.0, 1e-3, 5),
-        "q1": Hold(np.array([0.3])).preview(0.0, 1e-3, 5),
-    }
-    q = np.array([0.0, 1e-7, 0.0])
-    return make_controller(name, loaded.robot, chosen).step(q, np.zeros(3), pulled)
-
-
-@pytest.mark.parametrize("name", ["osf", "tdeosf"])
-def test_near_a_singularity_nothing_is_hidden(name: str) -> None:
-    """The undamped laws ask for thousands of times the torque there is, finite; the damped ones do not."""
-    limit = load_robot("planar3").tau_limit
-    assert np.abs(straight(name).tau / limit).max() > 1e3
-    damped = straight(f"{name}_damped").tau
-    assert 0.0 < np.abs(damped / limit).max() < 1.0
-
-
-def test_a_direction_that_is_gone_is_named() -> None:
-    """At the exactly straight arm the lost direction is given up, and the level says so."""
-    loaded = torque_scene("planar3-singular")
-    controller = make_controller("osf", loaded.robot, loaded.settings.for_controller())
-    references = loaded.references(loaded.robot, loaded.settings.levels)
-    previews = {name: each.preview(0.0, 1e-3, 5) for name, each in references.items()}
-    plan = controller.step(np.zeros(3), np.zeros(3), previews)
-    assert plan.levels[0].status == "directions lost: 1"
-    assert np.abs(plan.tau).max() < 4.0
-
-
-def test_hqp_passes_the_singularity_inside_its_bounds() -> None:
-    """R > 0 keeps the Hessian definite: no level fails, and the torque bounds hold."""
-    for R in (10.0, 1e-6):
-        levels = tuple(replace(level, R=R) for level in torque_scene("planar3-singular").settings.levels)
-        plan = straight("hqp", stack=levels)
-        assert plan.unsolved == 0 and plan.kkt_residual <= 1e-6
-        assert np.abs(plan.tau).max() <= 4.0
 
 
 def test_a_failing_qp_is_data(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -429,13 +363,3 @@ def test_levels_that_are_off_are_still_measured(name: str) -> None:
     assert controller.step(at.q, at.v, at.previews).levels == ()
     controller.configure(settings())
     assert len(controller.step(at.q, at.v, at.previews).levels) == 3
-
-
-@pytest.mark.parametrize("scene", ["planar3-hold", "iiwa14-hold", "panda-hold"])
-@pytest.mark.parametrize("name", RIVALS)
-def test_every_rival_holds_every_catalog_robot(name: str, scene: str) -> None:
-    loaded = torque_scene(scene)
-    session = TorqueSession(replace(loaded, settings=replace(loaded.settings, controller=name)))
-    errors = [session.tick()[session.layout.fields["error/position"]].copy() for _ in range(200)]
-    assert session.diverged_at is None
-    assert np.abs(errors).max() < 1e-4

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -15,8 +13,6 @@ from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from himpc.references import Hold
-from himpc.rotation import exp3, quaternion
-from himpc.stack import Level
 from himpc.tasks import (
     KINDS,
     CentreOfMass,
@@ -31,10 +27,6 @@ from himpc.tasks import (
     RelativePosition,
     Task,
 )
-from himpc.tasks.frame import FrameTask
-from lessons.events import MoveTarget
-from lessons.scenes.catalog import torque_scene
-from lessons.session.torque import TorqueSession
 from robots import CATALOG, InputError, Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -166,100 +158,3 @@ def test_every_kind_says_what_it_is() -> None:
 
 
 # ------------------------------------------------------------------ rows that the kernel does not know
-
-
-FAR = {
-    "two_axes": (0.1, 0.1, 1.7),
-    "one_axis": (1.7, 0.1, 0.1),
-    "relative_two_axes": (1.7, 0.1, 0.1),
-    "relative_one_axis": (1.7, 0.1, 0.1),
-}
-"""rad, by which the target of an orientation on some axes is turned away."""
-
-GIVEN = {
-    "two_axes": lambda: FrameOrientation(name="x", axes="xy", K_p=60.0, K_v=15.0),
-    "one_axis": lambda: FrameOrientation(name="x", axes="z", K_p=60.0, K_v=15.0),
-    "relative_two_axes": lambda: RelativeOrientation(name="x", root="link_3", axes="yz", K_p=60.0, K_v=15.0),
-    "relative_one_axis": lambda: RelativeOrientation(name="x", root="link_3", axes="y", K_p=60.0, K_v=15.0),
-    "com": lambda: CentreOfMass(name="x", axes="xy", K_p=60.0, K_v=15.0),
-    "relative": lambda: RelativePosition(name="x", root="link_3", K_p=60.0, K_v=15.0),
-    "relative_turn": lambda: RelativeOrientation(name="x", root="link_3", K_p=60.0, K_v=15.0),
-    "pointing": lambda: Pointing(name="x", frame="link_5", K_p=60.0, K_v=15.0),
-    "plane": lambda: PlaneDistance(name="x", normal=(1.0, 0.0, 1.0), K_p=60.0, K_v=15.0),
-}
-
-
-@pytest.mark.parametrize(
-    ("controller", "place"), [("himpc", 0), ("himpc", 1), ("nhimpc", 0), ("weighted", 0)]
-)
-@pytest.mark.parametrize("kind", GIVEN)
-def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: int, controller: str) -> None:
-    """Closed loops side by side while the target moves; the kernel takes the rows as they are handed in. It
-    knows orientations on one or two axes; their targets start 100° away, mostly about what is free."""
-    scene = torque_scene("iiwa14-hold")
-    levels = list(scene.settings.levels)
-    levels.insert(place, Level((GIVEN[kind](),)))
-    taken = replace(scene.settings, levels=tuple(levels), controller=controller)
-    compiled, printed = (
-        TorqueSession(replace(scene, settings=replace(taken, route=route)))
-        for route in ("compiled", "explicit")
-    )
-    assert getattr(compiled.controller, "kernel", None) is not None
-    for session in (compiled, printed):
-        target = session.target("x")
-        if target is not None and kind in FAR:
-            target.jump(exp3(np.array(FAR[kind])) @ target.raw)
-    worst = moved = 0.0
-    for k in range(60):
-        for session in (compiled, printed):
-            target = session.target("x")
-            assert target is not None
-            if k == 5:
-                turned = target.raw.ndim == 2
-                value = quaternion(exp3(np.full(3, 0.1)) @ target.raw) if turned else target.raw + 0.1
-                session.post(MoveTarget("x", tuple(value)))
-            session.tick()
-        assert compiled.plan is not None
-        assert printed.plan is not None
-        worst = max(worst, float(np.abs(compiled.plan.tau - printed.plan.tau).max()))
-        moved = max(moved, float(np.abs(compiled.plan.errors["x"]).max()))
-        for name, value in printed.plan.values.items():
-            np.testing.assert_allclose(compiled.plan.values[name], value, atol=1e-9)
-            np.testing.assert_allclose(compiled.plan.errors[name], printed.plan.errors[name], atol=1e-9)
-    assert moved > 1e-4
-    assert worst <= (1e-7 if controller == "weighted" else 1e-8)
-
-
-@dataclass(frozen=True, kw_only=True)
-class OwnTurn(FrameTask):
-    """A task of somebody's own whose value is a rotation and which controls some axes of it."""
-
-    first_row: ClassVar[int] = 3
-    unit: ClassVar[Literal["m", "rad"]] = "rad"
-
-    def value(self, configuration: Configuration) -> Array:
-        return configuration.placement(self.frame).rotation
-
-    def error(self, value: Array, desired: Array) -> Array:
-        return pin.log3(value @ desired.T)[self.components]
-
-
-@pytest.mark.parametrize(
-    ("controller", "route"), [("himpc", "compiled"), ("himpc", "explicit"), ("hqp", "compiled")]
-)
-def test_an_own_rotation_on_some_axes_is_told_of_these(controller: str, route: str) -> None:
-    """Its target turns about all axes; what it asks for has as many columns as the task has rows."""
-    scene = torque_scene("iiwa14-hold")
-    levels = (scene.settings.levels[0], Level((OwnTurn(name="x", axes="xy"),)), scene.settings.levels[2])
-    taken = replace(scene.settings, levels=levels, controller=controller, route=route)
-    session = TorqueSession(replace(scene, settings=taken))
-    target = session.target("x")
-    assert target is not None
-    session.tick()
-    session.post(MoveTarget("x", tuple(quaternion(exp3(np.array([0.1, 0.0, 0.0])) @ target.raw))))
-    for _ in range(200):
-        session.tick()
-    assert session.plan is not None
-    assert session.plan.values["x"].shape == (3, 3)
-    assert session.failure is None
-    assert 0.0 < np.linalg.norm(session.plan.errors["x"]) < 0.01

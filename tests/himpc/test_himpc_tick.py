@@ -15,15 +15,7 @@ from numpy.typing import NDArray
 from problems import Hierarchy, random_hierarchy, shifted
 
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
-from himpc.catalog import Route
-from himpc.plan import write_plan
 from himpc.references import Circle, FigureEight, Hold, Outlook, Phase, Reference, Sinusoid
-from himpc.tick.kernel.finish_tick import finish_tick
-from himpc.tick.kernel.linearize import linearize
-from himpc.tick.kernel.solve_level import solve_level
-from lessons.events import MoveTarget, Set
-from lessons.scenes.catalog import torque_scene
-from lessons.session.torque import TorqueSession
 from robots import Robot, load_robot
 from robots.importing import import_robot
 
@@ -103,52 +95,6 @@ def test_kinematics_are_pinocchio_s(seed: int) -> None:
 # ------------------------------------------------------------------ the same torques
 
 
-@pytest.mark.parametrize("controller", ["himpc", "hiqp", "nhimpc", "weighted"])
-@pytest.mark.parametrize(
-    ("name", "horizon", "position"),
-    [
-        ("iiwa14-circle", 5, "viability"),
-        ("iiwa14-circle-paper", 5, "viability"),
-        ("iiwa14-circle-paper", 5, "paper"),
-        ("iiwa14-hold", 3, "viability"),
-        ("planar3-circle", 5, "viability"),
-        ("planar3-conflict", 10, "viability"),
-        ("planar3-singular", 5, "viability"),
-        ("ridgeback-ur10-hold", 2, "viability"),
-    ],
-)
-def test_torques_are_those_of_the_printed_route(
-    name: str, horizon: int, position: str, controller: str
-) -> None:
-    """Two closed loops side by side, one by the kernel, one by the rows as printed; targets are dragged."""
-    scene = torque_scene(name)
-    taken = replace(scene.settings, horizon=horizon, controller=controller)
-    taken = taken.changed("limits.position", position)
-    compiled, printed = (
-        TorqueSession(replace(scene, settings=replace(taken, route=route)))
-        for route in ("compiled", "explicit")
-    )
-    worst = 0.0
-    for k in range(60):
-        for session in (compiled, printed):
-            target = session.target("position")
-            if k == 5 and target is not None:
-                session.post(MoveTarget("position", tuple(target.value + 0.2)))
-            session.tick()
-        assert compiled.plan is not None
-        assert printed.plan is not None
-        worst = max(worst, float(np.abs(compiled.plan.tau - printed.plan.tau).max()))
-        for one, other in zip(compiled.plan.levels, printed.plan.levels, strict=True):
-            assert one.fallback == "solve"
-            assert one.leak <= 1e-6 or controller == "weighted"
-            assert one.kkt_residual <= 1e-6
-            assert one.cost == pytest.approx(other.cost, rel=1e-6, abs=1e-6)
-    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact. So
-    # it is at the paper's start, where J₁…J₃ have rank 6, if no bound holds what rounding alone decides.
-    loose = controller == "weighted" or (name, position) == ("iiwa14-circle-paper", "paper")
-    assert worst <= (1e-7 if loose else 1e-8)
-
-
 def a_tick_later(hierarchy: Hierarchy, seed: int) -> Hierarchy:
     rng = np.random.default_rng(seed)
     return Hierarchy(
@@ -182,65 +128,6 @@ def test_the_optimum_does_not_depend_on_where_it_started(seed: int) -> None:
         assert_agree(hierarchy.solve(previous=previous), cold, 1e-7)
 
 
-@pytest.mark.parametrize("route", ["compiled", "explicit"])
-def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
-    """A sensor that reads many times the robot's limit leaves the next torques within it."""
-    scene = torque_scene("planar3-hold")
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, route=route)))
-    session.tick()
-    previews = {name: each.preview(session.t, 1e-3, 5) for name, each in session.references.items()}
-    for _ in range(3):
-        state = session.plant.measure(1e-3)
-        plan = session.controller.step(state.q, state.v, previews, 13.0 * session.robot.tau_limit)
-        assert (np.abs(plan.tau) <= session.robot.tau_limit).all()
-
-
-def test_a_plan_that_is_kept_stays_as_it_is() -> None:
-    """Frozen, its evidence is that of its own tick, whenever it is looked at; else it says what to do."""
-    session = TorqueSession(torque_scene("iiwa14-circle"))
-    session.tick()
-    shown, other = session.plan, TorqueSession(torque_scene("iiwa14-circle"))
-    other.tick()
-    assert shown is not None
-    assert other.plan is not None
-    kept, late = replace(shown).freeze(), replace(shown)
-    for _ in range(20):
-        session.tick()
-    for one, two in zip(kept.levels, other.plan.levels, strict=True):
-        np.testing.assert_array_equal(one.U, two.U)
-    np.testing.assert_array_equal(kept.q, other.plan.q)
-    np.testing.assert_array_equal(late.tau, kept.tau)
-    with pytest.raises(RuntimeError, match="freeze"):
-        _ = late.levels
-
-
-@pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
-@pytest.mark.parametrize("name", ["iiwa14-circle", "iiwa14-circle-paper", "iiwa14-hold", "planar3-conflict"])
-def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, controller: str) -> None:
-    """What the kernel puts aside for telemetry is what the plan's evidence says."""
-    scene = torque_scene(name)
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
-    session.post(Set("limits.velocity_scale", 0.3))  # so that bounds bind
-    session.post(Set("limits.position", "viability"))
-    target = session.target("orientation")
-    if target is not None:
-        target.move(pin.exp3(np.array([0.4, -0.2, 1.5])) @ target.value)
-    binding = 0
-    for k in range(40):
-        session.tick()
-        plan = session.plan
-        assert plan is not None
-        assert plan.fill is not None
-        previews = Outlook(session.references, session.t - session.settings.T_s, session.settings.T_s, 5)
-        gathered, by_field = np.empty((2, session.layout.size))
-        write_plan(gathered, session.layout, plan, previews)
-        write_plan(by_field, session.layout, replace(plan, fill=None), previews)
-        if k % 10 == 9:
-            np.testing.assert_allclose(gathered, by_field, rtol=0, atol=1e-12)
-        binding += bool(gathered[session.layout.fields["at_bound"]].any())
-    assert binding or not name.startswith("iiwa14-circle")
-
-
 @pytest.mark.parametrize("law", ["uniform", "eased"])
 @given(seeds)
 @settings(max_examples=20)
@@ -266,11 +153,3 @@ def test_the_kernel_s_references_are_the_printed_ones(law: Literal["uniform", "e
         np.testing.assert_allclose(f["x_d"][span], preview.value, atol=1e-12)
         for found, wanted in zip(f["motion"][:, :, span], preview[1:], strict=True):
             np.testing.assert_allclose(found, wanted, atol=1e-10)
-
-
-def test_nothing_is_compiled_while_a_robot_moves() -> None:
-    """One compiled form of each entry serves every layout."""
-    for name in ("iiwa14-circle", "planar3-hold"):
-        TorqueSession(torque_scene(name)).tick()
-    for compiled in (linearize, solve_level, finish_tick):
-        assert len(compiled.signatures) == 1

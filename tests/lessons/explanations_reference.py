@@ -36,7 +36,6 @@ REFERENCE = (
         ("lessons/own/deadline.py", "How long it waited is asked from the first alarm on"),
         ("lessons/papers/himpc_paper/ablations.py", "All tasks in one cost, one step ahead"),
         ("lessons/scenes/planar.py", "The plant applies any torque"),
-        ("lessons/scenes/torque_scene.py", "sources: catalog name or URDF path and tip"),
         ("lessons/settings/assignments.py", "The controller comes first"),
         ("lessons/settings/missions.py", "Scenes whose tasks last for the whole run"),
     )),

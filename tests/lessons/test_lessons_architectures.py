@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from lessons.recording.run import run
 from lessons.scenes.catalog import load_scene, prepared
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.velocity import VelocitySession
-from lessons.settings.missions import ARCHITECTURES, REST, WaypointOptions
+from lessons.settings.missions import REST, Architecture, WaypointOptions
 from lessons.teaching.measure import Measure, Signal
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 STRICT = ("base_tolerance=0.05", "base_at_rest=true")
 WAY = Signal("way of the base", "m")
 HAND = Signal("error/ee", "mm")
+ALL = get_args(Architecture)
 
 
 def scene_of(name: str, *assignments: str) -> VelocityScene:
@@ -76,7 +78,7 @@ def test_all_architectures_have_one_mission(rule: tuple[str, ...]) -> None:
                 "ridgeback-ur10-delivery", f"architecture={architecture}", *rule
             ).settings.options.mission({})
         ]
-        for architecture in ARCHITECTURES
+        for architecture in ALL
     ]
     assert missions[0] == missions[1] == missions[2]
 
@@ -184,12 +186,10 @@ def test_each_half_of_the_overlap_saves_time(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_base_that_stays_behind_the_hand_drives_no_farther() -> None:
     """One task at a time, but with the base at rest while the arm reaches: the way is as with two."""
-    ways = {a: Measure(WAY).value(of_step("deliveries", 0, f"architecture={a}")) for a in ARCHITECTURES}
+    ways = {a: Measure(WAY).value(of_step("deliveries", 0, f"architecture={a}")) for a in ALL}
     assert ways["decoupled"] < 1.1 * ways["hierarchical"]
     assert ways["single_task"] > 1.5 * ways["hierarchical"]
-    strict = [
-        Measure(WAY).value(of_step("deliveries", 0, f"architecture={a}", *STRICT)) for a in ARCHITECTURES
-    ]
+    strict = [Measure(WAY).value(of_step("deliveries", 0, f"architecture={a}", *STRICT)) for a in ALL]
     assert strict[0] / ways["hierarchical"] == pytest.approx(1.5, abs=0.05)
     assert strict[1] / ways["single_task"] == pytest.approx(1.1, abs=0.02)
 

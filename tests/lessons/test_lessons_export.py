@@ -172,18 +172,3 @@ def test_a_robot_from_a_file_and_its_tip_are_named(tmp_path: Path) -> None:
     state = RunSpec("hold", urdf="planar3", tip="link_2")
     assert "load_scene('hold', 'planar3', 'link_2')" in script(state, (), 0.1)
     assert prepared(state.loaded(), None, ()).robot.tip == "link_2"
-
-
-def test_a_script_of_before_still_runs() -> None:
-    """What version 0.1 exported imports other names; they lead to the same functions."""
-    import lessons.kinds as before
-    import lessons.mobile.events as events_before
-    from lessons import headless
-
-    assert (before.find_scene, before.prepared) == (headless.load_scene, headless.prepared)
-    assert (before.run_scene, before.summary_of, before.arrays_of) == (
-        headless.run,
-        headless.summary,
-        headless.arrays,
-    )
-    assert events_before.Release is Release and events_before.InsertTask is InsertTask

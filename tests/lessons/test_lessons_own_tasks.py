@@ -15,7 +15,6 @@ from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
-from lessons.runs.named import tasks_named
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import differences
 from lessons.settings.torque import TorqueSettings
@@ -55,7 +54,8 @@ def test_an_own_task_is_named_in_a_stack(by: str, file: str) -> None:
 
 
 def test_an_own_task_in_a_stack_runs_in_every_kind_of_run(file: str) -> None:
-    spec = RunSpec("iiwa14-hold", set=(stack(file),), duration=0.1, tasks=tasks_named((stack(file),)))
+    spec = RunSpec("iiwa14-hold", duration=0.1).admitting(stack(file), "horizon=4")
+    assert spec == RunSpec("iiwa14-hold", set=(stack(file), "horizon=4"), duration=0.1, tasks=(file,))
     found = summary(run(spec.prepared()))
     assert [task["name"] for task in found["tasks"]] == ["position", "far", "posture"]
     assert found["tasks"][1]["max_abs"][0] < 1e-3
@@ -98,3 +98,10 @@ def test_an_unknown_field_of_an_own_task_is_a_sentence(file: str) -> None:
     wrong = stack(file).replace("frame", "frames")
     with pytest.raises(InputError, match=r"no setting of the task of .*frames.*frame"):
         RunSpec("iiwa14-hold", set=(wrong,), tasks=(file,)).prepared()
+
+
+def test_the_files_of_a_run_are_attached_once(file: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[str] = []
+    monkeypatch.setattr("lessons.runs.named.check_task", lambda *args: tried.append(args[-1]))
+    RunSpec("iiwa14-hold", set=(stack(file),), tasks=(file,)).prepared()
+    assert tried == [file]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lessons.scenes.catalog import torque_scene
+from lessons.scenes.catalog import load_scene, torque_scene
 from lessons.settings.assignments import parse_assignment, with_assignments
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
@@ -55,6 +55,15 @@ def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> Non
         assert read(new) == value != read(start)
         touched = [f.name for f in fields(TorqueSettings) if getattr(new, f.name) != getattr(start, f.name)]
         assert touched == [path.split(".")[0].replace("tasks", "levels")]
+
+
+@pytest.mark.parametrize("scene", ["iiwa14-circle", "ridgeback-ur10-delivery"])
+def test_one_table_of_paths_serves_all_values(scene: str) -> None:
+    """Many assignments make no table each; other levels have another."""
+    settings = load_scene(scene).settings
+    changed = with_assignments(settings, ["horizon=7", "levels.1.Q=3"])
+    assert changed.places() is settings.places()
+    assert torque_scene("planar3-hold").settings.places() is not settings.places()
 
 
 def test_one_joint_of_many(start: TorqueSettings) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, JobResult, Results
@@ -20,7 +19,6 @@ from lessons.plots.style import name
 from lessons.scenes.catalog import prepared, torque_scene
 from robots import Plant, convergence_gauge
 
-Array = NDArray[np.float64]
 DEG = 180 / np.pi
 
 _LARGE = 5.0

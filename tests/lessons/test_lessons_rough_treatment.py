@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from control_loop import field, rows_of
 from numpy.typing import NDArray
+from session_rows import field, rows_of
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Set
 from lessons.scenes.catalog import torque_scene
@@ -70,11 +70,9 @@ SUBSETS = [names for size in range(4) for names in combinations(("position", "or
 
 
 @pytest.mark.parametrize("enabled", SUBSETS, ids=lambda names: "+".join(names) or "none")
-def test_a_push_dies_out_under_every_subset_of_levels(
-    enabled: tuple[str, ...], iiwa_scene: TorqueScene
-) -> None:
+def test_a_push_dies_out_under_every_subset_of_levels(enabled: tuple[str, ...], scene: TorqueScene) -> None:
     """5 N·m for 0.1 s on a middle link: whatever is switched on, all joints are slow 3 s later."""
-    session = TorqueSession(iiwa_scene)
+    session = TorqueSession(scene)
     for name in ("position", "orientation", "posture"):
         session.post(Set(f"levels.{name}.enabled", name in enabled))
     rows_of(session, 20)
@@ -86,19 +84,19 @@ def test_a_push_dies_out_under_every_subset_of_levels(
     assert session.diverged_at is None
 
 
-def test_same_events_same_numbers_to_the_bit(iiwa_scene: TorqueScene) -> None:
+def test_same_events_same_numbers_to_the_bit(scene: TorqueScene) -> None:
     """Two sessions that are told the same give the same rows, timing aside."""
     script: dict[int, Event] = {
         3: MoveTarget("position", (0.5, 0.2, 0.6)),
         40: Set("levels.orientation.enabled", False),
         60: Set("horizon", 9),
-        90: Push(iiwa_scene.robot.joint_names[2], force=(0.0, 20.0, 0.0)),
+        90: Push(scene.robot.joint_names[2], force=(0.0, 20.0, 0.0)),
         120: MoveLevel("posture", 0),
         150: Set("limits.velocity_scale", 0.2),
     }
     results = []
     for _ in range(2):
-        session = TorqueSession(iiwa_scene, seed=4)
+        session = TorqueSession(scene, seed=4)
         rows = []
         for k in range(250):
             if k in script:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
         return NONSENSE[kind](f, A)
 
-    monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(qp.SOLVERS, (nonsense,)))
+    monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(get_args(qp.Solver), (nonsense,)))
     monkeypatch.setattr(explicit, "descended", lambda *_: None)
 
 

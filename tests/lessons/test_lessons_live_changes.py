@@ -1,23 +1,16 @@
-"""Changes while it runs: bumpless at rest, faded in where they are large, refused without a trace."""
+"""Settings that change while the robot of a session moves."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from control_loop import field, holds, iiwa_settings, rows_of
-from numpy.typing import NDArray
+from session_rows import field, rows_of
 
-from himpc import HIMPC, FramePosition, Joints, Level
 from himpc.telemetry import AT_TORQUE
 from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
-from robots import InputError, Robot
-
-Array = NDArray[np.float64]
 
 
 def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
@@ -45,12 +38,12 @@ def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
         "no velocity limits": Set("limits.velocity", False),
         "no torque limits": Set("limits.torque", False),
         "explicit": Set("route", "explicit"),
-        "proxqp": Set("solver", "proxqp"),
         "R_on": Set("R_on", "acceleration"),
         "no damping": Set("damping", False),
         "level horizon": Set("levels.2.horizon", 1),
     }
     changes: dict[str, list[Event]] = {name: [event] for name, event in singles.items()}
+    changes["proxqp"] = [Set("route", "explicit"), Set("solver", "proxqp")]
     for name in names:
         changes[f"{name} off and on"] = [Set(f"levels.{name}.enabled", on) for on in (False, True)]
     changes["last level first"] = [MoveLevel(names[-1], 0)]
@@ -86,9 +79,9 @@ def test_changes_at_rest_are_bumpless(name: str, change: str) -> None:
     assert moved < 1e-3
 
 
-def test_a_level_enabled_with_a_large_error_fades_in(iiwa_scene: TorqueScene) -> None:
+def test_a_level_enabled_with_a_large_error_fades_in(scene: TorqueScene) -> None:
     """Its Q ramps over half a second: the first torques after the switch are calm, and it gets there."""
-    session = TorqueSession(iiwa_scene)
+    session = TorqueSession(scene)
     session.post(Set("levels.orientation.enabled", False))
     session.post(Set("levels.posture.enabled", False))
     session.tick()
@@ -103,9 +96,9 @@ def test_a_level_enabled_with_a_large_error_fades_in(iiwa_scene: TorqueScene) ->
     assert np.abs(field(session, rows, "error/position")).max() < 1e-2
 
 
-def test_a_torque_limit_tightened_below_the_present_torque_closes_in(iiwa_scene: TorqueScene) -> None:
+def test_a_torque_limit_tightened_below_the_present_torque_closes_in(scene: TorqueScene) -> None:
     """The bound starts at the torque of now and falls without a step; the demand stays inside it."""
-    session = TorqueSession(iiwa_scene)
+    session = TorqueSession(scene)
     rows_of(session, 20)
     present = np.abs(session.plant.tau / session.robot.tau_limit).max()
     assert present > 0.05
@@ -121,26 +114,3 @@ def test_a_torque_limit_tightened_below_the_present_torque_closes_in(iiwa_scene:
     np.testing.assert_allclose(upper[-1], 0.8 * present * limit)
     assert (field(session, rows, "at_bound").astype(int)[-1] & AT_TORQUE).any()
     assert np.isfinite(rows[:, session.layout.fields["q"]]).all()
-
-
-def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
-    """A refused configure leaves the controller as it was, to the bit."""
-    one, other = HIMPC(iiwa, iiwa_settings(iiwa)), HIMPC(iiwa, iiwa_settings(iiwa))
-    previews = holds(iiwa, 5)
-    for _ in range(3):
-        one.step(iiwa.home, np.full(7, 0.01), previews)
-        other.step(iiwa.home, np.full(7, 0.01), previews)
-    good = iiwa_settings(iiwa)
-    bad = [
-        replace(good, M_bar=good.M_bar[:-1]),
-        replace(good, stack=(Level((FramePosition(name="p", frame="nowhere"),)),)),
-        replace(good, stack=(Level((Joints(name="j", joints=("nothing",)),)),)),
-        replace(good, stack=(Level((FramePosition(name="p"),), Q=(1.0, 2.0)),)),
-        replace(good, stack=(*good.stack, Level((FramePosition(name="p"),), R=(1.0, 2.0), enabled=False))),
-    ]
-    for each in bad:
-        with pytest.raises(InputError):
-            one.configure(each)
-    assert one.settings == good
-    now, then = (c.step(iiwa.home + 0.01, np.zeros(7), previews) for c in (one, other))
-    np.testing.assert_array_equal(now.tau, then.tau)
