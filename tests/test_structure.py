@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
+import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -377,6 +379,21 @@ def test_heavy_dependencies_have_one_door(library: str) -> None:
     }
     assert users
     assert all(user.startswith(DOORS[library]) for user in users)
+
+
+def test_what_is_imported_is_declared() -> None:
+    """Not left to another package to bring along."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *project["dependencies"],
+        *(each for extra in project["optional-dependencies"].values() for each in extra),
+    ]
+    declared = {re.split(r"[^\w-]", each)[0] for each in wanted}
+    used = {name.partition(".")[0] for path in sources(*ORDER[:-1]) for name in imports(path)}
+    used -= {*ORDER, *sys.stdlib_module_names}
+    assert {"numpy", "pinocchio"} <= used
+    packages = {"pinocchio": "pin", "markdown_it": "markdown-it-py"}
+    assert {packages.get(name, name.replace("_", "-")) for name in used} <= declared
 
 
 def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:
