@@ -365,6 +365,13 @@ def test_one_file_touches_private_names_of_viser() -> None:
     assert {name for names in foreign.values() for name in names} == {PRIVATE}
 
 
+def test_one_file_has_the_names_of_visers_page() -> None:
+    """In scripts and styles; the table beside them is checked before anything is served."""
+    name = re.compile(r"__viser\w|mantine-[A-Z]|\.uplot|\.u-\w|20em")
+    files = {str(path.relative_to(ROOT)) for path in sources("app") if name.search(path.read_text())}
+    assert files == {"app/adapter/names.py"}
+
+
 def is_private(name: str) -> bool:
     return name.startswith("_") and not name.startswith("__")
 
