@@ -19,7 +19,6 @@ A row of telemetry on its way up:
 
 import os
 
-# One thread per matrix product: the matrices are tiny, and every session has its own process. NumPy reads it
-# once, when it is imported, so it stands before every other import.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+# One thread per matrix product, here and in every child: the matrices are tiny, and every session has its own
+# process. NumPy reads it once, when it is imported, so it stands before every other import.
+os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"))

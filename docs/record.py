@@ -14,16 +14,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tsdownsample import MinMaxDownsampler
 
+from app.worker.lesson.rows import thinned
 from lessons.course import COURSE, load_lesson
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.teaching.lesson import Lesson, Step
 
 FOLDER = Path(__file__).parents[1] / "docs" / "site" / "recorded"
-POINTS = 240
-"""Of a curve, and its two ends: its picture is 574 units wide."""
 RATE = 25.0
 """Pictures a second, at most, of a motion."""
 PLAYED = {"a-redundant-arm": 1, "no-model-needed": 1, "one-task": 1, "swap-the-priorities": 2, "two-tasks": 1}
@@ -61,16 +59,6 @@ def plot(step: Step, place: int, runs: list[Recording]) -> dict[str, Any]:
         "t": [rounded(t) for t, _ in drawn],
         "curves": [rounded(y) for _, y in drawn],
     }
-
-
-def thinned(t: Array, y: Array) -> tuple[Array, Array]:
-    """POINTS of them and both ends: of equal intervals the least and the greatest value, each at its time,
-    so that no peak is lost and none is moved."""
-    if len(t) <= POINTS:
-        return t, y
-    kept = MinMaxDownsampler().downsample(np.ascontiguousarray(y, float), n_out=POINTS)
-    kept = np.unique(np.concatenate(([0], kept.astype(int), [len(t) - 1])))
-    return t[kept], y[kept]
 
 
 def moved(lesson: Lesson, step: Step, runs: list[Recording]) -> dict[str, Any]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -24,8 +22,7 @@ _STEP = 0.5  # rad: the most a joint moves per iteration, so that the linearisat
 @dataclass(frozen=True)
 class ReachResult:
     """q (n,) rad, the best configuration found inside the limits; position_error m; rotation_error rad (0 if
-    none was
-    asked for); reachable: both within 2 mm and 1°.
+    none was asked for); reachable: both within 2 mm and 1°.
     """
 
     q: np.ndarray
@@ -39,10 +36,8 @@ class ReachJudge:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        with tempfile.TemporaryDirectory(prefix="himpc-reach-") as folder:
-            path = Path(folder) / "robot.urdf"
-            path.write_text(without_shapes(etree.fromstring(robot.urdf_text.encode())))
-            self._wrapper = placo.RobotWrapper(str(path), placo.Flags.ignore_collisions)
+        text = without_shapes(etree.fromstring(robot.urdf_text.encode()))
+        self._wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
         self._data = robot.model.createData()
         margin = 1e-4
         self._lower = np.where(np.isfinite(robot.q_lower), robot.q_lower + margin, -np.inf)

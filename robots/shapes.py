@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import pinocchio as pin
 import trimesh
 from lxml import etree
 from lxml.etree import _Element as Element
@@ -16,6 +15,7 @@ from lxml.etree import _Element as Element
 from robots.capsules import body_capsules
 from robots.robot import Robot
 from robots.surfaces import Colour, Piece, joined, limited, mesh_pieces, split_creases
+from robots.urdf.read import Refusal, placement
 
 MAX_TOTAL = 400_000  # faces of a robot
 _FARTHEST = 1e3  # m, largest distance of a point from its joint
@@ -85,12 +85,12 @@ def _visual(
         return []
     given = _material_colour(visual.find("material"), palette)
     try:
-        placement = _origin(visual.find("origin"))
+        at = placement(visual)
         return [
-            (given or own or _DEFAULT, vertices @ placement.rotation.T + placement.translation, faces)
+            (given or own or _DEFAULT, vertices @ at.rotation.T + at.translation, faces)
             for own, vertices, faces in _geometry(geometry[0], meshes)
         ]
-    except ValueError:
+    except (ValueError, Refusal):
         return []
 
 
@@ -148,11 +148,3 @@ def _material_colour(material: Element | None, palette: dict[str, Colour]) -> Co
         return limited(255.0 * np.array([float(word) for word in colour.get("rgba", "").split()[:3]]))
     except ValueError:
         return None
-
-
-def _origin(origin: Element | None) -> pin.SE3:
-    if origin is None:
-        return pin.SE3.Identity()
-    x, y, z = _numbers(origin, "xyz", "0 0 0")
-    roll, pitch, yaw = _numbers(origin, "rpy", "0 0 0")
-    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array([x, y, z]))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.worker.lesson.rows import BUCKETS, thinned
 from docs.pages.curves import FLOORS, figure, label
-from docs.record import POINTS, thinned
 
 
 def test_a_peak_is_neither_lost_nor_moved() -> None:
@@ -18,7 +18,7 @@ def test_a_peak_is_neither_lost_nor_moved() -> None:
     y = np.sin(t)
     y[[1234, 6543]] = 5.0, -5.0
     times, values = thinned(t, y)
-    assert len(times) == len(values) <= POINTS + 2
+    assert len(times) == len(values) <= 2 * BUCKETS + 2
     assert (np.diff(times) > 0).all()
     assert (times[0], times[-1]) == (t[0], t[-1])
     for place in (1234, 6543):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
+import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -372,6 +374,13 @@ def test_one_file_touches_private_names_of_viser() -> None:
     assert {name for names in foreign.values() for name in names} == {PRIVATE}
 
 
+def test_one_file_has_the_names_of_visers_page() -> None:
+    """In scripts and styles; the table beside them is checked before anything is served."""
+    name = re.compile(r"__viser\w|mantine-[A-Z]|\.uplot|\.u-\w|20em")
+    files = {str(path.relative_to(ROOT)) for path in sources("app") if name.search(path.read_text())}
+    assert files == {"app/adapter/names.py"}
+
+
 def is_private(name: str) -> bool:
     return name.startswith("_") and not name.startswith("__")
 
@@ -386,6 +395,21 @@ def test_heavy_dependencies_have_one_door(library: str) -> None:
     }
     assert users
     assert all(user.startswith(DOORS[library]) for user in users)
+
+
+def test_what_is_imported_is_declared() -> None:
+    """Not left to another package to bring along."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *project["dependencies"],
+        *(each for extra in project["optional-dependencies"].values() for each in extra),
+    ]
+    declared = {re.split(r"[^\w-]", each)[0] for each in wanted}
+    used = {name.partition(".")[0] for path in sources(*ORDER[:-1]) for name in imports(path)}
+    used -= {*ORDER, *sys.stdlib_module_names}
+    assert {"numpy", "pinocchio"} <= used
+    packages = {"pinocchio": "pin", "markdown_it": "markdown-it-py"}
+    assert {packages.get(name, name.replace("_", "-")) for name in used} <= declared
 
 
 def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:

@@ -1,4 +1,4 @@
-"""All uses of viser's private names. `self_test` checks each of them before the server starts.
+"""All uses of viser's private names; `names` lists them. `self_test` checks each before the server starts.
 
 If one of them is missing, the server does not start and prints one clear sentence.
 """
@@ -22,6 +22,7 @@ import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 
 from app.adapter.fast_messages import fast
+from app.adapter.names import OF_A_SERVER, check_names
 from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.removed_handle_errors import call
 from app.adapter.thread_safe_event import ThreadSafeEvent
@@ -43,27 +44,6 @@ _NEEDED = ("process_request", "max_size")
 _UNSENT = 32_000
 """Bytes that may wait in the socket's send buffer; the usual megabytes would hold seconds of old pictures."""
 
-_OF_MODULES = (
-    (_messages, ("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage")),
-    (_messages, ("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect", "Message")),
-    (_messages, ("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage")),
-    (_messages, ("FileTransferStartUpload", "FileTransferPart", "ScenePointerMessage")),
-    (_messages, ("TransformControlsUpdateMessage", "SceneNodeDragMessage", "SceneNodeClickMessage")),
-    (infra.WebsockClientConnection, ("_handle_incoming_message",)),
-)
-_OF_A_SERVER = (
-    "_websock_server._live_connections",
-    "_websock_server._incoming_handlers",
-    "_websock_server._client_state_from_id",
-    "_websock_server._broadcast_buffer.message_event",
-    "_websock_server._broadcast_buffer.window_duration_sec",
-    "gui._current_file_upload_states",
-    "gui._gui_input_handle_from_uuid",
-    "gui._thread_executor",
-    "scene._thread_executor",
-    "scene._dispatch_callback",
-)
-
 
 def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     """Starts a viser server whose connections pass `guard`. It opens no public tunnel, and its senders always
@@ -76,7 +56,7 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
         require(served == [True], "how it serves")
-        for path in _OF_A_SERVER:
+        for path in OF_A_SERVER:
             require(reaches(server, path), path)
         handlers = server._websock_server
         # Any client could request a public tunnel to this machine, even without the button.
@@ -98,9 +78,7 @@ def stop(server: viser.ViserServer) -> None:
 def self_test(guard: Guard) -> None:
     """Checks that viser has all private names used here, and that a guard which is not yet open refuses
     requests. It uses a temporary server on this machine that serves no page. Raises InputError."""
-    for module, names in _OF_MODULES:
-        for name in names:
-            require(hasattr(module, name), name)
+    check_names()
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
         bare.start()

@@ -25,8 +25,10 @@ def refuse(connection: ServerConnection, _: Request) -> Response:
 
 
 def reaches(start: object, path: str) -> bool:
-    """Whether an object has the attribute at a dotted path."""
+    """Whether an object has the attribute at a dotted path, or a dataclass the field."""
     for name in path.split("."):
+        if name in getattr(start, "__dataclass_fields__", ()):
+            return True
         try:
             start = getattr(start, name)
         except (AttributeError, RecursionError):

@@ -57,11 +57,6 @@ def block(inner: str, style: str = "") -> str:
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
 
 
-PHONE = '<style>@media (max-width: 36em) { div[style*="width: 20em"] { width: 100vw !important } }</style>'
-"""A style that makes viser's bottom sheet on a phone as wide as the screen; by default it is 20em wide, with
-an empty strip beside it. It applies while an HTML element with it is shown."""
-
-
 def in_trouble(state: str, sentence: str) -> str:
     """The text that a page shows for a simulation that died, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD

@@ -8,60 +8,25 @@ import multiprocessing as mp
 import os
 import signal
 import socket
+from collections.abc import Callable
 from importlib import import_module
-from typing import Protocol
 
 from app.link.wire import Wire
 from robots.processes.orphans import end_with_parent
 
 
-class Child(Protocol):
-    """The interface of a child process."""
-
-    @property
-    def pid(self) -> int | None:
-        """The process id; None before the process has started."""
-        ...
-
-    @property
-    def exitcode(self) -> int | None:
-        """The exit code; −N if signal N ended the process; None if it is not known."""
-        ...
-
-    @property
-    def doing(self) -> str:
-        """What the fork server is doing before the process can start, as a sentence."""
-        ...
-
-    def fileno(self) -> int:
-        """A descriptor that is readable when `look` has news; it may change after each `look`."""
-        ...
-
-    def look(self) -> bool:
-        """Reads the news; returns whether the process has ended."""
-        ...
-
-    def kill(self) -> None:
-        """Kills the process if it has started."""
-        ...
-
-    def close(self) -> None:
-        """Closes the handle of a process that has ended."""
-        ...
-
-
-class Preparation(Protocol):
-    """The preparation that a child waits for before it starts."""
-
-    doing: str
-
-
 class Forked:
     """A child of the fork server. Two numbers arrive over `status`: its process id, and later its exit
-    code."""
+    code.
 
-    def __init__(self, status: socket.socket, server: Preparation) -> None:
-        self._status, self._server = status, server
+    Attributes:
+        pid: the process id; None before the process has started.
+        exitcode: −N if signal N ended the process; None if it is not known.
+    """
+
+    def __init__(self, status: socket.socket, doing: Callable[[], str]) -> None:
+        """doing: what the fork server is doing before the process can start, as a sentence."""
+        self._status, self._doing = status, doing
         self._ended = False
         self._alone: int | None = None
         self.pid: int | None = None
@@ -73,12 +38,14 @@ class Forked:
 
     @property
     def doing(self) -> str:
-        return self._server.doing
+        return self._doing()
 
     def fileno(self) -> int:
+        """A descriptor that is readable when `look` has news; it may change after each `look`."""
         return self._status.fileno() if self._alone is None else self._alone
 
     def look(self) -> bool:
+        """Reads the news; returns whether the process has ended."""
         if self._alone is not None:
             self._ended = True
             return True
@@ -96,11 +63,13 @@ class Forked:
         return self._ended
 
     def kill(self) -> None:
+        """Kills the process if it has started."""
         if self.pid is not None and not self._ended:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, signal.SIGKILL)
 
     def close(self) -> None:
+        """Closes the handle of a process that has ended."""
         self._ended = True
         self._status.close()
         if self._alone is not None:
@@ -109,23 +78,14 @@ class Forked:
 
 
 class Spawned:
-    """A new interpreter, which takes a second or two to import everything."""
+    """A new interpreter, which takes a second or two to import everything; methods as of `Forked`."""
 
     doing = ""
 
     def __init__(self, worker: str, theirs: socket.socket) -> None:
         """worker: module name, as for `ForkServer`."""
-        before = {name: os.environ.get(name) for name in one_thread_each()}
-        os.environ.update(one_thread_each())
-        try:
-            self._process = mp.get_context("spawn").Process(target=_run, args=(worker, theirs), daemon=True)
-            self._process.start()
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
+        self._process = mp.get_context("spawn").Process(target=_run, args=(worker, theirs), daemon=True)
+        self._process.start()
         self.pid = self._process.pid
         self.exitcode: int | None = None
 
@@ -146,11 +106,7 @@ class Spawned:
             self._process.close()
 
 
-def one_thread_each() -> dict[str, str]:
-    """Environment variables of a child. With matrices of 7 × 7, the threads of a linear algebra library only
-    take processor time from the page. The variables are read when numpy is first imported, before any of our
-    code runs."""
-    return dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+Child = Forked | Spawned
 
 
 def _run(worker: str, theirs: socket.socket) -> None:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import NoReturn
 
-from app.link.children import Forked, one_thread_each
+from app.link.children import Forked
 from app.link.wire import Handle, Wire, packed
 from robots.processes.isolation import is_stopped, threads, waited
 from robots.processes.orphans import end_with
@@ -75,7 +75,6 @@ class ForkServer:
                 [sys.executable, "-c", code],
                 pass_fds=(theirs.fileno(), life),
                 stdin=subprocess.DEVNULL,
-                env={**os.environ, **one_thread_each()},
                 process_group=0,
             )
         except OSError:
@@ -146,7 +145,7 @@ class ForkServer:
         """Requests a child that gets this end of its socket. Raises OSError if the server has ended or does
         not read."""
         status, other = socket.socketpair()
-        child = Forked(status, self)
+        child = Forked(status, lambda: self.doing)
         try:
             with self._lock:
                 self._wire.post(packed(Fork(Handle(theirs.fileno()), Handle(other.fileno()))), wait=False)

@@ -15,6 +15,7 @@ from app.link.own_code import OwnCode
 from app.link.wire import Handle
 
 if TYPE_CHECKING:
+    from himpc.plan import Binding
     from himpc.telemetry import Layout
     from lessons.events import Event
     from lessons.settings.settings import SceneSettings
@@ -167,19 +168,6 @@ class Ready:
     left_out: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class BindingRow:
-    """One active constraint of the last plan."""
-
-    level: str
-    joint: str
-    kind: str
-    side: str
-    knot: int
-    multiplier: float
-    slack: float
-
-
 @dataclass(frozen=True, eq=False)
 class Status:
     """What is not worth sending every tick; about ten times a second.
@@ -204,7 +192,7 @@ class Status:
     resets: int
     targets: dict[str, np.ndarray]
     path: np.ndarray
-    binding: tuple[BindingRow, ...]
+    binding: tuple[Binding, ...]
     notices: tuple[str, ...] = ()
     settings: SceneSettings | None = field(default=None)
     gauge: tuple[float, float] | None = None

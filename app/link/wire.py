@@ -8,6 +8,7 @@ import pickle
 import select
 import socket
 import struct
+from array import array
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,11 +81,9 @@ class Wire:
         socket is full."""
         head = _HEAD.pack(len(parcel.content), len(parcel.files))
         flags = 0 if wait else socket.MSG_DONTWAIT
-        if parcel.files:
-            # The files are sent with the first byte.
-            sent = socket.send_fds(self._end, [head, parcel.content], list(parcel.files), flags)
-        else:
-            sent = self._end.sendmsg([head, parcel.content], [], flags)
+        # The files are sent with the first byte. `socket.send_fds` ignores its flags.
+        rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array("i", parcel.files))
+        sent = self._end.sendmsg([head, parcel.content], [rights] if parcel.files else [], flags)
         if sent < len(head) + len(parcel.content):
             self._end.sendall((head + parcel.content)[sent:])
 
@@ -110,10 +109,6 @@ class Wire:
             raise
 
     def _head(self) -> tuple[bytes, list[int]]:
-        if not hasattr(socket, "recv_fds"):  # Windows
-            head = bytearray(_HEAD.size)
-            self._fill(memoryview(head))
-            return bytes(head), []
         head, files, _, _ = socket.recv_fds(self._end, _HEAD.size, _MOST_FILES)
         rest = bytearray(_HEAD.size - len(head))
         if not head:

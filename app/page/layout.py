@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.adapter.names import SHEET
 from app.client.ghost import GhostClient
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
 from app.html.palette import level_colours, recoloured
-from app.html.text import PHONE
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready, Status
 from app.page.ui import Context, face_for
@@ -43,6 +43,9 @@ from lessons.events import Event
 from lessons.own.folder import Folder
 from lessons.settings.settings import SceneSettings
 
+_PHONE = f"<style>@media (max-width: 36em) {{ {SHEET} {{ width: 100vw !important }} }}</style>"
+"""Makes viser's bottom sheet on a phone as wide as the screen; by default it is narrower, with an empty strip
+beside it. It applies while an HTML element with it is shown."""
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
@@ -102,7 +105,7 @@ class Stage:
         notebook: Notebook,
         phone: bool,
     ) -> None:
-        gui.add_html(PHONE)
+        gui.add_html(_PHONE)
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
         self._time_line = TimeLine(gui, self._learner, loop)
         exercise = self._learner.choice_of(self._ready).exercise

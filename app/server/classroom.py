@@ -3,29 +3,15 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypeVar, cast
+from collections.abc import Sequence
+from typing import cast
 
-from app.client.decimated import History
-from app.client.ghost import GhostClient
-from app.client.pose_history import PoseHistory
-from app.client.rows import RowHistory
-from app.client.run_statistics import RunStatistics
 from app.client.simulation_client import SimulationClient
-from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
-from app.link.exercise import Lecture
-from app.link.messages import Command, Ready, Status, Told
-from app.link.ring import Block
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
-if TYPE_CHECKING:
-    from lessons.settings.settings import SceneSettings
-    from lessons.teaching import lesson
-
 STEERING = "The instructor steers: this page only watches."
-T = TypeVar("T")
 
 
 class Watcher:
@@ -40,100 +26,22 @@ class Watcher:
         self._shown = shown
         self._refuse = refuse
 
-    @property
-    def ready(self) -> Ready | None:
-        return self._shown.ready
-
-    @property
-    def status(self) -> Status | None:
-        return self._shown.status
-
-    @property
-    def settings(self) -> SceneSettings | None:
-        return self._shown.settings
-
-    @property
-    def failure(self) -> str | None:
-        return self._shown.failure
-
-    @property
-    def changed(self) -> int:
-        return self._shown.changed
-
-    @property
-    def tape(self) -> PoseHistory:
-        return self._shown.tape
-
-    @property
-    def score(self) -> RunStatistics | None:
-        return self._shown.score
-
-    @property
-    def record(self) -> RowHistory | None:
-        return self._shown.record
-
-    @property
-    def choice(self) -> SceneChoice:
-        return self._shown.choice
-
-    @property
-    def lecture(self) -> Lecture | None:
-        return self._shown.lecture
-
-    @property
-    def ghost(self) -> GhostClient | None:
-        return self._shown.ghost
-
-    @property
-    def pid(self) -> int | None:
-        return self._shown.pid
-
-    @property
-    def quiet(self) -> float:
-        return self._shown.quiet
-
-    def trouble(self) -> Trouble | None:
-        return self._shown.trouble()
-
-    def settings_of(self, ready: Ready) -> SceneSettings:
-        return self._shown.settings_of(ready)
-
-    def choice_of(self, ready: Ready) -> SceneChoice:
-        return self._shown.choice_of(ready)
-
-    def lecture_of(self, ready: Ready) -> Lecture | None:
-        return self._shown.lecture_of(ready)
-
-    def read(self, look: Callable[[Block, History], T]) -> T | None:
-        return self._shown.read(look)
-
-    def look(self, rows: bool = True) -> float | None:
-        return self._shown.look(rows)
-
-    def ask(self, timeout: float = 10.0) -> Told | None:
-        return self._shown.ask(timeout)
-
     def take_messages(self) -> tuple[list[str], list[str]]:
         """Returns no messages: they answer the instructor's commands."""
         return [], []
 
-    def send(self, command: Command) -> None:
-        self._refuse(STEERING)
 
-    def start_ghost(self, ghost: lesson.Ghost) -> None:
-        self._refuse(STEERING)
+def _of_the_session(name: str) -> property:
+    return property(lambda self: getattr(self._shown, name))
 
-    def stop_ghost(self) -> None:
-        self._refuse(STEERING)
 
-    def reset_all(self) -> None:
-        self._refuse(STEERING)
-
-    def load(self, choice: SceneChoice) -> None:
-        self._refuse(STEERING)
-
-    def restart(self, choice: SceneChoice | None = None) -> None:
-        self._refuse(STEERING)
+for _name in (
+    *("ready", "status", "settings", "failure", "changed", "tape", "score", "record", "choice", "lecture"),
+    *("ghost", "pid", "quiet", "trouble", "settings_of", "choice_of", "lecture_of", "read", "look", "ask"),
+):
+    setattr(Watcher, _name, _of_the_session(_name))
+for _name in ("send", "start_ghost", "stop_ghost", "reset_all", "load", "restart"):
+    setattr(Watcher, _name, property(lambda self: lambda *_, **__: self._refuse(STEERING)))
 
 
 class Classroom:

@@ -73,7 +73,7 @@ def end_family(pid: int, mark: tuple[str, str] | None = None) -> bool:
     for each in others:
         with suppress(psutil.Error):
             each.kill()
-    with suppress(OSError, AttributeError):
+    with suppress(OSError):
         if os.getpgid(pid) == pid:
             others += [each for each in _alive(pid) if each.pid != pid]
             os.killpg(pid, signal.SIGKILL)

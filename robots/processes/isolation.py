@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import pickle
+import resource
 import signal
 import subprocess
 import sys
@@ -56,7 +57,7 @@ class Allowance:
 
     def end(self, code: int) -> str:
         """Returns the error message for an exit code."""
-        if code == -getattr(signal, "SIGALRM", 0):
+        if code == -signal.SIGALRM:
             return self.too_long
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         return f"{self.doing} {self.ended} ({name}); {self.hint}"
@@ -94,7 +95,8 @@ def isolated(
             raise Fault(within.too_long) from None
         finally:
             child.kill()
-            _end_group(child.pid)
+            with suppress(OSError):
+                os.killpg(child.pid, signal.SIGKILL)  # what it started and left
     if child.returncode != 0 or not answer:
         raise Fault(within.end(child.returncode))
     result, fault, refusal = pickle.loads(answer)
@@ -103,12 +105,6 @@ def isolated(
     if fault is not None:
         raise Fault(fault)
     return result
-
-
-def _end_group(leader: int) -> None:
-    """Ends the processes that remain in the process group that a process led."""
-    with suppress(OSError, AttributeError):
-        os.killpg(leader, signal.SIGKILL)
 
 
 def threads() -> int:
@@ -262,19 +258,15 @@ def _answer(request: bytes, within: Allowance) -> bytes:
 def _restrict(within: Allowance, parent: int) -> None:
     """Makes this process end with its parent, at the deadline and at the limit of memory, where the system
     supports this."""
-    if hasattr(signal, "alarm"):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(int(PATIENCE * within.seconds) + 1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(int(PATIENCE * within.seconds) + 1)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DIES, signal.SIGKILL)
         if os.getppid() != parent:
             os._exit(1)
-    if sys.platform != "win32":
-        import resource
-
-        os.setsid()  # its children can then be ended with it
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        most = within.memory if hard == resource.RLIM_INFINITY else min(within.memory, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    os.setsid()  # its children can then be ended with it
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    most = within.memory if hard == resource.RLIM_INFINITY else min(within.memory, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))

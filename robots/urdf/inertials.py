@@ -10,7 +10,7 @@ from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.report import Finding
-from robots.urdf.read import Refusal, child, end_of, label, named, numbers
+from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
 from robots.urdf.structure import body_of, movable_joints
 
 _DENSITY = 1000.0  # kg/m³: the solid sphere that stands in for a missing inertia
@@ -66,14 +66,11 @@ def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
 
 def _repair_link(link: Element) -> Iterator[Finding]:
     """Repairs one link: a generator of findings that returns the link's mass, kg."""
-    inertial = child(link, "inertial")
+    inertial = link.find("inertial")
     if inertial is None:
         return 0.0
-    origin = child(inertial, "origin")
-    if origin is not None:
-        numbers(origin, "xyz", 3, (0.0, 0.0, 0.0))
-        numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
-    mass_element = child(inertial, "mass")
+    placement(inertial)
+    mass_element = inertial.find("mass")
     mass = 0.0 if mass_element is None else float(numbers(mass_element, "value", 1)[0])
     if mass < 0.0:
         raise Refusal(label(link), f"its mass is {mass:.4g} kg; give a positive mass")
@@ -105,7 +102,7 @@ def _repair_link(link: Element) -> Iterator[Finding]:
 
 
 def _read_inertia(inertial: Element) -> np.ndarray | None:
-    element = child(inertial, "inertia")
+    element = inertial.find("inertia")
     if element is None:
         return None
     xx, xy, xz, yy, yz, zz = (float(numbers(element, key, 1, (0.0,))[0]) for key in _KEYS)

@@ -14,7 +14,7 @@ from lxml.etree import _Element as Element
 
 from robots.errors import shortened
 from robots.report import Finding
-from robots.urdf.read import Refusal, child, end_of, label, named, numbers
+from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
 from robots.urdf.structure import movable_joints, parent_joints
 
 UNBOUNDED = 1e6  # rad or m: written for a joint without limits, so that nq = nv; read back as ±inf
@@ -31,7 +31,7 @@ def normalise_joints(root: Element) -> Iterator[Finding]:
         return
     for joint in root.findall("joint"):
         try:
-            _origin(joint)
+            placement(joint)
             _drop(joint, "dynamics", "calibration", "safety_controller")
             if joint.get("type") == "fixed":
                 _drop(joint, "limit", "axis", "mimic")
@@ -48,7 +48,7 @@ def normalise_joints(root: Element) -> Iterator[Finding]:
 
 def freeze(joint: Element, value: float, reason: str) -> Finding:
     """Makes a joint fixed at `value` (rad or m), moved inside its limits, by folding it into the origin."""
-    limit = child(joint, "limit")
+    limit = joint.find("limit")
     if limit is not None:
         value = float(np.clip(value, float(limit.get("lower", "0")), float(limit.get("upper", "0"))))
     axis = numbers(_require(joint, "axis"), "xyz", 3)
@@ -57,8 +57,8 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
     else:
         motion = pin.SE3(pin.exp3(axis * value), np.zeros(3))
     if value != 0.0:
-        placed = _placement(joint) * motion
-        origin = child(joint, "origin")
+        placed = placement(joint) * motion
+        origin = joint.find("origin")
         if origin is None:
             origin = etree.SubElement(joint, "origin")
         origin.set("xyz", _text(placed.translation))
@@ -75,7 +75,7 @@ def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
     joints, carriers = named(root, "joint"), parent_joints(root)
     for joint in movable_joints(root):
         name = joint.get("name", "")
-        mimic = child(joint, "mimic")
+        mimic = joint.find("mimic")
         if mimic is not None:
             offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
             leader = mimic.get("joint", "")
@@ -86,7 +86,7 @@ def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
             frozen.setdefault(name, (0.0, "its name says it belongs to a gripper"))
     # A hand alone is a robot too: if no other joints move, joints with gripper names stay movable.
     if len(frozen) == len(movable_joints(root)):
-        frozen = {name: why for name, why in frozen.items() if child(joints[name], "mimic") is not None}
+        frozen = {name: why for name, why in frozen.items() if joints[name].find("mimic") is not None}
     return frozen
 
 
@@ -103,23 +103,8 @@ def _ancestors(carriers: dict[str, Element], link: str) -> Iterator[Element]:
         link = end_of(carriers[link], "parent")
 
 
-def _origin(joint: Element) -> None:
-    origin = child(joint, "origin")
-    if origin is not None:
-        numbers(origin, "xyz", 3, (0.0, 0.0, 0.0))
-        numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
-
-
-def _placement(joint: Element) -> pin.SE3:
-    origin = child(joint, "origin")
-    if origin is None:
-        return pin.SE3.Identity()
-    rpy = numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
-    return pin.SE3(pin.rpy.rpyToMatrix(*rpy), numbers(origin, "xyz", 3, (0.0, 0.0, 0.0)))
-
-
 def _axis(joint: Element) -> Iterator[Finding]:
-    axis = child(joint, "axis")
+    axis = joint.find("axis")
     if axis is None:
         axis = etree.SubElement(joint, "axis", xyz="1 0 0")
         yield Finding("filled", label(joint), "no axis; the URDF default x was used")
@@ -133,7 +118,7 @@ def _axis(joint: Element) -> Iterator[Finding]:
 
 
 def _limits(joint: Element) -> Iterator[Finding]:
-    limit = child(joint, "limit")
+    limit = joint.find("limit")
     if limit is None:
         limit = etree.SubElement(joint, "limit")
     if joint.get("type") == "continuous":
@@ -174,7 +159,7 @@ def _freeze_if_stuck(joint: Element) -> Iterator[Finding]:
 
 
 def _require(joint: Element, tag: str) -> Element:
-    found = child(joint, tag)
+    found = joint.find(tag)
     if found is None:
         raise Refusal(label(joint), f"it has no <{tag}>")
     return found

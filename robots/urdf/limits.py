@@ -12,7 +12,7 @@ from lxml.etree import _Element as Element
 from robots.inertia import mass_matrix, sample_configurations
 from robots.report import Finding
 from robots.urdf.joints import finite_bounds
-from robots.urdf.read import Refusal, child, label, numbers
+from robots.urdf.read import Refusal, label, numbers
 from robots.urdf.structure import movable_joints
 
 _SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast but safe for an unknown arm
@@ -24,7 +24,7 @@ _ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allow
 def fill_speeds(root: Element) -> Iterator[Finding]:
     """Fills missing, zero and negative velocity limits, and marks effort limits of these kinds with 0."""
     for joint in movable_joints(root):
-        limit = child(joint, "limit")
+        limit = joint.find("limit")
         if limit is None:
             limit = etree.SubElement(joint, "limit")
         try:
@@ -55,7 +55,7 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
         place = model.getJointId(name) - 1
         effort = float(f"{needed[place]:.1e}")
         limits[place] = effort
-        limit = child(joints[name], "limit")
+        limit = joints[name].find("limit")
         if limit is not None:
             limit.set("effort", repr(effort))
         unit = "N" if joints[name].get("type") == "prismatic" else "N·m"
@@ -65,7 +65,7 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
 
 
 def _effort(joint: Element) -> float:
-    limit = child(joint, "limit")
+    limit = joint.find("limit")
     return 0.0 if limit is None else float(limit.get("effort", "0"))
 
 

@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
@@ -112,9 +113,13 @@ def numbers(
     return np.array(values)
 
 
-def child(element: Element, tag: str) -> Element | None:
-    """The first direct child with this tag."""
-    return element.find(tag)
+def placement(element: Element) -> pin.SE3:
+    """The `origin` of an element. Raises Refusal like `numbers`."""
+    origin = element.find("origin")
+    if origin is None:
+        return pin.SE3.Identity()
+    xyz, rpy = (numbers(origin, name, 3, (0.0, 0.0, 0.0)) for name in ("xyz", "rpy"))
+    return pin.SE3(pin.rpy.rpyToMatrix(*rpy), xyz)
 
 
 def without_shapes(root: Element) -> str:

@@ -32,7 +32,7 @@ def test_watchers_change_nothing() -> None:
             sent.append(command)
 
     refused: list[str] = []
-    watcher = Watcher(cast(SimulationClient, Shown()), refused.append)
+    watcher = cast(SimulationClient, Watcher(cast(SimulationClient, Shown()), refused.append))
     watcher.send(Play(False))
     watcher.reset_all()
     watcher.restart(cast(SceneChoice, "another scene"))

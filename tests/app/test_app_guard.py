@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 
-from app.adapter import private
+from app.adapter import names, private
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.server import budget
@@ -360,11 +360,15 @@ def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: py
             patch.delattr(_messages, gone)
             with pytest.raises(InputError, match=gone):
                 private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
+    with monkeypatch.context() as patch:
+        patch.setattr(names, "OF_THE_PAGE", (("App.tsx", "w.__viserImmutable"),))
+        with pytest.raises(InputError, match="__viserImmutable"):
+            private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
     opened: list[Any] = []
     with monkeypatch.context() as patch:
         stop = private.stop
         patch.setattr(private, "stop", lambda server: (opened.append(server.get_port()), stop(server)))
-        patch.setattr(private, "_OF_A_SERVER", ("gui._thread_pool",))
+        patch.setattr(private, "OF_A_SERVER", ("gui._thread_pool",))
         with pytest.raises(InputError, match="_thread_pool"):
             private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
     with pytest.raises(urllib.error.URLError):

@@ -13,6 +13,7 @@ from app.html.palette import BAD, BOUND, GHOST, RGB, css
 from app.html.text import block, esc, figure, swatch
 from app.link.inside import Inside, InsideRequest
 from app.panels.inside.plane_svg import CONTOURED, SIZE, half_width, parts
+from app.panels.widgets.command import on_click
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.picture import SvgPicture
 from lessons.events import Set
@@ -73,9 +74,7 @@ class PlanePanel:
                 hint="The other joints' Δτ, away from there",
             )
 
-        @self._fewer.on_click
-        async def _(_: object) -> None:
-            post(Set("horizon", 1))
+        on_click(self._fewer, lambda: post(Set("horizon", 1)))
 
     @property
     def wish(self) -> InsideRequest:

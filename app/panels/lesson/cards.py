@@ -13,6 +13,7 @@ from app.html.palette import GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
+from app.panels.widgets.command import on_click
 from lessons.course import COURSE, load_lesson
 from lessons.replay.progress import LearnerProgress
 from lessons.scenes.run_spec import RunSpec
@@ -73,9 +74,7 @@ def _button(
 ) -> None:
     button = gui.add_button(label, color=colour)
 
-    @button.on_click
-    async def _(_: object) -> None:
-        choose(choice)
+    on_click(button, lambda: choose(choice))
 
 
 def _offer(lesson: Lesson, progress: LearnerProgress) -> tuple[str, int]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,37 +59,27 @@ def chart(
     until: float,
 ) -> str:
     """A signal over the run, with the ghost's curve (dashed) and its reference levels (dotted)."""
-    height, top, left = 92, 18, 54
     shown = [curve.values, *([ghost.values] if ghost is not None else [])]
     values = np.concatenate([each[np.isfinite(each)] for each in shown])
     if not values.size:
         return ""
     marks = [bound.value for bound in bounds if math.isfinite(bound.value)]
     axis = _axis(values, marks)
-
-    def points(of: SignalCurve) -> str:
-        return _polyline(
-            of, lambda t: left + (_W - left - 6) * t / until, lambda v: _height(v, axis, top, height)
-        )
-
+    frame = _Frame(axis, until, height=92, top=18, left=54)
     log = " · logarithmic" if axis[2] else ""
     parts = [
-        _text(left, 11, f"{words}{f' [{unit}]' if unit else ''}{log}", bold=True),
-        f'<path d="M{left} {top}V{height - 14}H{_W - 6}" stroke="{css(BOUND)}" fill="none"/>',
-        _text(left - 4, height - 12, _end(axis, 0), anchor="end"),
-        _text(left - 4, top + 8, _end(axis, 1), anchor="end"),
-        _text(_W - 6, height - 2, f"{until:g} s", anchor="end"),
+        _text(frame.left, 11, f"{words}{f' [{unit}]' if unit else ''}{log}", bold=True),
+        *frame.axes(_end(axis, 0), _end(axis, 1)),
     ]
     for value, bound in zip(marks, bounds, strict=False):
-        y = _height(value, axis, top, height)
+        y = frame.y(value)
         parts.append(
-            f'<line x1="{left}" x2="{_W - 6}" y1="{y:.1f}" y2="{y:.1f}" stroke="{css(GOOD)}" '
+            f'<line x1="{frame.left}" x2="{_W - 6}" y1="{y:.1f}" y2="{y:.1f}" stroke="{css(GOOD)}" '
             f'stroke-width="1.5" stroke-dasharray="2 3"><title>{esc(bound.words)}</title></line>'
         )
     if ghost is not None:
-        parts.append(f'<path d="{points(ghost)}" {_line(css(BOUND))} stroke-dasharray="5 4"/>')
-    parts.append(f'<path d="{points(curve)}" {_line(TRUTH)}/>')
-    return _svg(height, parts, f"{words} over time")
+        parts.append(frame.line(ghost, css(BOUND), "5 4"))
+    return _svg(frame.height, [*parts, frame.line(curve, TRUTH)], f"{words} over time")
 
 
 def sketch(
@@ -100,42 +91,67 @@ def sketch(
     unit: str,
 ) -> str:
     """The curve that the learner draws, with the measured one over it."""
-    height, top, left = 130, 16, 40
-    axis = (low, high, False)
-
-    def place(of: SignalCurve) -> str:
-        return _polyline(
-            of, lambda t: left + (_W - left - 8) * t / until, lambda v: _height(v, axis, top, height)
-        )
-
+    frame = _Frame((low, high, False), until, height=130, top=16, left=40)
     times, values = (np.array(column, float) for column in zip(*points, strict=True))
-    drawn = SignalCurve(times, values)
-    dots = "".join(
-        f'<circle cx="{left + (_W - left - 8) * t / until:.1f}" cy="{_height(v, axis, top, height):.1f}" '
-        f'r="3.5" fill="{GUESS}"/>'
-        for t, v in points
-    )
     parts = [
-        f'<path d="M{left} {top}V{height - 14}H{_W - 8}" stroke="{css(BOUND)}" fill="none"/>',
-        _text(left - 4, height - 12, figure(low), anchor="end"),
-        _text(left - 4, top + 8, figure(high, unit), anchor="end"),
-        _text(_W - 8, height - 2, f"{until:g} s", anchor="end"),
-        _text(left, 11, "your sketch", GUESS, bold=True),
-        f'<path d="{place(drawn)}" {_line(GUESS)} stroke-dasharray="6 3"/>{dots}',
+        *frame.axes(figure(low), figure(high, unit)),
+        _text(frame.left, 11, "your sketch", GUESS, bold=True),
+        frame.line(SignalCurve(times, values), GUESS, "6 3"),
+        *(f'<circle cx="{frame.x(t):.1f}" cy="{frame.y(v):.1f}" r="3.5" fill="{GUESS}"/>' for t, v in points),
     ]
     if truth is not None:
         inside = truth.t <= until
-        parts.append(
-            f'<path d="{place(SignalCurve(truth.t[inside], truth.values[inside]))}" {_line(TRUTH)}/>'
-        )
-        parts.append(_text(left + 90, 11, "measured", TRUTH, bold=True))
-    return _svg(height, parts, "your sketch over time")
+        parts.append(frame.line(SignalCurve(truth.t[inside], truth.values[inside]), TRUTH))
+        parts.append(_text(frame.left + 90, 11, "measured", TRUTH, bold=True))
+    return _svg(frame.height, parts, "your sketch over time")
 
 
 # -------------------------------------------------------------------- pieces
 
-Scaling = Callable[[float], float]
 Axis = tuple[float, float, bool]  # low, high, logarithmic
+
+
+class _Frame(NamedTuple):
+    """The axes of a picture over time, 0 … until s, and what stands in them."""
+
+    axis: Axis
+    until: float
+    height: int
+    top: int
+    left: int
+
+    def x(self, t: float) -> float:
+        return self.left + (_W - self.left - 6) * t / self.until
+
+    def y(self, value: float) -> float:
+        low, high, log = self.axis
+        value = math.log10(max(value, 10.0 ** (low - 1))) if log else value
+        share = (value - low) / (high - low)
+        return self.height - 14 - (self.height - 14 - self.top) * min(max(share, 0.0), 1.0)
+
+    def axes(self, low: str, high: str) -> list[str]:
+        """The axes, with their ends in words."""
+        corner = f"M{self.left} {self.top}V{self.height - 14}H{_W - 6}"
+        return [
+            f'<path d="{corner}" stroke="{css(BOUND)}" fill="none"/>',
+            _text(self.left - 4, self.height - 12, low, anchor="end"),
+            _text(self.left - 4, self.top + 8, high, anchor="end"),
+            _text(_W - 6, self.height - 2, f"{self.until:g} s", anchor="end"),
+        ]
+
+    def line(self, curve: SignalCurve, colour: str, dashes: str = "none") -> str:
+        """A curve, with gaps where it is not finite."""
+        pieces, pen = [], "M"
+        for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True):
+            if not math.isfinite(value):
+                pen = "M"
+                continue
+            pieces.append(f"{pen}{self.x(t):.1f} {self.y(value):.1f}")
+            pen = "L"
+        return (
+            f'<path d="{"".join(pieces)}" stroke="{colour}" stroke-width="2" fill="none" '
+            f'stroke-linejoin="round" stroke-dasharray="{dashes}"/>'
+        )
 
 
 def _axis(values: np.ndarray, marks: list[float]) -> Axis:
@@ -154,30 +170,8 @@ def _axis(values: np.ndarray, marks: list[float]) -> Axis:
     return (low if low == 0 else low - room), high + room, False
 
 
-def _height(value: float, axis: Axis, top: float, height: float) -> float:
-    low, high, log = axis
-    value = math.log10(max(value, 10.0 ** (low - 1))) if log else value
-    share = (value - low) / (high - low)
-    return height - 14 - (height - 14 - top) * min(max(share, 0.0), 1.0)
-
-
 def _end(axis: Axis, which: int) -> str:
     return figure(10.0 ** axis[which] if axis[2] else float(f"{axis[which]:.2g}"))
-
-
-def _polyline(curve: SignalCurve, x: Scaling, y: Scaling) -> str:
-    pieces, pen = [], "M"
-    for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True):
-        if not math.isfinite(value):
-            pen = "M"
-            continue
-        pieces.append(f"{pen}{x(t):.1f} {y(value):.1f}")
-        pen = "L"
-    return "".join(pieces)
-
-
-def _line(colour: str) -> str:
-    return f'stroke="{colour}" stroke-width="2" fill="none" stroke-linejoin="round"'
 
 
 def _pointer(x: float, tip: float, foot: float, colour: str) -> str:

@@ -13,6 +13,7 @@ from app.html.palette import BAD, GOOD, LEVELS, css
 from app.html.text import badge, block, figure, readable
 from app.link.exercise import Answer, Lecture
 from app.panels.lesson.drawing import scale, sketch
+from app.panels.widgets.command import on_click
 from app.panels.widgets.logarithmic import STEPS, only_track, place_of, value_at
 from lessons.teaching.prediction import Choice, Prediction, Sketch, Value
 
@@ -46,9 +47,7 @@ class Asking:
         buttons = gui.add_button_group("I expect", letters)
         self._inputs.append(buttons)
 
-        @buttons.on_click
-        async def _(_: object) -> None:
-            self._say(letters.index(str(buttons.value)))
+        on_click(buttons, lambda: self._say(letters.index(str(buttons.value))))
 
     def _weigh(self, gui: viser.GuiApi, value: Value) -> None:
         slider = gui.add_slider(

@@ -17,7 +17,7 @@ from app.link.messages import Post, Predict, ResetAll, RunStep
 from app.panels.lesson.claims import after, heading, idea, pictures, state
 from app.panels.lesson.exercise_cards import belonging_to
 from app.panels.lesson.prediction import Asking
-from app.panels.widgets.command import add_command
+from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_control
 from app.panels.widgets.mirror import Bindings
 from lessons.events import Event
@@ -108,9 +108,7 @@ class LessonPanel:
         self._listen()
 
     def _listen(self) -> None:
-        @self._run.on_click
-        async def _(_: object) -> None:
-            self.run()
+        on_click(self._run, self.run)
 
         @self._hurry.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
@@ -123,18 +121,17 @@ class LessonPanel:
                 self._beside = bool(self._second.value)
                 self._show_ghost()
 
-        @self._next.on_click
-        async def _(_: object) -> None:
-            self.next()
+        on_click(self._next, self.next)
 
         @self._rerun.on_click
         async def _(_: object) -> None:
             choice = str(self._rerun.value)
             self._send(ResetAll() if choice == _RESET else RunStep(own=choice == _AGAIN, fast=self._fast))
 
-        @self._where.on_click
-        async def _(_: object) -> None:
-            {_BACK: self.back, _SKIP: self.next, _ALL: self._all_lessons}[str(self._where.value)]()
+        on_click(
+            self._where,
+            lambda: {_BACK: self.back, _SKIP: self.next, _ALL: self._all_lessons}[str(self._where.value)](),
+        )
 
     def _show_ghost(self) -> None:
         """Starts the ghost of this step in the scene, if it needs one."""

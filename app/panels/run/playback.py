@@ -16,7 +16,7 @@ from app.client.trouble import Trouble
 from app.html.palette import GOOD, LEVELS
 from app.html.text import badge, block, in_trouble
 from app.link.messages import Play, Post, Speed, StepTicks
-from app.panels.widgets.command import add_command
+from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Reset
@@ -54,13 +54,8 @@ class PlaybackPanel:
         )
         self._touched = -math.inf
 
-        @self._buttons.on_click
-        async def _(_: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            self._click(str(self._buttons.value))
-
-        @self._again.on_click
-        async def _(_: object) -> None:
-            learner.restart()
+        on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
+        on_click(self._again, learner.restart)
 
         @self._speed.on_update
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:

@@ -10,6 +10,7 @@ from app.html.palette import BAD, DAMPING, GOOD, LEVELS
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.panels.widgets.command import on_click
 from lessons.own.files import is_file
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
@@ -65,9 +66,10 @@ class RobotPanel:
                 path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
                 load_path = gui.add_button("Load file")
 
-                @load_path.on_click
-                async def _(_: object) -> None:
-                    self._ask_file(of_urdf, own_files, path.value.strip(), tip.value.strip() or None)
+                on_click(
+                    load_path,
+                    lambda: self._ask_file(of_urdf, own_files, path.value.strip(), tip.value.strip() or None),
+                )
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
             gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
@@ -83,9 +85,7 @@ class RobotPanel:
         async def _(_: object) -> None:
             about.content = block(esc(CATALOG[str(catalog.value)].title))
 
-        @load_scene.on_click
-        async def _(_: object) -> None:
-            self._ask(of_scene, RunSpec(str(scene.value)))
+        on_click(load_scene, lambda: self._ask(of_scene, RunSpec(str(scene.value))))
 
         @load_robot.on_click
         async def _(_: object) -> None:

@@ -12,7 +12,7 @@ import viser
 from app.adapter.removed_handle_errors import unless_removed
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
-from app.panels.widgets.command import add_command
+from app.panels.widgets.command import add_command, on_click
 
 _STEP = 0.05  # s
 _SHORT, _LONG = 0.1, 1.0  # s per key press
@@ -46,9 +46,7 @@ class TimeLine:
             if event.client is not None:
                 self._look(float(self._slider.value))
 
-        @self._live.on_click
-        async def _(_: object) -> None:
-            self._set(0.0)
+        on_click(self._live, lambda: self._set(0.0))
 
         for words, key, shift, seconds in (
             ("Look back a little", "J", False, -_SHORT),

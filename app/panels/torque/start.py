@@ -12,7 +12,7 @@ from app.html.palette import BAD, GOOD, RGB
 from app.html.text import block, esc, quantity
 from app.link.messages import Ready
 from app.panels.torque.guide import guide
-from app.panels.widgets.command import add_command
+from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.reachability import Reachability
 from lessons.events import Push, Set
@@ -96,9 +96,7 @@ class StartPanel:
         async def _(_: object) -> None:
             post(Set("plant.payload_kg", _LOAD if self._load.label == _PICK_UP else 0.0))
 
-        @recall.on_click
-        async def _(_: object) -> None:
-            self.on_recall()
+        on_click(recall, lambda: self.on_recall())
 
         @self.dark.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:

@@ -12,6 +12,7 @@ from app.html.palette import GOOD, RGB, css
 from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import Status, TaskView
 from app.link.mission_view import MissionRow
+from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
@@ -57,9 +58,7 @@ class MissionPanel:
             hold = gui.add_checkbox("Hold until released", False)
             add = gui.add_button("Add")
 
-        @self._swap.on_click
-        async def _(_: object) -> None:
-            swap(self._rows(), post)
+        on_click(self._swap, lambda: swap(self._rows(), post))
 
         @self._release.on_click
         async def _(_: object) -> None:
@@ -67,17 +66,13 @@ class MissionPanel:
             if waiting is not None:
                 post(Release(waiting.name))
 
-        @self._change.on_click
-        async def _(_: object) -> None:
-            self._changed(str(self._change.value), str(self._task.value))
+        on_click(self._change, lambda: self._changed(str(self._change.value), str(self._task.value)))
 
         @self._role.on_update
         async def _(_: object) -> None:
             self._goal.value = self._start()
 
-        @add.on_click
-        async def _(_: object) -> None:
-            self._add(bool(hold.value))
+        on_click(add, lambda: self._add(bool(hold.value)))
 
     def _rows(self) -> tuple[MissionRow, ...]:
         status = self._status()

@@ -8,6 +8,7 @@ import viser
 
 from app.html.palette import RGB
 from app.html.text import badge, block, esc, quantity, swatch
+from app.panels.widgets.command import on_click
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball
@@ -61,21 +62,11 @@ class BeginPanel:
             self.frames = gui.add_checkbox("Target and actual frames", True)
         self.dark = gui.add_checkbox("Dark theme", dark)
 
-        @swap.on_click
-        async def _(_: object) -> None:
-            self.on_swap()
+        on_click(swap, lambda: self.on_swap())
+        on_click(look, lambda: self.on_look())
 
-        @look.on_click
-        async def _(_: object) -> None:
-            self.on_look()
-
-        @obstacle.on_click
-        async def _(_: object) -> None:
-            self.on_obstacle()
-
-        @self._clear.on_click
-        async def _(_: object) -> None:
-            self.on_clear()
+        on_click(obstacle, lambda: self.on_obstacle())
+        on_click(self._clear, lambda: self.on_clear())
 
         @self.dark.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:

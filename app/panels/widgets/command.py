@@ -1,4 +1,4 @@
-"""Commands of the page, available by key and in viser's palette (Ctrl K)."""
+"""Commands of the page, available by key and in viser's palette (Ctrl K), or by a button."""
 
 from __future__ import annotations
 
@@ -21,5 +21,13 @@ def add_command(
     )
 
     @command.on_trigger
+    async def _(_: object) -> None:
+        does()
+
+
+def on_click(button: viser.GuiButtonHandle | viser.GuiButtonGroupHandle, does: Callable[[], object]) -> None:
+    """Calls `does` on viser's event loop when a button is pressed."""
+
+    @button.on_click
     async def _(_: object) -> None:
         does()

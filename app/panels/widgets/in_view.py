@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import viser
 
 from app.adapter import private
+from app.adapter.names import CHART, CHART_TITLE, PAGE
 
 LABEL = "Charts in view"
 """Label of the hidden control through which the browser reports."""
@@ -18,7 +19,8 @@ _LONGEST = 4000  # number of characters that are read
 # in a hidden tab shows nothing. Charts appear and disappear with viser's tabs, so the script checks
 # regularly.
 _SCRIPT = """
-const control = %s, awake = %s, asleep = %s, key = "__himpcLabInView";
+const control = %s, awake = %s, asleep = %s, charts = %s, title = %s;
+const viser = () => %s, key = "__himpcLabInView";
 window[key]?.();
 const shown = new Map();
 let said = null;
@@ -26,18 +28,18 @@ const tell = () => {
   const titles = new Set([awake]);
   for (const [chart, on] of shown)
     if (on && chart.isConnected)
-      titles.add(chart.dataset.chart ?? chart.querySelector(".u-title")?.textContent ?? "");
+      titles.add(chart.dataset.chart ?? chart.querySelector(title)?.textContent ?? "");
   const value = document.hidden ? asleep : [...titles].sort().join("\\n");
-  if (value === said || !window.__viserMutable) return;
+  if (value === said || !viser()) return;
   said = value;
-  window.__viserMutable.sendMessage({ type: "GuiUpdateMessage", uuid: control, updates: { value } });
+  viser().sendMessage({ type: "GuiUpdateMessage", uuid: control, updates: { value } });
 };
 const observer = new IntersectionObserver((entries) => {
   for (const entry of entries) if (shown.has(entry.target)) shown.set(entry.target, entry.isIntersecting);
   tell();
 });
 const look = () => {
-  for (const chart of document.querySelectorAll(".uplot, [data-chart]"))
+  for (const chart of document.querySelectorAll(charts))
     if (!shown.has(chart)) { shown.set(chart, false); observer.observe(chart); }
   for (const chart of shown.keys())
     if (!chart.isConnected) { shown.delete(chart); observer.unobserve(chart); }
@@ -76,8 +78,8 @@ class InView:
             if event.client is not None:
                 self._hear(self._told.value)
 
-        words = private.dom_id(self._told), AWAKE, ASLEEP
-        private.run_script(client, _SCRIPT % tuple(json.dumps(each) for each in words))
+        words = private.dom_id(self._told), AWAKE, ASLEEP, f"{CHART}, [data-chart]", CHART_TITLE
+        private.run_script(client, _SCRIPT % (*map(json.dumps, words), PAGE))
 
     def _hear(self, told: str) -> None:
         told = told[:_LONGEST]

@@ -7,6 +7,7 @@ from typing import Any
 
 import viser
 
+from app.adapter.names import NUMBER_BOX, SLIDER_LABEL
 from app.adapter.private import dom_id
 
 STEPS = 200
@@ -27,4 +28,4 @@ def value_at(place: float, low: float, high: float) -> float:
 def only_track(slider: viser.GuiSliderHandle[Any]) -> str:
     """A style that hides the number box of a slider whose number is only a position."""
     here = f'[id="{dom_id(slider)}"]'
-    return f"<style>{here} + .mantine-NumberInput-root,{here} .mantine-Slider-label{{display:none}}</style>"
+    return f"<style>{here} + {NUMBER_BOX},{here} {SLIDER_LABEL}{{display:none}}</style>"

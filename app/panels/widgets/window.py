@@ -7,7 +7,7 @@ from typing import Any
 
 import viser
 
-from app.panels.widgets.command import add_command
+from app.panels.widgets.command import add_command, on_click
 
 
 class PopupWindow:
@@ -42,9 +42,7 @@ class PopupWindow:
     def _button(self) -> None:
         shut = self._gui.add_button("Close", color="gray")
 
-        @shut.on_click
-        async def _(_: object) -> None:
-            self.close()
+        on_click(shut, self.close)
 
     def close(self) -> None:
         modal, self._modal = self._modal, None

@@ -37,16 +37,16 @@ class LessonRows:
 
 
 def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Decimates a curve to at most 2 · BUCKETS points: each bucket's minimum and maximum of its finite
-    values, in the order in which they came."""
+    """Decimates a curve to at most 2 · BUCKETS points and its two ends: each bucket's minimum and maximum of
+    its finite values, each at its own time."""
     if len(t) <= 2 * BUCKETS:
         return t.copy(), values.copy()
-    size = -(-len(t) // BUCKETS)
-    known = np.isfinite(values)
-    low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
-    rest = size * BUCKETS - len(t)
-    low = np.concatenate([low, np.full(rest, np.inf)]).reshape(BUCKETS, size).argmin(axis=1)
-    high = np.concatenate([high, np.full(rest, -np.inf)]).reshape(BUCKETS, size).argmax(axis=1)
-    places = np.sort(np.arange(BUCKETS)[:, None] * size + np.stack([low, high], axis=1), axis=1).ravel()
-    places = places[places < len(t)]
-    return t[places], values[places]
+    starts = np.arange(BUCKETS + 1) * (len(t) - 1) // BUCKETS + 1
+    starts[0] = 0
+    places = np.minimum(starts[:-1, None] + np.arange(np.diff(starts).max()), starts[1:, None] - 1)
+    found = values[places]
+    known = np.isfinite(found)
+    low = np.where(known, found, np.inf).argmin(axis=1)
+    high = np.where(known, found, -np.inf).argmax(axis=1)
+    kept = np.unique(np.concatenate([[0], starts[:-1] + low, starts[:-1] + high, [len(t) - 1]]))
+    return t[kept], values[kept]

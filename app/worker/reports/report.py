@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from app.link.inside import Inside, InsideRequest
-from app.link.messages import BindingRow, TaskView
+from app.link.messages import TaskView
 from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
+from himpc.plan import Binding
 
 LISTED = 24
 """Largest number of active constraints sent to the page: nobody can read more in a tenth of a second."""
@@ -47,9 +48,9 @@ class SessionReport(ABC):
         """Points (k, 3) that the camera should show besides the robot, m."""
         return np.zeros((0, 3))
 
-    def binding(self) -> tuple[BindingRow, ...]:
+    def binding(self) -> tuple[Binding, ...]:
         """Active constraints of the last plan, at most LISTED."""
-        return tuple(BindingRow(*row) for row in self.session.binding()[:LISTED])
+        return tuple(self.session.binding()[:LISTED])
 
     def gauge(self) -> tuple[float, float] | None:
         """Norm and spectral radius of I − M⁻¹M̄, if the controller has an M̄."""

@@ -1,0 +1,70 @@
+"""Every name of viser that is private and is used here; each is checked before the server starts.
+
+viser's page has no public names at all: selectors and objects that our scripts and styles use are constants
+of this module, and viser's sources of the page, which its package contains, must still have what they stand
+for.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import viser
+
+from app.adapter.probe import reaches, require
+
+OF_VISER = {
+    "_messages": (
+        *("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage", "Message"),
+        *("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect", "FileTransferStartUpload"),
+        *("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage", "FileTransferPart"),
+        *("TransformControlsUpdateMessage", "SceneNodeDragMessage", "SceneNodeClickMessage"),
+        "ScenePointerMessage",
+    ),
+    "infra.WebsockClientConnection": ("_handle_incoming_message", "get_message_buffer", "queue_message"),
+    "_gui_handles._GuiHandleState": ("uuid", "value", "removed", "gui_api"),
+    "_scene_handles._SceneNodeHandleState": ("name", "api", "position", "wxyz"),
+    "SceneApi": ("_queue_scene_message",),
+    "GuiUplotHandle": ("_queue_update",),
+}
+OF_A_SERVER = (
+    "_websock_server._live_connections",
+    "_websock_server._incoming_handlers",
+    "_websock_server._client_state_from_id",
+    "_websock_server._broadcast_buffer.message_event",
+    "_websock_server._broadcast_buffer.message_from_id",
+    "_websock_server._broadcast_buffer.window_duration_sec",
+    "gui._current_file_upload_states",
+    "gui._gui_input_handle_from_uuid",
+    "gui._thread_executor",
+    "gui._websock_interface",
+    "scene._thread_executor",
+    "scene._dispatch_callback",
+)
+
+PAGE = "window.__viserMutable"
+"""The object of viser's page that sends messages."""
+CHART, CHART_TITLE = ".uplot", ".u-title"
+NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
+SHEET = 'div[style*="width: 20em"]'
+"""The sheet at the bottom of a phone."""
+OF_THE_PAGE = (
+    ("App.tsx", "w.__viserMutable = mutable.current"),
+    ("WebsocketInterface.tsx", "viewerMutable.sendMessage = (message)"),
+    ("components/UplotComponent.css", f"{CHART} {CHART_TITLE} {{"),
+    ("components/Slider.tsx", 'import { Slider, Flex, NumberInput } from "@mantine/core"'),
+    ("components/Slider.tsx", "id={uuid}"),
+    ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
+)
+"""(file below viser's `client/src`, what stands in it)."""
+
+
+def check_names() -> None:
+    """Raises InputError if viser lacks one of the names that it has before a server is made."""
+    for place, names in OF_VISER.items():
+        for name in names:
+            require(reaches(viser, f"{place}.{name}"), name)
+    sources = Path(viser.__file__).parent / "client" / "src"
+    for file, words in OF_THE_PAGE:
+        path = sources / file
+        require(path.is_file() and words in path.read_text("utf-8"), words)
