@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from submissions import MISTAKES, PD, STYLES, SUBMISSIONS
+from right_laws import PD, STYLES
+from submissions import MISTAKES, SUBMISSIONS
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.view import View
