@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import random
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -12,31 +10,8 @@ from typing import Any
 import msgspec
 from websockets.exceptions import ConnectionClosed
 
-from app.server.server import PageServer
-from benchmarks.findings import Findings
-from browsing.wire import Wire, camera, eventually, pack
-
-ODD: tuple[Any, ...] = (
-    None, True, False, 0, -1, 3.7, math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-320, 2**63 - 1, -(2**63),
-    "", "word", "nan", "x" * 300_000, "\x00", "🤖" * 50, [], [1], [1, 2, 3], [1, 2, 3, 4], [math.nan] * 3,
-    [1e308] * 3, [[[[1]]]], {}, {"a": 1}, b"bytes",
-)  # fmt: skip
-NUMBERS = (0.0, -0.0, 1.0, -1.0, 1e-300, 1e6, 1e7, 1e308, math.nan, math.inf, -math.inf)
-KINDS = (
-    "ViewerCameraMessage", "GuiUpdateMessage", "GuiFormDirtyMessage", "GuiFormSubmitMessage",
-    "ShareUrlRequest", "GuiButtonHoldMessage", "RunJavascriptMessage", "GetRenderResponseMessage",
-    "ScenePointerMessage", "TransformControlsUpdateMessage", "SceneNodeDragMessage", "SceneNodeClickMessage",
-    "CommandTriggerMessage", "FileTransferStartUpload", "FileTransferPart", "FileTransferPartAck",
-    "LocalStorageGetItemResponseMessage", "ResetSceneMessage", "RemoveSceneNodeMessage", "no such message",
-    "", 7, None,
-)  # fmt: skip
-
-LOOKS: tuple[dict[str, Any], ...] = (
-    {"image_height": 0},
-    {"look_at": (math.inf, 0.0, 0.0)},
-    {"up_direction": (math.nan, 0.0, 1.0)},
-    {"look_at": camera().position},
-)
+from benchmarks.odd import LOOKS, ODD, Odd
+from browsing.wire import Wire, camera
 
 
 class HostileUser:
@@ -44,7 +19,7 @@ class HostileUser:
 
     def __init__(self, url: str, seed: int) -> None:
         self.actions: Counter[str] = Counter()
-        self._url, self._random = url, random.Random(seed)
+        self._url, self._random = url, Odd(seed)
         self.page = Wire(url)
         self._due = [each for each, _ in self._actions()]
         self._random.shuffle(self._due)
@@ -91,27 +66,6 @@ class HostileUser:
         """Closes the tab."""
         self.page.__exit__()
 
-    # ---------------------------------------------------------------- numbers
-
-    def _number(self) -> float:
-        return self._random.choice(NUMBERS) if self._random.random() < 0.5 else self._random.gauss(0.0, 1.0)
-
-    def _numbers(self, count: int) -> tuple[Any, ...]:
-        """A number of values, usually the right number."""
-        chance = self._random.random()
-        if chance < 0.05:
-            return tuple(self._number() for _ in range(self._random.randrange(7)))
-        if chance < 0.1:
-            return tuple(self._random.choice(ODD) for _ in range(count))
-        return tuple(self._number() for _ in range(count))
-
-    def _place(self) -> tuple[float, ...]:
-        """A position that a user may drag to."""
-        return tuple(self._random.uniform(-1.2, 1.2) for _ in range(3))
-
-    def _turn(self) -> tuple[float, ...]:
-        return tuple(self._random.gauss(0.0, 1.0) for _ in range(4))
-
     # ---------------------------------------------------------------- the 3D view
 
     def _look(self) -> None:
@@ -120,19 +74,20 @@ class HostileUser:
         for _ in range(self._random.choice((1, 1, 2))):
             match self._random.randrange(6):
                 case 0:
-                    said["look_at"] = said["position"] = self._place()
+                    said["look_at"] = said["position"] = self._random.place()
                 case 1:
-                    said[self._random.choice(("position", "look_at", "up_direction"))] = self._numbers(3)
+                    odd = self._random.numbers(3)
+                    said[self._random.choice(("position", "look_at", "up_direction"))] = odd
                 case 2:
-                    said["wxyz"] = self._numbers(4)
+                    said["wxyz"] = self._random.numbers(4)
                 case 3:
                     size = self._random.choice((0, -1, 1, 10**9))
                     said[self._random.choice(("image_height", "image_width"))] = size
                 case 4:
-                    said[self._random.choice(("fov", "near", "far"))] = self._number()
+                    said[self._random.choice(("fov", "near", "far"))] = self._random.number()
                 case _:
                     # From the position that the page itself set.
-                    said["look_at"] = self.page.eye or self._place()
+                    said["look_at"] = self.page.eye or self._random.place()
         self._send("ViewerCameraMessage", said)
 
     def _look_while_built(self) -> None:
@@ -154,8 +109,8 @@ class HostileUser:
             odd = self._random.random() < 0.3
             said = {
                 "name": "/nothing/here" if stale else name,
-                "wxyz": self._numbers(4) if odd else self._turn(),
-                "position": self._numbers(3) if odd else self._place(),
+                "wxyz": self._random.numbers(4) if odd else self._random.turn(),
+                "position": self._random.numbers(3) if odd else self._random.place(),
                 "owner": self.page.controls_3d[name],
             }
             if self._random.random() < 0.2:
@@ -175,10 +130,10 @@ class HostileUser:
                 "phase": phase,
                 "name": name,
                 "instance_index": self._random.choice((None, 0, -1, 10**12)),
-                "start_position": self._numbers(3) if odd else self._place(),
+                "start_position": self._random.numbers(3) if odd else self._random.place(),
                 "start_screen_pos": (0.5, 0.5),
-                "end_position": self._numbers(3) if odd else self._place(),
-                "end_screen_pos": (self._number(), 0.5),
+                "end_position": self._random.numbers(3) if odd else self._random.place(),
+                "end_screen_pos": (self._random.number(), 0.5),
                 "button": self._random.choice(("left", "left", "left", "thumb")),
                 "modifier": None,
                 "owner": self.page.meshes[name],
@@ -187,8 +142,8 @@ class HostileUser:
         said = {
             "name": name,
             "instance_index": None,
-            "ray_origin": self._numbers(3),
-            "ray_direction": self._numbers(3),
+            "ray_origin": self._random.numbers(3),
+            "ray_direction": self._random.numbers(3),
             "screen_pos": (0.5, 0.5),
             "modifier": None,
             "owner": self.page.meshes[name],
@@ -232,7 +187,7 @@ class HostileUser:
                 high = low + 10.0 if high is None else high
                 value = self._random.choice((low, high, low + self._random.random() * (high - low)))
             case "GuiVector3Message" | "GuiVector2Message":
-                value = self._place()[: len(value)]
+                value = self._random.place()[: len(value)]
             case "GuiTextMessage":
                 value = self._random.choice(("a", "", "0 0 1", "[1, 2]", "x" * 5000, "nan", "(awake)", "🤖"))
             case _:
@@ -329,17 +284,7 @@ class HostileUser:
         self._send("LocalStorageGetItemResponseMessage", said)
 
     def _babble(self) -> None:
-        match self._random.randrange(4):
-            case 0:
-                self.page.send(self._random.randbytes(self._random.choice((0, 1, 30, 3000))))
-            case 1:
-                self.page.send(b"\x91" * self._random.choice((10, 100_000)))  # a deeply nested list
-            case 2:
-                names = ("uuid", "name", "updates", "value", "owner", "position", "content", "source")
-                said = {self._random.choice(names): self._random.choice(ODD) for _ in range(3)}
-                self._send(self._random.choice(KINDS), said)
-            case _:
-                self.page.send(pack(camera())[: self._random.randrange(60)])
+        self.page.send(self._random.babble())
 
     def reload(self) -> None:
         """Reloads the page of the same user, with empty storage."""
@@ -353,59 +298,3 @@ class HostileUser:
 
     def _send(self, kind: object, said: dict[str, Any]) -> None:
         self.page.send(msgspec.msgpack.encode({**said, "type": kind}))
-
-
-def roam(server: PageServer, seconds: float, seed: int, complaints: Callable[[], str]) -> Findings:
-    """Runs a hostile user for a time, with each action at least once; it ends early after a fault.
-
-    complaints: everything that was written to standard error so far.
-    """
-    found = Findings(seed)
-    user = HostileUser(server.link, seed)
-    try:
-        if not eventually(lambda: user.page.shows("t = ")):
-            found.blame("the page does not begin")
-        end = time.monotonic() + seconds
-        while (time.monotonic() < end or not user.once_all) and not found.faults:
-            user.act()
-            _look(server, user.page, found, complaints)
-        if not found.faults and not _answers(server, user):
-            found.blame("the page does not answer any more")
-        _look(server, user.page, found, complaints)
-    finally:
-        user.close()
-    found.actions = user.actions
-    return found
-
-
-def _look(server: PageServer, page: Wire, found: Findings, complaints: Callable[[], str]) -> None:
-    """Checks what happened."""
-    said = complaints()
-    for word in ("Traceback", "Exception", "Warning", "[viser]"):
-        if word in said:
-            found.blame("on the terminal: " + said[max(0, said.index(word) - 200) :][:2500])
-            return
-    if page.shows("cannot be shown"):
-        found.blame("the page ended")
-    for learner in server.sessions.learners:
-        if learner.failure is not None:
-            found.blame(f"the simulation: {learner.failure}")
-        if learner.ready is not None:
-            found.scenes.add(learner.choice.run.scene)
-
-
-def _answers(server: PageServer, user: HostileUser) -> bool:
-    """Whether a new page shows the session and accepts a command."""
-    user.reload()
-    if not eventually(lambda: user.page.find("Playback") is not None and bool(server.sessions.learners)):
-        return False
-    learner = server.sessions.learners[-1]
-
-    def stepped() -> bool:
-        before = -1 if learner.status is None else learner.status.ticks
-        button = user.page.find("Playback")
-        if button is not None:
-            user.page.write(button, value="Step")
-        return eventually(lambda: learner.status is not None and learner.status.ticks != before, 2.0)
-
-    return eventually(stepped)

@@ -28,7 +28,7 @@ from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.server.server import PageServer
 from benchmarks.findings import Findings, StandardError
-from benchmarks.hostile import roam
+from benchmarks.roam import roam
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings

@@ -39,10 +39,16 @@ def sources(*packages: str) -> list[Path]:
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    """A file, parsed once."""
+    return ast.parse(path.read_text())
+
+
+@cache
 def imports(path: Path) -> frozenset[str]:
     """Every module or name a file imports, in dotted form, wherever in the file and for types too."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -115,7 +121,7 @@ def test_app_is_the_folders_it_says() -> None:
 
 def test_the_way_through_app_names_files_that_are_there() -> None:
     """What app/__init__.py tells of a target's way down and a row's way up is about these files."""
-    told = ast.get_docstring(ast.parse((ROOT / "app" / "__init__.py").read_text())) or ""
+    told = ast.get_docstring(tree(ROOT / "app" / "__init__.py")) or ""
     named = set(re.findall(r"`(\w+/\w+)`", told))
     assert len(named) >= 10
     assert {name for name in named if not (ROOT / "app" / f"{name}.py").exists()} == set()
@@ -333,7 +339,7 @@ def test_few_files_touch_private_names_of_numba() -> None:
         touching |= {path.stem} if any(name.count(".") > 1 for name in of_numba) else set()
     assert touching == PRIVATE_OF_NUMBA
     assert using - touching == {"compiled", "public"}
-    told = ast.get_docstring(ast.parse((ROOT / "himpc/compilation/__init__.py").read_text())) or ""
+    told = ast.get_docstring(tree(ROOT / "himpc/compilation/__init__.py")) or ""
     assert set(re.findall(r"`(\w+)`", told)) >= PRIVATE_OF_NUMBA
 
 
@@ -357,7 +363,7 @@ def test_one_file_touches_private_names_of_viser() -> None:
     ours = {"_exit"}  # of os, and no secret of anybody
     for path in files:
         name = str(path.relative_to(ROOT))
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.Attribute) and is_private(node.attr):
                 of = node.value
                 inside = isinstance(of, ast.Name) and of.id in ("self", "cls")
@@ -445,7 +451,7 @@ def test_who_tells_torque_from_velocity() -> None:
 
 def asks_for_kind(path: Path) -> bool:
     """Whether a class of one kind is tested for, compared with, or matched."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree(path)):
         about: list[ast.AST] = []
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("isinstance", "issubclass"):
             about = [node.args[1]]
@@ -493,7 +499,7 @@ def test_classes_are_abstract_or_final() -> None:
 
 
 def classes_of(path: Path) -> list[ast.ClassDef]:
-    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ClassDef)]
+    return [node for node in ast.walk(tree(path)) if isinstance(node, ast.ClassDef)]
 
 
 def words_of(nodes: list[ast.expr]) -> list[str]:
@@ -502,9 +508,10 @@ def words_of(nodes: list[ast.expr]) -> list[str]:
     return [str(getattr(node, "id", getattr(node, "attr", ""))) for node in plain]
 
 
+@cache
 def origins(path: Path) -> dict[str, str]:
     """Where the names of a file come from."""
-    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)]
+    nodes = [node for node in ast.walk(tree(path)) if isinstance(node, ast.ImportFrom)]
     return {alias.asname or alias.name: str(node.module) for node in nodes for alias in node.names}
 
 

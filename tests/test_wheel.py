@@ -15,8 +15,12 @@ from pathlib import Path
 
 import pytest
 
+from himpc.compilation.compiling import compile_all
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("robots", "himpc", "lessons", "app")
+_ELSEWHERE = "NUMBA_CACHE_DIR" in os.environ
+"""Whether compiled code is kept in a folder of the tester's: then there is none to take along."""
 
 
 @pytest.fixture(scope="module")
@@ -79,23 +83,25 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _take_compiled_code_along(there: Path) -> None:
-    """A new place has no compiled code, and compiling it for a minute is no part of this test. Numba knows a
-    source by its time and size."""
-    for kept in ROOT.glob("himpc/**/__pycache__/*.nb[ic]"):
-        (there / kept.relative_to(ROOT).parent).mkdir(exist_ok=True)
-        shutil.copy2(kept, there / kept.relative_to(ROOT))
-    for source in ROOT.glob("himpc/**/*.py"):
-        told = source.stat()
-        os.utime(there / source.relative_to(ROOT), ns=(told.st_atime_ns, told.st_mtime_ns))
+    """A new place has no compiled code, and compiling it for a minute is no part of this test."""
+    compile_all(lambda *_: None)
+    found = [*ROOT.glob("himpc/**/__pycache__/compiled/*.code")]
+    assert found or _ELSEWHERE
+    for kept in found:
+        folder = there / kept.relative_to(ROOT).parent
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        shutil.copy2(kept, folder)
 
 
 def run(command: Path, folder: Path, what: Sequence[str]) -> str:
     """What the command prints, started in `folder` with nothing of this process's paths."""
-    environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
+    processor = {name: value for name, value in os.environ.items() if name == "NUMBA_CPU_NAME"}
+    environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", **processor}
     done = subprocess.run(
         [str(command), *what], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+    assert "compiling" not in done.stderr or _ELSEWHERE
     return done.stdout
 
 

@@ -25,7 +25,7 @@ from app.view.camera import look, turn
 from app.view.robot import aim
 from app.worker.simulation import SimulationRunner
 from benchmarks.findings import StandardError
-from benchmarks.hostile import roam
+from benchmarks.roam import roam
 from browsing.wire import Wire, camera, eventually
 from lessons.scenes.run_spec import RunSpec
 from robots import load_robot

@@ -150,20 +150,21 @@ sys.meta_path.insert(0, Interrupted())
 """
 
 
+def python(*arguments: str, before: Callable[[], None] | None = None) -> subprocess.CompletedProcess[str]:
+    """Python with these arguments, once it has ended; `before`: what is done first in its process."""
+    command = [sys.executable, *arguments]
+    return subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=LONG, check=False, preexec_fn=before
+    )
+
+
 @pytest.mark.parametrize(
     "start",
     ["runpy.run_module('app', run_name='__main__')", "from app.commands.early import main; sys.exit(main())"],
     ids=["module", "script"],
 )
 def test_ctrl_c_while_the_first_modules_load(start: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", BEFORE_ANYTHING.replace("{start}", start), "scenes"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=LONG,
-        check=False,
-    )
+    done = python("-c", BEFORE_ANYTHING.replace("{start}", start), "scenes")
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
@@ -180,28 +181,12 @@ with interruptible():
     os.kill(os.getpid(), signal.SIGINT)
 print("went on")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=LONG,
-        check=False,
-        preexec_fn=deaf,
-    )
+    done = python("-c", code, before=deaf)
     assert (done.returncode, done.stdout, done.stderr) == (0, "went on\n", "")
 
 
 def test_tests_in_the_background_start_programs_as_a_terminal_does() -> None:
     """They inherit that Ctrl-C means nothing, the programs that they test must not."""
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-n", "0", "-k", "first_modules_load", __file__],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=LONG,
-        check=False,
-        preexec_fn=deaf,
-    )
+    done = python("-m", "pytest", "-n", "0", "-k", "first_modules_load", __file__, before=deaf)
     assert done.returncode == 0, done.stdout
     assert "2 passed" in done.stdout

@@ -11,7 +11,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
 
 if TYPE_CHECKING:
-    from quoted import CourseRuns
+    from course_runs import CourseRuns
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +26,6 @@ def session(scene: TorqueScene) -> TorqueSession:
 
 @pytest.fixture(scope="session")
 def course_runs() -> CourseRuns:
-    from quoted import course_runs as made
+    from course_runs import course_runs as made
 
     return made()

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from course_runs import CourseRuns
 from latex2mathml.converter import convert
-from quoted import CourseRuns
 
 from himpc.telemetry import layout_of
 from lessons.course import COURSE, load_lesson

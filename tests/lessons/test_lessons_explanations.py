@@ -12,7 +12,7 @@ from explanations_exempt import TEXTS, Exempt
 from explanations_reference import REFERENCE
 from interventions import Intervention
 from interventions_all import ROWS
-from quoted import QUOTED
+from quoted_all import QUOTED
 
 from docs.pages import texts
 from lessons.course import COURSE, load_lesson

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from submissions import PD
+from right_laws import PD
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController

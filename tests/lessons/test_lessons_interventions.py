@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from course_runs import CourseRuns
 from interventions import Intervention
 from interventions_all import ROWS
-from quoted import CourseRuns, step_of
+from quoted import step_of
 from test_lessons_quoted import texts
 
 from docs.further import further

@@ -1,6 +1,6 @@
 """Numbers that stand in a lesson's sentences, beside its claims: each is measured, to the digits it has.
 
-`quoted.QUOTED` holds those that a run gives. Those that follow from settings alone are at the end, or in
+`quoted_all.QUOTED` holds those that a run gives. Those that follow from settings alone are at the end, or in
 `test_lessons_derivations`.
 """
 
@@ -12,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from course_runs import CourseRuns
 from interventions_all import ROWS
-from quoted import QUOTED, CourseRuns, Quoted, specs, step_of
+from quoted import Quoted, specs, step_of
+from quoted_all import QUOTED
 
 from himpc.limits import Limits
 from lessons.course import COURSE, load_lesson

@@ -1,0 +1,280 @@
+"""Every number of the steps' texts that a run gives, see `quoted`."""
+
+from __future__ import annotations
+
+import math
+
+from quoted import Quoted
+
+from lessons.teaching.measure import Measure, Signal, Statistic
+
+HAND = Signal("error/position", "mm")
+TILT = Signal("error/orientation", "deg")
+EE = Signal("error/ee", "mm")
+BASE = Signal("error/base", "m")
+WAY = Signal("way of the base", "m")
+TORQUE = Signal("torque share", "%")
+RADIUS, NORM = Signal("gauge_radius"), Signal("gauge_norm")
+ROUGH = Signal("delta_tau", "N·m")
+Q1 = Signal("error/q1", "deg")
+SPEED_3 = Signal("v", "deg/s", column=2)
+
+
+def _of(
+    signal: Signal, statistic: Statistic = "largest", after: float = 0.0, until: float = math.inf
+) -> Measure:
+    return Measure(signal, statistic, after, until)
+
+
+def _ratio(signal: Signal, statistic: Statistic = "largest", after: float = 0.0) -> Measure:
+    return Measure(signal, statistic, after, over_ghost=True)
+
+
+QUOTED = (
+    Quoted("a-redundant-arm/1", "turns by almost 30°", _of(Signal("q", "deg", column=2), "range"), 28, 30),
+    Quoted(
+        "one-task/0",
+        "Half a second later the hand is back on its target, and it has not swung",
+        _of(HAND, after=0.8),
+        0.0,
+        0.5,
+    ),
+    Quoted("one-task/2", "Almost nothing happens", _ratio(HAND), 0.98, 1.05),
+    Quoted("no-model-needed/0", "dips by a few millimetres", _of(HAND), 1.5, 5.0),
+    Quoted("no-model-needed/0", "to a hundredth of a millimetre", _of(HAND, "last"), 0.0, 0.015),
+    Quoted("no-model-needed/0", "it sags by centimetres", _of(HAND, "last"), 15, 100, None),
+    Quoted("no-model-needed/2", "leaves 0.41 of the error", _ratio(HAND), 0.405, 0.415, ("M_bar_scale=2",)),
+    Quoted("no-model-needed/2", "The error is less than a fifth", _ratio(HAND), 0.16, 0.2),
+    Quoted("no-model-needed/2", "the largest of them is 0.94", _of(RADIUS, "mean"), 0.935, 0.945),
+    Quoted("no-model-needed/2", "there it is 0.999", _of(NORM, "mean"), 0.9985, 0.9995, None),
+    Quoted("no-model-needed/3", "At × 6 the gauge read 0.91", _of(RADIUS, "mean"), 0.905, 0.915, None),
+    Quoted("no-model-needed/3", "to −1.21 at × 7", _of(RADIUS, "mean"), 1.205, 1.215, ("M_bar_scale=7",)),
+    Quoted("no-model-needed/3", "comes back half as large again", _of(RADIUS, "mean"), 1.4, 1.6),
+    Quoted("two-tasks/1", "by a quarter of a metre", _of(HAND), 225, 275),
+    Quoted("two-tasks/2", "keeps its circle to a millimetre", _of(HAND), 0.2, 1.25),
+    Quoted("two-tasks/3", "by 0.02° with $Q_2 = 1$", _of(Q1), 0.015, 0.025, ("q1_amplitude_deg=20",)),
+    Quoted(
+        "two-tasks/3",
+        "by 0.05° with 0.01",
+        _of(Q1),
+        0.045,
+        0.055,
+        ("q1_amplitude_deg=20", "levels.q1.Q=0.01"),
+    ),
+    Quoted(
+        "two-tasks/3", "by 13° of its 20°", _of(Q1), 12.5, 14.5, ("q1_amplitude_deg=20", "levels.q1.Q=1e-5")
+    ),
+    Quoted("two-tasks/3", "still several times the error", _ratio(HAND), 3, 20),
+    Quoted(
+        "swap-the-priorities/0",
+        "the posture's error of 32°",
+        _of(Signal("error/posture", "deg"), "last"),
+        31.5,
+        32.5,
+    ),
+    Quoted(
+        "swap-the-priorities/1",
+        "to a hundredth of a degree",
+        _of(Signal("error/posture", "deg"), "last"),
+        0,
+        0.015,
+    ),
+    Quoted(
+        "when-tasks-fight/0",
+        "From 1.3 s on links 2 and 3 come into line",
+        _of(Signal("q", "deg", column=2), after=1.2, until=1.3),
+        10,
+        60,
+    ),
+    Quoted("when-tasks-fight/0", "passes a thousand times the limit", _of(TORQUE), 1e5, math.inf),
+    Quoted("when-tasks-fight/2", "to and fro with 94°/s", _of(SPEED_3, after=2.0), 93.5, 94.5),
+    Quoted(
+        "stretched-out/0",
+        "what the motion needs, less than half of the limit",
+        _of(TORQUE),
+        30,
+        50,
+        ("controller=himpc",),
+    ),
+    Quoted(
+        "stretched-out/1",
+        "after a few tenths of a second the hand is on its circle",
+        _of(HAND, after=0.6),
+        0,
+        0.5,
+    ),
+    Quoted("stretched-out/2", "an error of some millimetres right at the start", _of(HAND), 2, 10, None),
+    Quoted("torque-has-a-limit/0", "nine tenths of the 0.24 N·m", _of(TORQUE), 85, 92),
+    Quoted("torque-has-a-limit/1", "falls behind by half a degree", _of(Q1), 0.45, 0.6),
+    Quoted("stopping-takes-distance/0", "it comes at 57°/s", _of(Signal("v", "deg/s", column=1)), 56.5, 57.5),
+    Quoted(
+        "stopping-takes-distance/2",
+        "the arm does 18",
+        _of(Signal("speed within 5° of an end", "deg/s")),
+        17.5,
+        18.5,
+    ),
+    Quoted(
+        "stopping-takes-distance/2",
+        "never takes more than 1.5",
+        _of(Signal("deceleration to stop", "rad/s²")),
+        1.3,
+        1.5,
+    ),
+    Quoted(
+        "stopping-takes-distance/2",
+        "it takes 16 of the 20 rad/s²",
+        _of(Signal("deceleration to stop", "rad/s²")),
+        15.5,
+        16.5,
+        ("limits.velocity_approach=0",),
+    ),
+    Quoted("how-far-ahead/0", "Nothing happens", _ratio(HAND, "rms"), 0.98, 1.02),
+    Quoted(
+        "how-far-ahead/0",
+        "Twice the $\\bar M$ halves the error",
+        _ratio(HAND, "rms"),
+        0.45,
+        0.55,
+        ("M_bar_scale=2",),
+    ),
+    Quoted("how-far-ahead/1", "about half the error", _ratio(HAND, "rms"), 0.4, 0.6),
+    Quoted("deadlines/0", "The error more than doubles", _ratio(HAND), 2.0, 2.5),
+    Quoted("deadlines/1", "The same error", _ratio(HAND), 0.95, 1.05),
+    Quoted("deadlines/2", "the same to the third digit", _ratio(HAND), 0.995, 1.005),
+    Quoted("sensors-are-coarse/0", "the motion needs 3 % of the torque limit", _of(TORQUE), 2.5, 3.5, None),
+    Quoted("sensors-are-coarse/1", "a quarter of the noise", _ratio(ROUGH, "rms"), 0.22, 0.28),
+    Quoted("sensors-are-coarse/1", "grows by little more than half", _ratio(HAND), 1.5, 1.65),
+    Quoted("the-model-is-wrong/2", "The error grows a little", _ratio(HAND), 1.02, 1.25),
+    Quoted("inside-the-qp/0", "pays with 14 degrees", _of(Signal("error/pose", "deg"), "last"), 13.5, 14.5),
+    Quoted("inside-the-qp/1", "10 cm off its target", _of(Signal("error/reach", "mm"), after=2.5), 95, 105),
+    Quoted(
+        "inside-the-qp/2",
+        "never more than 1.1 mm off",
+        _of(Signal("error/reach", "mm")),
+        1.05,
+        1.15,
+        ("limits.torque_scale=1",),
+    ),
+    Quoted(
+        "inside-the-qp/2",
+        "its error is no larger than with all the torque",
+        _of(Signal("error/reach", "mm")),
+        1.0,
+        1.1,
+    ),
+    Quoted("inside-the-qp/2", "here by a third of the limit", _of(TORQUE), 128, 138, None),
+    Quoted(
+        "inside-the-qp/3",
+        "the wrist is left 5 cm short",
+        _of(Signal("error/reach", "mm"), after=1.95),
+        45,
+        55,
+        None,
+    ),
+    Quoted(
+        "inside-the-qp/3",
+        "the joints give 7 degrees",
+        _of(Signal("error/pose", "deg"), "last"),
+        6.5,
+        7.5,
+        None,
+    ),
+    Quoted("first-hold-then-reach/0", "Hundredths of a millimetre", _of(EE), 0.005, 0.1),
+    Quoted("first-hold-then-reach/0", "the hand swings out by 12 cm", _of(EE), 115, 125, None),
+    Quoted("first-hold-then-reach/1", "1.63 m before its target", _of(BASE, "mean", after=7.0), 1.625, 1.635),
+    Quoted(
+        "first-hold-then-reach/2",
+        "by exactly these 1.63 m",
+        _of(Signal("error/ee", "m"), "mean", after=8.5),
+        1.625,
+        1.635,
+    ),
+    Quoted("how-strict-is-strict/1", "Less than a tenth of it is used", _of(EE), 0.1, 1.0),
+    Quoted(
+        "how-strict-is-strict/1",
+        "with (11) in its place it is off by 3 mm",
+        _of(EE),
+        2.5,
+        3.5,
+        ("lexicographic=cost",),
+    ),
+    Quoted("how-strict-is-strict/1", "35 cm from its target", _of(BASE, "mean", 6.0, 7.0), 0.345, 0.355),
+    Quoted(
+        "how-strict-is-strict/2",
+        "cuts the step to a fortieth",
+        _of(Signal("step/base"), "mean"),
+        1 / 50,
+        1 / 33,
+    ),
+    Quoted("seeing-ahead/0", "More than half a metre of the way back", _of(WAY, "range", 6.5, 8.0), 0.5, 0.7),
+    Quoted("seeing-ahead/0", "about a quarter of the ghost's", _ratio(BASE, "mean", after=8.0), 0.2, 0.3),
+    Quoted("seeing-ahead/1", "is off by 3 cm all the same", _of(EE), 25, 35),
+    Quoted("seeing-ahead/2", "16 cm from home at the end", _of(BASE, "mean", after=15.9), 0.155, 0.165),
+    Quoted("seeing-ahead/2", "the plan keeps the hand within a millimetre", _of(EE), 0.1, 1.0, None),
+    Quoted("seeing-ahead/3", "the hand pays with 2 cm", _of(EE), 15, 25),
+    Quoted(
+        "deliveries/0", "Less than two thirds of the time", _ratio(Signal("time at work", "s")), 0.55, 0.667
+    ),
+    Quoted("deliveries/0", "and of the way", _ratio(WAY), 0.55, 0.667),
+    Quoted(
+        "deliveries/2", "The hand is with the first person by 3 s", _of(EE, after=3.0, until=4.0), 0.0, 10.0
+    ),
+    Quoted(
+        "deliveries/3",
+        "a second later it is there within two centimetres",
+        _of(EE, after=17.5, until=19.5),
+        10,
+        20,
+    ),
+    Quoted("deadlines/2", "the cliff is where it was, between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
+    Quoted(
+        "deadlines/2",
+        "the cliff is where it was, between 2 and 2.5",
+        _of(RADIUS),
+        1.0,
+        9.0,
+        ("M_bar_scale=2.5",),
+    ),
+    Quoted(
+        "the-model-is-wrong/1",
+        "here that is mostly the friction",
+        _of(HAND),
+        0.0,
+        0.5,
+        ("plant.friction=0", "plant.damping=0"),
+    ),
+    Quoted("the-model-is-wrong/1", "here that is mostly the friction", _of(HAND), 1.0, 5.0),
+    Quoted(
+        "inside-the-qp/2",
+        "then level 1 pays as well",
+        _of(Signal("active/reach")),
+        1,
+        9,
+        ("limits.torque_scale=0.1",),
+    ),
+    Quoted(
+        "how-strict-is-strict/0",
+        "more than a third of a step is accepted",
+        _of(Signal("step/base"), "mean"),
+        0.34,
+        0.6,
+        None,
+    ),
+    Quoted(
+        "how-strict-is-strict/2", "allow a third and more", _of(Signal("step/base"), "mean"), 0.34, 0.9, None
+    ),
+    Quoted("deliveries/2", "three seconds to the second person", _of(Signal("place"), until=17.1), 4, 4),
+    Quoted("deliveries/2", "needs nearly seven", _of(Signal("place"), until=21.1), 4, 4, None),
+    Quoted("deliveries/2", "needs nearly seven", _of(Signal("place"), until=20.6), 3, 3, None),
+    Quoted("your-robot/1", "the head hangs low for good", _of(HAND, "last"), 10, 100, None),
+    Quoted("your-robot/2", "Less than half the error", _ratio(HAND), 0.35, 0.5),
+    Quoted(
+        "your-robot/2",
+        "At three times the suggestion the gauge passes 1",
+        _of(RADIUS),
+        1.0,
+        1.3,
+        ("M_bar_scale=3",),
+    ),
+)

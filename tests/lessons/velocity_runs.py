@@ -1,0 +1,17 @@
+"""Velocity-level scenes as their tests prepare them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.velocity_scene import VelocityScene
+
+HOME = np.array([1.48962656, 0.173941])
+"""Where the hand of the mobile manipulator begins, seen from above, m."""
+
+
+def scene(name: str, *assignments: str, controller: str | None = None) -> VelocityScene:
+    found = prepared(load_scene(name), controller, assignments)
+    assert isinstance(found, VelocityScene)
+    return found
