@@ -1,7 +1,6 @@
 """Whether the server's memory, threads and handles stay constant, over time and over reconnections.
 
-    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--set PATH=VALUE …]
-                              [--json -]
+    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--json -]
 
 Runs a server and, in a process of their own, K clients that use the page's protocol (benchmarks/client.py).
 Measures for M minutes. The first ten of them (or the first half of a shorter run) fill the histories for
@@ -70,11 +69,9 @@ def main() -> int:
     parser.add_argument("--clients", type=int, default=8)
     parser.add_argument("--reconnects", type=int, default=100)
     parser.add_argument("--scene", default="iiwa14-hold")
-    parser.add_argument("--set", nargs="*", default=[])
     parser.add_argument("--json", choices=["-"], default=None)
     options = parser.parse_args()
-    choice = SceneChoice(RunSpec(options.scene, set=tuple(options.set)))
-    server = PageServer(choice, port=0, max_sessions=options.clients)
+    server = PageServer(SceneChoice(RunSpec(options.scene)), port=0, max_sessions=options.clients)
     try:
         with Viewers(server.link, "--clients", str(options.clients)) as viewers:
             assert wait_until(lambda: len(server.sessions.learners) == options.clients, LONG), "not let in"

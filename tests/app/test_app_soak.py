@@ -13,10 +13,9 @@ ROOT = Path(__file__).parents[2]
 
 def test_nothing_grows() -> None:
     """Memory of server and simulations, threads, handles; and over reloads. In a process of its own, which
-    holds nothing of other tests. Rows come a hundred times a second in every case, and so the robots are
-    controlled hardly more often: what a tick keeps, `test_app_kept` finds."""
+    holds nothing of other tests."""
     options = ["--minutes", "2", "--clients", "2", "--reconnects", "50", "--scene", "planar3-hold"]
-    found = json.loads(run("soak", *options, "--set", "T_s=0.004", "--json", "-"))
+    found = json.loads(run("soak", *options, "--json", "-"))
     assert found["faults"] == [], found
 
 
