@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from lessons import begin, load_scene, prepared
+from lessons import begin, prepared, torque_scene
 from lessons.events import Set
 
 
 def main(seconds: float = 2.0, payload_kg: float = 3.0) -> None:
     """Prints what the module's docstring says."""
     for controller in ("himpc", "tdeosf", "osf"):
-        session = begin(prepared(load_scene("iiwa14-hold"), controller, ()), seed=0)
+        session = begin(prepared(torque_scene("iiwa14-hold"), controller, ()), seed=0)
         half, ticks = 0.5 * seconds, round(seconds / session.settings.T_s)
         errors = []
         for tick in range(ticks):
@@ -24,7 +24,7 @@ def main(seconds: float = 2.0, payload_kg: float = 3.0) -> None:
                 # What happens to a run is an event; it takes effect when the next tick begins.
                 session.post(Set("plant.payload_kg", payload_kg))
             session.tick()
-            if session.t > half:
+            if session.t > half and session.plan is not None:
                 errors.append(float(np.linalg.norm(session.plan.errors["position"])))
         print(f"{controller}: sags by {1e3 * max(errors):.2f} mm, rests {1e3 * errors[-1]:.3f} mm off")
 

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from lessons import begin, load_scene, prepared
+from lessons import begin, prepared, torque_scene
 
 
 def main(seconds: float = 4.0) -> None:
     """Prints what the module's docstring says."""
     # A session is a run that you advance yourself, one tick at a time.
-    session = begin(prepared(load_scene("planar3-conflict"), "himpc", ()), seed=0)
+    session = begin(prepared(torque_scene("planar3-conflict"), "himpc", ()), seed=0)
     ticks = round(seconds / session.settings.T_s)
     residual, leak, unsolved, solved = 0.0, 0.0, 0, 0
     for tick in range(ticks):
         session.tick()
         plan = session.plan
+        assert plan is not None  # there is one after every tick
         residual = max(residual, plan.kkt_residual)
         leak = max(leak, plan.leak or 0.0)
         unsolved, solved = unsolved + plan.unsolved, solved + len(plan.levels)

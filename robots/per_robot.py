@@ -9,7 +9,8 @@ from weakref import WeakKeyDictionary
 
 from robots.robot import Robot
 
-P, Result = ParamSpec("P"), TypeVar("Result")
+P = ParamSpec("P")
+Result = TypeVar("Result")
 
 
 def per_robot(compute: Callable[Concatenate[Robot, P], Result]) -> Callable[Concatenate[Robot, P], Result]:

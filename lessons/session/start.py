@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import overload
 
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
@@ -18,6 +19,12 @@ SESSIONS: Mapping[type[Scene], type[TorqueSession] | type[VelocitySession]] = {
 """The session class for each kind of scene."""
 
 
+@overload
+def begin(scene: TorqueScene, seed: int = 0) -> TorqueSession: ...
+@overload
+def begin(scene: VelocityScene, seed: int = 0) -> VelocitySession: ...
+@overload
+def begin(scene: Scene, seed: int = 0) -> Session: ...
 def begin(scene: Scene, seed: int = 0) -> Session:
     """Starts a session for a scene. Raises InputError if its settings do not fit its robot."""
     return SESSIONS[type(scene)](scene, seed)  # pyright: ignore[reportArgumentType]

@@ -59,6 +59,7 @@ def test_own_code_that_is_saved_runs(body: SimulationRunner, file: Path) -> None
     own = body.status().own
     assert own is not None
     assert (own.file, own.fault, own.saves) == (str(file), None, 0)
+    assert body.session.plant.tau is not None
     before = body.session.plant.tau.copy()
     file.write_text(HOLDS.replace("now.bias", "now.bias + 0.1"))
     assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)
