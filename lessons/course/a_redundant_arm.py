@@ -87,8 +87,8 @@ ELBOW = Step(
     do="Grab the posture's target and turn the elbow around. Then grab the hand's: which one wins?",
     why=r"""
     The elbow swings around the line from shoulder to wrist; the hand stays. This is called
-    *self-motion*. It does not go the whole 60°: only the part of the wish that lies in the null
-    space is granted.
+    *self-motion*. Joint 3 stops at 29°, because the same level asks the other six joints to stay, and
+    the elbow cannot swing without them. Asked for joint 3 alone, the arm turns it by nearly the whole 60°.
     """,
     prediction=Choice(
         "The elbow turns by almost 30°. How far does the hand move on the way?",

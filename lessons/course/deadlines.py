@@ -88,8 +88,9 @@ SLOWER = Step(
     """,
     do="What do 5 ms and 10 ms do? Where does the arm stop to be usable?",
     why=r"""
-    The same error, with half the computing. A loop that misses every deadline by one tick is a loop
-    at half the rate that does not know it. The error grows with the period (Remark 6): that is why
+    The same error, with half the computing. A loop that misses every deadline by one tick follows no
+    better than a loop of half the rate. With coarse sensors it is worse: it divides by 1 ms and keeps the
+    noise of the full rate. The error grows with the period (Remark 6): that is why
     the paper wants 1 ms, and why it calls its own 8 ms per step on seven joints, at $N = 5$, too
     long.
     """,

@@ -38,9 +38,10 @@ NOTHING = Step(
     """,
     do="What is the smallest δ with which the base moves at all?",
     why=r"""
-    It does not move. A straight step along a tangent leaves a curve at once, however short it is;
-    with $\delta = 0$ the line search halves and halves, and what is left is nothing. Strict to the
-    last digit is not a strict hierarchy, it is a single task.
+    It does not move. With $\delta = 0$ a rounding error already breaks the rule, and the line search
+    accepts no step. With a $\delta$ just above 0 the curve is the reason: a straight step along a
+    tangent leaves it at once (given), so that only tiny steps are accepted. With $\delta = 0$ the
+    second task gets nothing.
     """,
     prediction=Choice(
         "δ = 0, the strictest of all hierarchies. How far does the base drive in 8 s?",
@@ -150,7 +151,8 @@ SUM = Step(
     paper finds the same, (12) "permitting larger step sizes", and for the hand 3.07 and 3.42 mm at low
     and high $\delta$ against 3.24 and 6.25 mm. (Under the formulation as printed, `formulation=paper`,
     which of the two is better for the hand depends on a weight that the paper does not print: with our
-    $Q = 1$ the hand is worse off under (12), with $Q = 100$ better.)
+    $Q = 1$ the hand is worse off under (12). With $Q = 100$ its mean error is smaller under (12), and its
+    largest error is still larger.)
     """,
     prediction=Choice(
         "(11) forbids less than (12). With it, the base's mean error over the 8 s is …",

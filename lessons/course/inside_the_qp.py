@@ -42,7 +42,8 @@ LINE = Step(
     why=r"""
     Blue would like to be at the ring "2 alone", the middle of its ellipses. It may only choose on
     the line, and takes the point where one of its ellipses just touches it. The wrist arrives and
-    blue pays with 14 degrees, for good: seen from the line there is no better point. At rest both
+    blue pays with 14 degrees, for good: seen from the line there is no better point by blue's weights,
+    which count joint 1 four times as much as joint 2. With equal weights it pays 12 degrees. At rest both
     discs lie at zero, "leave the torque as it is", and the ring stays outside.
     """,
     prediction=Choice(

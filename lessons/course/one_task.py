@@ -162,10 +162,10 @@ FREE = Step(
     why=r"""
     Nothing asks that direction to stop, so the elbow still moves when the hand has long been home.
     Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and the
-    torques change to hold it there. When the push ends, the changed torques stay as they are, and they
-    turn joint 2 round: 0.2 s later it does 80°/s the other way. Without speed limits joint 2 goes on the
-    way it was pushed, with more than 300°/s. A last level that wants $\ddot q + K_V \dot q = 0$
-    brings it to rest; the hand hardly notices.
+    torques change to hold it there. When the push ends, the part of the torques along the free motion
+    stays as it is, and it turns joint 2 round: 0.2 s later it does 80°/s the other way. Without speed
+    limits joint 2 goes on the way it was pushed, with more than 300°/s. A last level that wants $\ddot
+    q + K_V \dot q = 0$ brings it to rest; the hand hardly notices.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",

@@ -107,7 +107,7 @@ SHORT = Step(
             "at least",
             10.0,
             fails_with=("horizon=10",),
-            because="a second ahead is enough to slow down in time",
+            because="ten knots over a second are enough to slow down in time",
         ),
     ),
     set=("horizon=2",),

@@ -137,11 +137,11 @@ VIABLE = Step(
     """,
     do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""
-    Now the very next step already knows the whole braking distance. 5° before the limit $t = T_s$
-    would allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18, a little late
-    behind the falling bound. A stop never takes more than 1.5 of the 20 rad/s², and no QP is without a
-    solution. The price is time: the last degrees are crept. What a short horizon cannot see must be
-    put into its bounds. It is this lab's default and a deliberate departure from (32d).
+    Now the very next step already knows the whole braking distance. 5° before the limit $t = T_s$ would
+    allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18, a little late behind the falling bound. At
+    no moment would an even stop before the limit take more than 1.5 of the 20 rad/s², and no QP is
+    without a solution. The price is time: the last degrees are crept. What a short horizon cannot see
+    must be put into its bounds. It is this lab's default and a deliberate departure from (32d).
     """,
     prediction=Choice(
         "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",

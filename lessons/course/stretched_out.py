@@ -31,8 +31,8 @@ INVERSE = Step(
     Sideways almost no torque would be enough. But a circle also bends: in the first instant this one
     asks for 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that
     many million times. Started gently, the circle asks for nothing along the arm at first, and for a
-    tenth of a second the demand is small. Then, at 0.13 s, it passes ten times the limit all the same,
-    for a tick or two. A damped inverse, `osf_damped`, asks for a fifth of the limit. Motors cannot
+    tenth of a second the demand is small. Then, at 0.13 s, it passes a thousand times the limit all the
+    same, for a tick or two. A damped inverse, `osf_damped`, asks for a fifth of the limit. Motors cannot
     follow such demands: they clip them.
     """,
     prediction=Choice(

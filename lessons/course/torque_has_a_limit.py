@@ -34,8 +34,8 @@ ENOUGH = Step(
     do="Lower the limit until something changes. What is it that changes first?",
     why=r"""
     The run needs nine tenths of the 0.24 N·m, and most of that is friction: without any friction the
-    same motion needs a third of the 0.24 N·m. A bound that is not met does nothing: with all the torque
-    the errors are the same.
+    same motion needs a third of the 0.24 N·m, and half of it without the dry one alone. A bound that is
+    not met does nothing: with all the torque the errors are the same.
     """,
     prediction=Value(
         "Which share of the reduced limit does the motion need at most?",

@@ -60,7 +60,7 @@ LOAD = Step(
             "at most",
             0.2,
             fails_with=("controller=weighted",),
-            because="in a sum the orientation holds the head back",
+            because="in a sum the orientation and the posture hold the head back, each of them alone as well",
         ),
         Claim(
             "It is tilted by more than 5°.",

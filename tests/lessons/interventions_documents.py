@@ -213,8 +213,13 @@ DOCUMENT_ROWS = (
         of=("formulation=paper", "lexicographic=per_coordinate"),
     ),
     STRICT(
-        "how-strict-is-strict/2", "with $Q = 100$ better",
+        "how-strict-is-strict/2", "With $Q = 100$ its mean error is smaller under (12)",
         of("error/ee", "mm", "mean"), (1.2, 2.8), ("lexicographic=cost",), (3.0, 5.0),
+        of=("formulation=paper", "lexicographic=per_coordinate", "Q=100"),
+    ),
+    STRICT(
+        "how-strict-is-strict/2", "largest error is still larger",
+        of("error/ee", "mm"), (9.5, 11), ("lexicographic=cost",), (7, 8),
         of=("formulation=paper", "lexicographic=per_coordinate", "Q=100"),
     ),
     STRICT(

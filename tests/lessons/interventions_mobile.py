@@ -27,7 +27,7 @@ MOBILE_ROWS = (
     ),
     # ---------------------------------------- how-strict-is-strict
     Intervention(
-        "how-strict-is-strict/0", "with $\\delta = 0$ the line search halves and halves",
+        "how-strict-is-strict/0", "and the line search accepts no step",
         of("way of the base", "m"), (0, 0.01), ("delta_m=0.001",), (1.0, 3.0),
     ),
     Intervention(

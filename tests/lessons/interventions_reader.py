@@ -5,6 +5,7 @@ from __future__ import annotations
 from interventions import Intervention, of
 
 HAND, HAND_RMS = of("error/position", "mm"), of("error/position", "mm", "rms")
+HAND_LAST = of("error/position", "mm", "last")
 X = of("error/position", "mm", "rms", column=0)
 ROUGH = of("delta_tau", "N·m", "rms")
 JOINT_2 = of("q", "deg", column=1)
@@ -24,11 +25,38 @@ INF = float("inf")
 READER_ROWS = (
     # ---------------------------------------- one-task
     Intervention(
-        "one-task/3", "the changed torques stay as they are, and they turn joint 2 round",
+        "one-task/3",
+        "the part of the torques along the free motion stays as it is, and it turns joint 2 round",
         of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("damping=true",), (-10, 10),
         seconds=0.6,
     ),
+    # ---------------------------------------- your-robot
+    Intervention(
+        "your-robot/0", "in a sum the orientation and the posture hold the head back",
+        HAND_LAST, (75, 85), ("levels.orientation.enabled=false",), (0, 1),
+        of=("controller=weighted", "levels.posture.enabled=false"),
+    ),
+    Intervention(
+        "your-robot/0", "each of them alone as well",
+        HAND_LAST, (90, 105), ("levels.posture.enabled=false",), (0, 1),
+        of=("controller=weighted", "levels.orientation.enabled=false"),
+    ),
+    # ---------------------------------------- deadlines
+    Intervention(
+        "deadlines/1", "keeps the noise of the full rate",
+        ROUGH, (0.25, 0.5), ("T_s=0.002", "deadline_ms=2"), (0.05, 0.2),
+        of=("T_s=0.001", "deadline_ms=1", "plant.encoder_resolution_deg=0.0005"),
+    ),
+    # ---------------------------------------- inside-the-qp
+    Intervention(
+        "inside-the-qp/0", "With equal weights it pays 12 degrees",
+        of("error/pose", "deg", "last"), (14, 14.5), ("levels.pose.Q=200",), (11.7, 12.1),
+    ),
     # ---------------------------------------- when-tasks-fight
+    Intervention(
+        "when-tasks-fight/2", "A horizon of more than one step does",
+        of("v", "deg/s", "largest", 3.5, column=2), (80, 100), ("horizon=1",), (0, 15),
+    ),
     Intervention(
         "when-tasks-fight/1", "The inverse asks for more than the arm can do and knows no bound",
         of("speed share", "%"), (2000, INF), ("controller=tdeosf_damped",), (0, 500),
@@ -52,14 +80,18 @@ READER_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "Then, at 0.13 s, it passes ten times the limit all the same",
-        of("torque share", "%", "largest", 0.12, 0.14), (1e3, INF), ("controller=osf_damped",), (0, 5),
+        "stretched-out/0", "Then, at 0.13 s, it passes a thousand times the limit all the",
+        of("torque share", "%", "largest", 0.12, 0.14), (1e5, INF), ("controller=osf_damped",), (0, 5),
         of=("smooth=true",),
     ),
     # ---------------------------------------- torque-has-a-limit
     Intervention(
         "torque-has-a-limit/0", "without any friction the same motion needs a third of the 0.24 N·m",
         TORQUE, (85, 92), NO_FRICTION, (32, 36),
+    ),
+    Intervention(
+        "torque-has-a-limit/0", "and half of it without the dry one alone",
+        TORQUE, (85, 92), ("plant.friction=0",), (48, 54),
     ),
     Intervention(
         "torque-has-a-limit/0", "that is too little for level 1 alone, with the dry friction of the joints",

@@ -31,9 +31,8 @@ TASK_ROWS = (
         of("q", "deg", "range", column=6), (5, 30), ("levels.orientation.enabled=false",), (0, 1),
     ),
     Intervention(
-        "a-redundant-arm/1", "only the part of the wish that lies in the null space is granted",
-        of("q", "deg", "range", column=2), (27, 31),
-        ("levels.position.enabled=false", "levels.orientation.enabled=false"), (57, 61),
+        "a-redundant-arm/1", "because the same level asks the other six joints to stay",
+        of("q", "deg", "range", column=2), (27, 31), ("tasks.posture.K_p=[0,0,56.2,0,0,0,0]",), (53, 61),
     ),
     Intervention(
         "a-redundant-arm/2", "the hand pays with a tilt nobody objects to",
@@ -126,7 +125,7 @@ TASK_ROWS = (
         ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 0.1),
     ),
     Intervention(
-        "swap-the-priorities/2", "It is not the bounds that keep it calm",
+        "swap-the-priorities/2", "It is not the bounds that keep the motion orderly",
         of("v", "deg/s"), (85, 105), ("limits.velocity=false", "limits.torque=false", "limits.position=off"),
         (85, 105), stays=True,
     ),

@@ -116,7 +116,7 @@ QUOTED = (
     ),
     Quoted(
         "stopping-takes-distance/2",
-        "never takes more than 1.5",
+        "take more than 1.5",
         _of(Signal("deceleration to stop", "rad/s²")),
         1.3,
         1.5,
@@ -267,6 +267,13 @@ QUOTED = (
     Quoted("deliveries/2", "three seconds to the second person", _of(Signal("place"), until=17.1), 4, 4),
     Quoted("deliveries/2", "needs nearly seven", _of(Signal("place"), until=21.1), 4, 4, None),
     Quoted("deliveries/2", "needs nearly seven", _of(Signal("place"), until=20.6), 3, 3, None),
+    Quoted(
+        "swap-the-priorities/2",
+        "4.7 N·m in the first",
+        _of(Signal("delta_tau", "N·m"), after=2.595, until=2.61),
+        4.65,
+        4.75,
+    ),
     Quoted("your-robot/1", "the head hangs low for good", _of(HAND, "last"), 10, 100, None),
     Quoted("your-robot/2", "Less than half the error", _ratio(HAND), 0.35, 0.5),
     Quoted(
