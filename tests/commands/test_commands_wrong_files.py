@@ -123,7 +123,7 @@ def test_a_wrong_file_is_a_sentence(
     text, words = WRONG[kind][what]
     Path("mine.py").write_bytes(text if isinstance(text, bytes) else text.encode())
     # None of these harms the process it is loaded in; those that do come below.
-    monkeypatch.setattr(judge, "_judged", judge._kind)
+    monkeypatch.setattr(judge, "isolated", lambda function, source, **_: function(source))
     assert main(LINES[kind]) == 2
     said = capsys.readouterr().err.strip()
     assert words in said
