@@ -39,9 +39,10 @@ ONE_MORE = Step(
     why=r"""
     The error more than doubles, between one knot and the next. Nothing is gained by the longer horizon,
     and every single torque is one tick late. Each $\Delta\tau$ is meant as a change of the torque that
-    acts now; when it arrives, another torque has taken that one's place. The even and the odd ticks are
-    two sequences of torques, each corrected only once in 2 ms, and neither knows of the other's
-    corrections. No correction is lost, but each sequence is a control loop of half the rate.
+    acts now; when it arrives, the torque that it was meant to change has been replaced. The even and
+    the odd ticks are two sequences of torques, each corrected only once in 2 ms, and neither knows of
+    the other's corrections. No correction is lost, but each sequence is a control loop of half the
+    rate.
     """,
     prediction=Choice(
         "Eleven knots instead of ten, 0.1 ms too slow: the largest error of this motion …",

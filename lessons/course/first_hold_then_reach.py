@@ -153,9 +153,8 @@ SWAP = Step(
     """,
     do="Is there a way back? Swap them once more while the base is on its way.",
     why=r"""
-    The base goes the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The
-    conflict is as large as before, only the other one pays: a hierarchy hands the bill to the last in
-    the list.
+    The base goes the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The conflict
+    is as large as before, only the other task loses: in a hierarchy it is the last one in the list.
     """,
     prediction=Value(
         "The base now gets to its target. How far is the hand off in the end, in m?",

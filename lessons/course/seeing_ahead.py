@@ -134,11 +134,11 @@ NO_PLAN = Step(
     Both are surprised at 8 s, and still it is far behind, 16 cm from home at the end where the ghost
     has long arrived. A velocity in proportion to the error is slow at the end, and with 0.3 1/s it is
     slow for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of
-    2 1/s it arrives. A plan has no gain; its weights take the place of one. With our $Q = 10$ it is
-    nearly as quick as the limits let it be: it comes home later with half the speed or a third of the
-    acceleration, where HTIDKC comes home as late as before. With $Q = 1$ and the same limits it is
-    still 22 cm away where it is home with $Q = 10$. The paper, which tuned both to do equally well in
-    Part 1, counts 42 % less error in Part 2 for HTMPC.
+    2 1/s it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly as quick
+    as the limits let it be: it comes home later with half the speed or a third of the acceleration,
+    where HTIDKC comes home as late as before. With $Q = 1$ and the same limits it is still 22 cm away
+    where it is home with $Q = 10$. The paper, which tuned both to do equally well in Part 1, counts 42
+    % less error in Part 2 for HTMPC.
     """,
     prediction=Value(
         "Part 2, mean error of the base: that of HTIDKC is how many times the ghost's?",

@@ -34,9 +34,9 @@ PROJECTION = Step(
     """,
     do="Switch to HIMPC in good time, and back, while the arm moves.",
     why=r"""
-    Dividing by almost nothing gives almost infinity: the demanded torque passes a thousand times
-    the limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
-    singularity is made by the algorithm, and is called algorithmic for that.
+    Dividing by almost nothing gives almost infinity: the demanded torque passes a thousand times the
+    limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
+    singularity is made by the algorithm, and is therefore called algorithmic.
     """,
     prediction=Choice(
         "When the tasks start to conflict, the torque that OSF demands is at most …",
