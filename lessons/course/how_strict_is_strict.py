@@ -39,7 +39,7 @@ NOTHING = Step(
     do="What is the smallest δ with which the base moves at all?",
     why=r"""
     It does not move. With $\delta = 0$ a rounding error already breaks the rule, and the line search
-    accepts no step. With a $\delta$ just above 0 the curve is the reason: a straight step along a
+    accepts no step. With a small $\delta$ the curve is the reason: a straight step along a
     tangent leaves it at once (given), so that only tiny steps are accepted. With $\delta = 0$ the
     second task gets nothing.
     """,

@@ -43,7 +43,7 @@ READER_ROWS = (
     ),
     # ---------------------------------------- deadlines
     Intervention(
-        "deadlines/1", "keeps the noise of the full rate",
+        "deadlines/1", "it divides by 1 ms and keeps the noise of the full rate",
         ROUGH, (0.25, 0.5), ("T_s=0.002", "deadline_ms=2"), (0.05, 0.2),
         of=("T_s=0.001", "deadline_ms=1", "plant.encoder_resolution_deg=0.0005"),
     ),
@@ -54,8 +54,9 @@ READER_ROWS = (
     ),
     # ---------------------------------------- when-tasks-fight
     Intervention(
-        "when-tasks-fight/2", "A horizon of more than one step does",
-        of("v", "deg/s", "largest", 3.5, column=2), (80, 100), ("horizon=1",), (0, 15),
+        "when-tasks-fight/2",
+        "A horizon of more than one step does: with $N = 1$ the swing dies away to a tremble of 12°/s",
+        of("v", "deg/s", "largest", 3.5, column=2), (80, 100), ("horizon=1",), (11, 12.5),
     ),
     Intervention(
         "when-tasks-fight/1", "The inverse asks for more than the arm can do and knows no bound",

@@ -31,8 +31,9 @@ TASK_ROWS = (
         of("q", "deg", "range", column=6), (5, 30), ("levels.orientation.enabled=false",), (0, 1),
     ),
     Intervention(
-        "a-redundant-arm/1", "because the same level asks the other six joints to stay",
-        of("q", "deg", "range", column=2), (27, 31), ("tasks.posture.K_p=[0,0,56.2,0,0,0,0]",), (53, 61),
+        "a-redundant-arm/1",
+        "Joint 3 stops at 29°, because the same level asks the other six joints to stay",
+        of("q", "deg", "range", column=2), (28.5, 29.5), ("tasks.posture.K_p=[0,0,56.2,0,0,0,0]",), (53, 61),
     ),
     Intervention(
         "a-redundant-arm/2", "the hand pays with a tilt nobody objects to",
