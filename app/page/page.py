@@ -118,7 +118,7 @@ class Page:
     def _look(self, frame: int) -> None:
         learner = self.learner
         ready = learner.ready
-        if ready is not None and ready is not self._built:
+        if ready is not None and ready is not self._built and self._delivered():
             before, self._built = self._built, ready  # a scene that cannot be built is tried only once
             same = ready.again and before is not None and before.choice == ready.choice
             try:
@@ -146,6 +146,11 @@ class Page:
             # Another scene may be loaded at any moment; its rows and poses do not fit this stage.
             if learner.ready is self._built:
                 raise
+
+    def _delivered(self) -> bool:
+        """Whether the browser has received the scene that was built last. The next scene is built only then:
+        otherwise the messages of all scenes that a learner opens would collect on a slow connection."""
+        return self._stage is None or private.waiting(self._client) == 0
 
     def _show(self, ready: Ready, same: bool) -> None:
         """Builds a scene; same: it is the run that is shown, with another stack."""

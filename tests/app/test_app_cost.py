@@ -11,6 +11,7 @@ from websockets.sync.connection import Connection
 
 from app.adapter import private
 from app.client.decimate import decimate
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.panels.widgets.chart import _TOP, _axis
@@ -90,6 +91,31 @@ def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
         viewer.second = Second()
         hear_until(viewer, page, lambda: private.waiting(client) == 0)
         hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+
+
+def test_a_slow_line_queues_one_scene_at_most(alone: PageServer) -> None:
+    """While a connection delivers nothing, the page does not build further scenes; afterwards it builds the
+    last one."""
+    viewer = Viewer(alone.link)
+    with viewer.connect(slow=True) as page:
+        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+        (client,) = alone._viser.get_clients().values()
+        (learner,) = alone.sessions.learners
+        (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
+        assert wait_until(lambda: private.waiting(client) > 0, LONG)
+        queued = []
+        for scene in ("planar3-hold", "planar3-singular", "planar3-conflict"):
+            learner.load(SceneChoice(RunSpec(scene)))
+            assert wait_until(lambda scene=scene: simulates(learner, scene), LONG)
+            queued.append(private.waiting(client))
+        assert queued[-1] < queued[0] + 100
+        hear_until(viewer, page, lambda: shown._built is learner.ready and private.waiting(client) == 0)
+
+
+def simulates(learner: SimulationClient, scene: str) -> bool:
+    """Whether a scene has run for half a second."""
+    status = learner.status
+    return learner.choice.run.scene == scene and status is not None and status.t > 0.5
 
 
 def test_corners_show_the_curves() -> None:
