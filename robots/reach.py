@@ -1,137 +1,108 @@
-"""Decides which targets the robot can reach, by placo's inverse kinematics. No other module imports placo."""
+"""Decides which targets the robot can reach: inverse kinematics as bounded nonlinear least squares."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import placo
-from lxml import etree
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from robots.robot import Robot
-from robots.urdf.read import without_shapes
+
+Array = NDArray[np.float64]
 
 POSITION_TOLERANCE = 2e-3  # m
 ROTATION_TOLERANCE = np.radians(1.0)  # rad
-_ITERATIONS = 60
-_RESTARTS = 4
-_STEP = 0.5  # rad: the most a joint moves per iteration, so that the linearisation holds
+_EVALUATIONS = 60
+_STARTS = 4
+_MARGIN = 1e-4
+"""rad or m: the distance that is kept to joint limits."""
 
 
 @dataclass(frozen=True)
 class ReachResult:
     """q (n,) rad, the best configuration found inside the limits; position_error m; rotation_error rad (0 if
-    none was asked for); reachable: both within 2 mm and 1°.
+    no rotation was given); reachable: both within 2 mm and 1°.
     """
 
-    q: np.ndarray
+    q: Array
     position_error: float
     rotation_error: float
     reachable: bool
 
 
 class ReachJudge:
-    """placo's solver for one robot, kept because building it costs more than using it."""
+    """Inverse kinematics of one robot."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        text = without_shapes(etree.fromstring(robot.urdf_text.encode()))
-        self._wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
         self._data = robot.model.createData()
-        margin = 1e-4
-        self._lower = np.where(np.isfinite(robot.q_lower), robot.q_lower + margin, -np.inf)
-        self._upper = np.where(np.isfinite(robot.q_upper), robot.q_upper - margin, np.inf)
+        self._lower, self._upper = robot.q_lower + _MARGIN, robot.q_upper - _MARGIN
 
     def solve(
         self,
-        position: np.ndarray,
-        rotation: np.ndarray | None = None,
-        q_seed: np.ndarray | None = None,
+        position: Array,
+        rotation: Array | None = None,
+        q_seed: Array | None = None,
         frame: str = "",
     ) -> ReachResult:
         """Finds a configuration that brings `frame` (default: the tip) to a world position (3,), m, and, if
         given, to a world rotation (3, 3).
 
-        Tasks are soft, so a target out of reach gives the nearest posture instead of an exception; the
-        residual decides. The search starts at `q_seed` (default: home), then at a few other fixed
-        configurations. Raises
-        InputError for an unknown frame, ValueError for a target that is not finite.
+        For a target out of reach the result is the configuration with the least sum of squares of position
+        error, m, and rotation error, rad. The search starts at `q_seed` (default: home), then at a few other
+        fixed configurations. Raises InputError for an unknown frame, ValueError for a target that is not
+        finite.
         """
-        name = frame or self.robot.tip
-        index = self.robot.frame_id(name)
+        index = self.robot.frame_id(frame or self.robot.tip)
         target = np.asarray(position, dtype=float)
         if target.shape != (3,) or not np.all(np.isfinite(target)):
             raise ValueError("position must be three finite numbers")
         if rotation is not None and (np.shape(rotation) != (3, 3) or not np.all(np.isfinite(rotation))):
             raise ValueError("rotation must be a finite 3 × 3 matrix")
-        seed = self.robot.home if q_seed is None else np.asarray(q_seed, dtype=float)
-        rng = np.random.default_rng(0)
-        spread = np.minimum(self._upper, np.pi) - np.maximum(self._lower, -np.pi)
         best: ReachResult | None = None
-        for attempt in range(_RESTARTS):
-            start = (
-                seed if attempt == 0 else self.robot.home + 0.25 * rng.uniform(-1, 1, self.robot.n) * spread
-            )
-            result = self._from(np.clip(start, self._lower, self._upper), name, index, target, rotation)
-            if best is None or _residual(result) < _residual(best):
-                best = result
+        for start in self._starts(self.robot.home if q_seed is None else np.asarray(q_seed, dtype=float)):
+            found = self._from(start, index, target, rotation)
+            if best is None or _residual(found) < _residual(best):
+                best = found
             if best.reachable:
                 break
         assert best is not None
         return best
 
-    def _from(
-        self, seed: np.ndarray, name: str, index: int, position: np.ndarray, rotation: np.ndarray | None
-    ) -> ReachResult:
-        solver = placo.KinematicsSolver(self._wrapper)
-        solver.mask_fbase(True)
-        solver.enable_joint_limits(True)
-        solver.dt = 1.0
-        solver.enable_velocity_limits(False)
-        if rotation is None:
-            task = solver.add_position_task(name, position)
-            task.configure("position", "soft", 1.0)
-        else:
-            pose = np.eye(4)
-            pose[:3, :3], pose[:3, 3] = rotation, position
-            frame_task = solver.add_frame_task(name, pose)
-            frame_task.configure("pose", "soft", 1.0, 1.0)
-        solver.add_regularization_task(1e-6)
-        q = seed
-        self._place(q)
-        for _ in range(_ITERATIONS):
-            try:
-                solver.solve(True)
-            except RuntimeError:
-                break
-            after = np.array([self._wrapper.get_joint(joint) for joint in self.robot.joint_names])
-            step = np.clip(after - q, -_STEP, _STEP)
-            if not np.all(np.isfinite(step)):
-                break
-            q = np.clip(q + step, self._lower, self._upper)
-            self._place(q)
-            if float(np.abs(step).max()) < 1e-7:
-                break
-        return self._judge(q, index, position, rotation)
+    def _starts(self, seed: Array) -> list[Array]:
+        """The configurations from which the search starts, inside the limits."""
+        rng, home = np.random.default_rng(0), self.robot.home
+        spread = 0.25 * (np.minimum(self._upper, np.pi) - np.maximum(self._lower, -np.pi))
+        others = [home + rng.uniform(-1, 1, self.robot.n) * spread for _ in range(_STARTS - 1)]
+        return [np.clip(q, self._lower, self._upper) for q in (seed, *others)]
 
-    def _place(self, q: np.ndarray) -> None:
-        for joint, value in zip(self.robot.joint_names, q, strict=True):
-            self._wrapper.set_joint(joint, float(value))
-        self._wrapper.update_kinematics()
+    def _from(self, start: Array, index: int, position: Array, rotation: Array | None) -> ReachResult:
+        model, data = self.robot.model, self._data
 
-    def _judge(
-        self, q: np.ndarray, index: int, position: np.ndarray, rotation: np.ndarray | None
-    ) -> ReachResult:
-        """The residual by our own kinematics: a posture is not believed because a solver said so."""
-        model = self.robot.model
-        pin.forwardKinematics(model, self._data, q)
-        pose = pin.updateFramePlacement(model, self._data, index)
-        distance = float(np.linalg.norm(pose.translation - position))
-        angle = 0.0 if rotation is None else float(np.linalg.norm(pin.log3(rotation.T @ pose.rotation)))
-        return ReachResult(
-            q.copy(), distance, angle, distance <= POSITION_TOLERANCE and angle <= ROTATION_TOLERANCE
-        )
+        def errors(q: Array) -> Array:
+            pin.forwardKinematics(model, data, q)
+            pose = pin.updateFramePlacement(model, data, index)
+            away = pose.translation - position
+            return away if rotation is None else np.r_[away, pin.log3(rotation.T @ pose.rotation)]
+
+        def slopes(q: Array) -> Array:
+            J = pin.computeFrameJacobian(model, data, q, index, pin.ReferenceFrame.LOCAL).reshape(6, -1)
+            R = data.oMf[index].rotation
+            if rotation is None:
+                return R @ J[:3]
+            return np.vstack([R @ J[:3], pin.Jlog3(rotation.T @ R) @ J[3:]])
+
+        bounds = self._lower, self._upper
+        jac: Any = slopes  # SciPy does not say that it may be a function
+        q = least_squares(errors, start, jac, bounds, "dogbox", 1e-4, 1e-5, 1e-6, max_nfev=_EVALUATIONS).x
+        left = errors(q)
+        distance, angle = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
+        reachable = distance <= POSITION_TOLERANCE and angle <= ROTATION_TOLERANCE
+        return ReachResult(q, distance, angle, reachable)
 
 
 def _residual(result: ReachResult) -> float:

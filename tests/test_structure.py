@@ -18,7 +18,6 @@ ORDER = ("robots", "himpc", "lessons", "app", "tests")
 
 DOORS = {
     "mujoco": ("robots/plant.py",),
-    "placo": ("robots/reach.py",),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
     "numba": ("himpc/compilation/",),

@@ -42,7 +42,7 @@ class Reachability:
 
 
 class ReachabilityWorker:
-    """A thread that runs placo."""
+    """A thread that solves the inverse kinematics of dragged targets."""
 
     def __init__(
         self,

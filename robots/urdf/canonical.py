@@ -29,7 +29,7 @@ MAX_FINDINGS = 200
 
 @dataclass(frozen=True)
 class Canonical:
-    """A URDF that Pinocchio, MuJoCo, placo and the page interpret in the same way."""
+    """A URDF that Pinocchio, MuJoCo and the page interpret in the same way."""
 
     name: str
     text: str

@@ -1,35 +1,48 @@
-"""A simulation that runs keeps nothing of its ticks: neither Python's objects nor its libraries' memory."""
+"""Ticks of a simulation and scenes that a learner has left keep no memory: neither Python's objects nor memory
+of the libraries."""
 
 from __future__ import annotations
 
 import ctypes
 import gc
+import re
+import tempfile
 
 import pytest
 
+from app.adapter import private
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
+from app.link.process import wait_until
 from app.link.wire import packed
+from app.server.server import PageServer
 from app.worker.simulation import SimulationRunner
+from benchmarks.learners import Viewers
 from lessons.scenes.run_spec import RunSpec
+
+pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 TICKS = 1000
 
 
-class Allocated(ctypes.Structure):
-    """`mallinfo2` of glibc: ten numbers, of which we want two."""
-
-    _fields_ = [(name, ctypes.c_size_t) for name in (*"abcd", "mapped", *"fg", "used", *"ij")]
+LONG = 240.0  # s: the first start of a checkout compiles
 
 
 def allocated() -> int:
-    """Bytes that this process holds of the system's allocator."""
+    """Bytes that this process holds of the system's allocator, in all its arenas."""
     gc.collect()
     library = ctypes.CDLL(None)
-    if not hasattr(library, "mallinfo2"):
+    if not hasattr(library, "malloc_info"):
         pytest.skip("only glibc tells what is allocated")
-    library.mallinfo2.restype = Allocated
-    found = library.mallinfo2()
-    return found.used + found.mapped
+    library.fopen.restype = ctypes.c_void_p
+    with tempfile.NamedTemporaryFile("r") as report:
+        file = ctypes.c_void_p(library.fopen(report.name.encode(), b"w"))
+        library.malloc_info(0, file)
+        library.fclose(file)
+        text = report.read()
+    text = text[text.rindex("</heap>") :]  # the sums of all arenas come last
+    size = {kind: int(found) for kind, found in re.findall(r'type="(\w+)"[^/]*size="(\d+)"', text)}
+    return size["current"] + size["mmap"] - size["fast"] - size["rest"]
 
 
 @pytest.mark.parametrize("scene", ["iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag"])
@@ -51,3 +64,39 @@ def test_ticks_keep_nothing(scene: str) -> None:
         assert allocated() - before < 8 * TICKS
     finally:
         body.close()
+
+
+def test_scenes_that_were_left_keep_nothing() -> None:
+    """Four visits of a scene keep less than 100 kB each."""
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    try:
+        with Viewers(server.link, "--clients", "1"):
+            assert wait_until(lambda: bool(server.sessions.learners), LONG)
+
+            def visit(times: int) -> int:
+                for scene in times * ("baxter-hold", "planar3-hold"):
+                    show(server, scene)
+                return allocated()
+
+            visit(3)
+            before = visit(1)
+            assert visit(4) - before < 400_000
+    finally:
+        server.close()
+
+
+def show(server: PageServer, scene: str) -> None:
+    """Opens a scene, and waits until the page has sent it."""
+    (learner,) = server.sessions.learners
+    before = learner.ready
+    learner.load(SceneChoice(RunSpec(scene)))
+    assert wait_until(lambda: learner.ready is not before and simulates(learner), LONG)
+    (client,) = server._viser.get_clients().values()
+    (page,) = (each._page for each in server._visits.values() if each._page is not None)
+    assert wait_until(lambda: page._built is learner.ready and private.waiting(client) == 0, LONG)
+
+
+def simulates(learner: SimulationClient) -> bool:
+    """Whether the simulation has run for a moment."""
+    status = learner.status
+    return status is not None and status.t > 0.1

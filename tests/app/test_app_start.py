@@ -15,7 +15,7 @@ from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 ROOT = Path(__file__).parents[2]
-NUMERICS = ("scipy", "pinocchio", "mujoco", "numba", "trimesh", "placo", "coal", "daqp", "matplotlib")
+NUMERICS = ("scipy", "pinocchio", "mujoco", "numba", "trimesh", "coal", "daqp", "matplotlib")
 
 LISTEN = f"""
 import sys, urllib.request

@@ -20,7 +20,6 @@ NUMERICS = (
     "mujoco",
     "numba",
     "trimesh",
-    "placo",
     "coal",
     "daqp",
     "matplotlib",

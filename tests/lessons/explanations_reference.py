@@ -28,7 +28,6 @@ REFERENCE = (
         ("robots/capsules.py", "Vertices modelled along z"),
         ("robots/capsules.py", "Caps and mantle with vertices of their own"),
         ("robots/catalog.py", "Angles in degrees here"),
-        ("robots/reach.py", "placo's solver for one robot"),
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much early"),
@@ -102,10 +101,6 @@ REFERENCE = (
         ("lessons/scenes/plane.py", "The wrist is where joint 3 sits"),
     )),
     # ---------------------------------------- what the program does
-    Exempt("software", ROBOTS + "reach.py::test_a_target_out_of_reach_is_said_to_be", (
-        ("robots/reach.py", "Tasks are soft"),
-        ("robots/reach.py", "The residual by our own kinematics"),
-    )),
     Exempt("software", ROBOTS + "mobile.py::test_ideal_kinematics_are_the_double_integrator", (
         ("robots/servo.py", "mode: \"ideal\": the velocity moves linearly"),
     )),

@@ -1,4 +1,4 @@
-"""Reachability judged by placo, believed only by residual."""
+"""Inverse kinematics finds reachable targets, and says which targets are out of reach."""
 
 from __future__ import annotations
 
