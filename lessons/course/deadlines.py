@@ -136,7 +136,7 @@ REPAIR = Step(
     """,
     do="How far does this go: 2.5, 3? And what if the computer becomes fast again, N = 10?",
     why=r"""
-    The lost half is back: the errors are the same to the third digit. It was paid for with the
+    The late controller now errs as little as the one in time, to the third digit. It pays with the
     margin: the cliff is where it was, between 2 and 2.5 times the old $\bar M$, and noise counts
     double.
     """,

@@ -92,8 +92,8 @@ SMALL = Step(
     The torque is right in the end, but it comes late: every millisecond only a part of the error in
     $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$: of the slowest
     component of that error this share is left after each step. Close to 1 it says *slow* here: the
-    eigenvalue behind it is near +1. Near −1 it would say *almost unstable*; the radius alone does not
-    tell which.
+    eigenvalue behind it is near +1. An eigenvalue near −1 would give the same radius and mean *almost
+    unstable*; the radius alone does not tell which.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",

@@ -136,9 +136,9 @@ NO_PLAN = Step(
     slow for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of
     2 1/s it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly as quick
     as the limits let it be: it comes home later with half the speed or a third of the acceleration,
-    where HTIDKC comes home as late as before. With $Q = 1$ and the same limits it is still 22 cm away
-    where it is home with $Q = 10$. The paper, which tuned both to do equally well in Part 1, counts 42
-    % less error in Part 2 for HTMPC.
+    where HTIDKC comes home as late as before. With $Q = 1$ and the scene's own limits it is still 22 cm
+    away at the time when $Q = 10$ has brought it home. The paper, which tuned both to do equally well
+    in Part 1, counts 42 % less error in Part 2 for HTMPC.
     """,
     prediction=Value(
         "Part 2, mean error of the base: that of HTIDKC is how many times the ghost's?",
@@ -183,8 +183,9 @@ GAINS = Step(
     The base is quick now, and the hand pays with 2 cm although it ranks first. A velocity is held for
     the 20 ms until the next one is asked for. Meanwhile base and arm move on, and velocities that kept
     the hand in place at the beginning no longer do: the faster base and arm move, the further the hand
-    drifts. It drifts most at the edge of the arm's reach, where the arm's joints turn fastest although
-    the base has slowed down: with a peak that the arm can reach the hand is off by 6 mm. Asked for a
+    drifts. It drifts most at the edge of the arm's reach, 20 mm, where the arm's joints turn fastest
+    although the base has slowed down, and on the way home, 16 mm, where the base is at full speed. With
+    a peak that the arm can just reach the hand is off by 14 mm, with a near one by 4 mm. Asked for a
     hundred times a second it drifts half as far. The hand's error is brought back in proportion to $K$:
     with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as before.
     Limits are not to blame: without any the hand is off by more. A good pair exists, and has to be

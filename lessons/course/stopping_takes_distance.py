@@ -45,10 +45,11 @@ PRINTED = Step(
     why=r"""
     To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². With all its torque the
     motor gets 35 to 38 rad/s². So the problem has no solution, a fallback takes over, the torque hits
-    its limit and the joint overruns its range by 0.6°. The rows on speed hold the joint back for the
-    first three ticks only: without them it still overruns by 0.57°. With three times the torque, in the
-    bounds and in the motors, 0.2° is left. Then the rows on speed matter: with the rows on speed off as
-    well only 0.1° is left. The row on the position is correct, but it comes too late.
+    its limit and the joint overruns its range by 0.6°. The rows on speed keep the joint from
+    braking for the first three ticks only: without them it still overruns by 0.57°. With three times
+    the torque, in the bounds and in the motors, 0.2° is left. Then the rows on speed matter: with the
+    rows on speed off as well only 0.1° is left. The row on the position is correct, but it comes too
+    late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",

@@ -80,7 +80,7 @@ SHORT = Step(
     Level 2 goes without: joint 1 falls behind by half a degree while the hand does not notice. That is
     the order's doing. With joint 1 first it is the hand that goes without, by 1.6 mm, and joint 1 does
     not notice. An order helps where both need what is scarce. If joint 1 swings to the other side, by
-    60°, its own motor is the one that is short, the hand can do without it, and the order makes no
+    60°, only the motor of joint 1 is short of torque. The hand does not need it, so the order makes no
     difference. The torque is scarce because of the dry friction: without it both wishes together need
     77 % of what there is, and joint 1 does not fall behind.
     """,
@@ -142,7 +142,7 @@ LESS = Step(
     why=r"""
     The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself
     would need 0.07 N·m, and the hand would stay on it. But the hand leaves its circle no further than
-    without any level 2. This time that is not the order's doing, for with joint 1 first it is the same:
+    without any level 2. The order is not the reason, for with joint 1 first the hand is off as far:
     whichever task comes first, joint 1's motor is at its limit. Nor can an order promise that the hand
     stays as near as without a level 2. An order is kept in every single tick, not over the run: with a
     swing of −30° the hand gets further off than the ghost, 16 mm instead of 10, since level 2 has moved

@@ -133,7 +133,8 @@ STRICT = Step(
     why=r"""
     Joint 1 pays: it goes no further than the circle lets it. The hand keeps its circle to a
     millimetre, and no weight of level 2 can change that. Without level 2 the hand errs by 0.2 mm only.
-    With it joint 1 moves more, and time-delay estimation has to correct what that motion changes.
+    With it joint 3 swings with up to 100°/s, and time-delay estimation has to correct what that motion
+    changes.
     """,
     prediction=Choice(
         "With strict priorities: who pays for the conflict?",
@@ -180,7 +181,7 @@ LIMIT = Step(
     """,
     why=r"""
     Better, and still several times the error of a strict priority. In the limit the weighted
-    solution becomes the strict one. But a $Q$ that small has to outweigh $R$ as well. On the easy
+    solution becomes the strict one. But a $Q$ that small no longer outweighs $R$. On the easy
     circle joint 1 is off by 0.02° with $Q_2 = 1$, by 0.05° with 0.01, and at the slider's end, with
     $10^{-5}$, by 13° of its 20°: there it is not followed any more, although it could be. With a
     smaller $R$ it would.

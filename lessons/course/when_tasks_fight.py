@@ -142,8 +142,9 @@ EQUALITY = Step(
     does not make the arm calm. Nor is the strict order what makes it swing: in a weighted sum with $Q_2
     = 0.01$ joint 3 swings as well, with up to 73°/s, and with $R_2 = 10^5$ the strict one slows down to
     58°/s. Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it swings as
-    before. A horizon of more than one step does: with $N = 1$ the swing dies away to a tremble of 12°/s.
-    But torque and speed stay within their bounds, and the hand
+    before. With our weights the horizon keeps it swinging: with $N = 1$ the swing dies away to a tremble
+    of 12°/s. Where level 2 weighs little, a single step is enough: with $N = 1$ and $R_2 = 10^5$ joint 3
+    goes on swinging with 62°/s. But torque and speed stay within their bounds, and the hand
     stays on its circle. The equality (34g) does not do that alone, the bounds are needed as well:
     without those on speed and position every motor comes to its limit and the hand is off by 11 mm, and
     without any bound the arm is lost as with a projection.

@@ -1,5 +1,5 @@
-"""Ticks of a simulation and scenes that a learner has left keep no memory: neither Python's objects nor memory
-of the libraries."""
+"""Ticks of a simulation and scenes that a learner has left keep no memory, neither that of Python's objects
+nor that of the libraries."""
 
 from __future__ import annotations
 

@@ -55,6 +55,10 @@ DOCUMENT_ROWS = (
         "disagreements", "Our friction is not the cause: without it level 1 errs as much.",
         HAND_RMS, (0.25, 0.5), ("plant.friction=0", "plant.damping=0"), (0.25, 0.5), stays=True,
     ),
+    Intervention(
+        "disagreements", "with N = 1 it dies away, and three quarters of the error remain",
+        HAND_RMS, (0.35, 0.365), ("horizon=1",), (0.27, 0.28), on="planar3-conflict",
+    ),
     RT2(
         "disagreements", "RT1 has no such swing.", HAND_RMS, (0.25, 0.5), ("q1_amplitude_deg=20",),
         (0, 0.06),

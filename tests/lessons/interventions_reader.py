@@ -11,6 +11,7 @@ ROUGH = of("delta_tau", "N·m", "rms")
 JOINT_2 = of("q", "deg", column=1)
 TORQUE = of("torque share", "%")
 SWING = of("v", "deg/s", "largest", 2.0, column=2)
+LATE_SWING = of("v", "deg/s", "largest", 3.5, column=2)
 EE = of("error/ee", "mm")
 WORK = of("time at work", "s")
 NO_FRICTION = ("plant.friction=0", "plant.damping=0")
@@ -52,11 +53,24 @@ READER_ROWS = (
         "inside-the-qp/0", "With equal weights it pays 12 degrees",
         of("error/pose", "deg", "last"), (14, 14.5), ("levels.pose.Q=200",), (11.7, 12.1),
     ),
+    # ---------------------------------------- two-tasks
+    Intervention(
+        "two-tasks/2", "With it joint 3 swings with up to 100°/s",
+        of("v", "deg/s", "largest", column=2), (99, 101), ("levels.q1.enabled=false",), (20, 30),
+    ),
+    Intervention(
+        "two-tasks/2", "time-delay estimation has to correct what that motion changes",
+        HAND, (0.7, 1.0), ("limits.velocity_scale=0.5",), (0.4, 0.5),
+    ),
     # ---------------------------------------- when-tasks-fight
     Intervention(
         "when-tasks-fight/2",
-        "A horizon of more than one step does: with $N = 1$ the swing dies away to a tremble of 12°/s",
-        of("v", "deg/s", "largest", 3.5, column=2), (80, 100), ("horizon=1",), (11, 12.5),
+        "With our weights the horizon keeps it swinging: with $N = 1$ the swing dies away to a tremble of 12",
+        LATE_SWING, (80, 100), ("horizon=1",), (11, 12.5),
+    ),
+    Intervention(
+        "when-tasks-fight/2", "with $N = 1$ and $R_2 = 10^5$ joint 3 goes on swinging with 62°/s",
+        LATE_SWING, (61.5, 62.5), ("levels.q1.R=10",), (11, 12.5), of=("horizon=1", "levels.q1.R=1e5"),
     ),
     Intervention(
         "when-tasks-fight/1", "The inverse asks for more than the arm can do and knows no bound",
@@ -185,7 +199,7 @@ READER_ROWS = (
         of("v", column=1), (1.095, 1.105), ("limits.velocity_scale=0.5",), (0.54, 0.56),
     ),
     Intervention(
-        "seeing-ahead/2", "With $Q = 1$ and the same limits it is still 22 cm away",
+        "seeing-ahead/2", "With $Q = 1$ and the scene's own limits it is still 22 cm away",
         of("error/base", "m", "mean", 10.0, 10.2), (0, 0.05), ("Q=1",), (0.215, 0.23),
         of=("controller=htmpc_wpt",),
     ),
@@ -194,8 +208,15 @@ READER_ROWS = (
         EE, (15, 25), ("limits.velocity_scale=0.5",), (6, 9),
     ),
     Intervention(
-        "seeing-ahead/3", "with a peak that the arm can reach the hand is off by 6 mm",
-        EE, (15, 25), ("peak=[0.2,-0.9]",), (5.5, 6.4),
+        "seeing-ahead/3", "with a near one by 4 mm", EE, (19, 21), ("peak=[0.3,-0.5]",), (3.7, 4.3),
+    ),
+    Intervention(
+        "seeing-ahead/3", "With a peak that the arm can just reach the hand is off by 14 mm",
+        EE, (19, 21), ("peak=[0.55,-1.35]",), (13.7, 14.4),
+    ),
+    Intervention(
+        "seeing-ahead/3", "on the way home, 16 mm, where the base is at full speed",
+        of("error/ee", "mm", "largest", 5.0), (15.8, 16.4), ("limits.velocity_scale=0.5",), (5, 8),
     ),
     # ---------------------------------------- deliveries
     Intervention(

@@ -110,7 +110,7 @@ TASK_ROWS = (
         HAND, (0.7, 1.0), ("M_bar_scale=2",), (0.3, 0.6),
     ),
     Intervention(
-        "two-tasks/3", "But a $Q$ that small has to outweigh $R$ as well.",
+        "two-tasks/3", "But a $Q$ that small no longer outweighs $R$.",
         Q1, (8, 20), ("levels.q1.R=0.001", "levels.position.R=0.001"), (0, 0.1),
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-5"),
     ),
