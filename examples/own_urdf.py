@@ -1,4 +1,4 @@
-"""Your own URDF under your own stack: what the import says of the file, and a hand that is sent 5 cm away.
+"""Your own URDF with your own stack: prints the findings of the import and moves the hand by 5 cm.
 
     python examples/own_urdf.py [FILE.urdf]
 

@@ -1,4 +1,5 @@
-"""Tuning M̄ as Remark 4 of the paper says: begin small, increase until it is good enough or grows noisy.
+"""Tuning M̄ as Remark 4 of the paper says: begin small, increase it until the error is small or torques are
+noisy.
 
 Prints a line per trial: the factor on the scene's M̄, the error of level 1, the roughness of the torque and
 the verdict; then the diagonal that was chosen, as an assignment for the command line.
