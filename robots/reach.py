@@ -21,8 +21,13 @@ _STEP = 0.5  # rad: the most a joint moves per iteration, so that the linearisat
 
 @dataclass(frozen=True)
 class ReachResult:
-    """q (n,) rad, the best configuration found inside the limits; position_error m; rotation_error rad (0 if
-    none was asked for); reachable: both within 2 mm and 1°.
+    """The best configuration found.
+
+    Attributes:
+        q: (n,) rad, inside the limits.
+        position_error: m.
+        rotation_error: rad; 0 if the target has no rotation.
+        reachable: whether the errors are within 2 mm and 1°.
     """
 
     q: np.ndarray
@@ -32,7 +37,7 @@ class ReachResult:
 
 
 class ReachJudge:
-    """placo's solver for one robot, kept because building it costs more than using it."""
+    """placo's solver for one robot. Building it takes longer than using it, so it is kept."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -53,10 +58,10 @@ class ReachJudge:
         """Finds a configuration that brings `frame` (default: the tip) to a world position (3,), m, and, if
         given, to a world rotation (3, 3).
 
-        Tasks are soft, so a target out of reach gives the nearest posture instead of an exception; the
-        residual decides. The search starts at `q_seed` (default: home), then at a few other fixed
-        configurations. Raises
-        InputError for an unknown frame, ValueError for a target that is not finite.
+        Tasks are soft: a target out of reach gives the nearest posture instead of an exception, and the
+        residual decides whether it counts as reached. The search starts at `q_seed` (default: home), then at
+        a few other fixed configurations. Raises InputError for an unknown frame, ValueError for a target that
+        is not finite.
         """
         name = frame or self.robot.tip
         index = self.robot.frame_id(name)
@@ -123,7 +128,7 @@ class ReachJudge:
     def _judge(
         self, q: np.ndarray, index: int, position: np.ndarray, rotation: np.ndarray | None
     ) -> ReachResult:
-        """The residual by our own kinematics: a posture is not believed because a solver said so."""
+        """Computes the residual with Pinocchio's kinematics, independently of the solver's own result."""
         model = self.robot.model
         pin.forwardKinematics(model, self._data, q)
         pose = pin.updateFramePlacement(model, self._data, index)

@@ -1,4 +1,4 @@
-"""A simulation that runs keeps nothing of its ticks: neither Python's objects nor its libraries' memory."""
+"""A running simulation keeps no memory per tick, neither Python objects nor memory of libraries."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ TICKS = 1000
 
 
 class Allocated(ctypes.Structure):
-    """`mallinfo2` of glibc: ten numbers, of which we want two."""
+    """`mallinfo2` of glibc: ten numbers, of which two are used."""
 
     _fields_ = [(name, ctypes.c_size_t) for name in (*"abcd", "mapped", *"fg", "used", *"ij")]
 
 
 def allocated() -> int:
-    """Bytes that this process holds of the system's allocator."""
+    """Returns the bytes that this process has allocated from the system."""
     gc.collect()
     library = ctypes.CDLL(None)
     if not hasattr(library, "mallinfo2"):
@@ -34,7 +34,7 @@ def allocated() -> int:
 
 @pytest.mark.parametrize("scene", ["iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag"])
 def test_ticks_keep_nothing(scene: str) -> None:
-    """80 bytes a tick are 5 MB a minute."""
+    """A leak of 80 bytes per tick would be 5 MB per minute."""
     body = SimulationRunner(SceneChoice(RunSpec(scene)))
 
     def run() -> None:
@@ -44,7 +44,7 @@ def test_ticks_keep_nothing(scene: str) -> None:
             packed(body.status())
 
     try:
-        for _ in range(2):  # what is remembered of the last seconds is full then
+        for _ in range(2):  # afterwards the history of the last seconds is full
             run()
         before = allocated()
         run()
