@@ -102,7 +102,7 @@ def test_nothing_moves_before_the_prediction_and_marks_come_while_it_runs(learn:
         learner.body.settle()
     assert learner.body.pace == 1.0
     learner.body.tick(600)
-    for _ in range(5):  # the curves are sent twice a second
+    for _ in range(5):  # the claims are checked at every fifth report
         learner.look()
     assert learner.lecture.phase == "running" and 0.5 < learner.lecture.t < 0.7
     assert None not in learner.lecture.holds and learner.lecture.grade is None
