@@ -15,4 +15,4 @@ APPROACH_RATE = 6.0
 VELOCITY_RATE = 36.0
 """1/s: rate at which its velocity approaches the desired velocity."""
 STILL = 1e-9
-"""Below this distance and speed the target is set to rest, so that it does not drift for ever."""
+"""Below this distance and speed the target is set to rest; it must not drift for ever."""

@@ -54,8 +54,7 @@ Stack = tuple[Level, ...]
 
 
 def check_names(stack: Stack) -> None:
-    """Raises InputError if two tasks have the same name, because events and telemetry refer to tasks by
-    name."""
+    """Raises InputError if two tasks have the same name: events and telemetry refer to tasks by name."""
     names = [task.name for level in stack for task in level.tasks]
     twice = {name for name in names if names.count(name) > 1}
     if twice:

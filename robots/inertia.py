@@ -90,7 +90,7 @@ def convergence_eigenvalues(M: np.ndarray, M_bar: np.ndarray) -> np.ndarray:
     """Returns the eigenvalues of I − M⁻¹M̄, (n,), the largest first: the factors by which a step multiplies
     each mode of the error.
 
-    All are real, because M⁻¹M̄ is similar to a symmetric matrix: near 1 an error decays slowly, below 0 it
+    All are real, for M⁻¹M̄ is similar to a symmetric matrix: near 1 an error decays slowly, below 0 it
     changes its sign at every step, below −1 it grows. Arguments and errors as in `convergence_gauge`.
     """
     root = np.sqrt(np.asarray(M_bar, dtype=float))

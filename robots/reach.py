@@ -58,7 +58,7 @@ class ReachJudge:
         """Finds a configuration that brings `frame` (default: the tip) to a world position (3,), m, and, if
         given, to a world rotation (3, 3).
 
-        Tasks are soft: a target out of reach gives the nearest posture instead of an exception, and the
+        Tasks are soft, so a target out of reach gives the nearest posture instead of an exception, and the
         residual decides whether it counts as reached. The search starts at `q_seed` (default: home), then at
         a few other fixed configurations. Raises InputError for an unknown frame, ValueError for a target that
         is not finite.

@@ -29,8 +29,7 @@ class Shape:
 
     joint: the Pinocchio joint in whose frame the piece is fixed, 0 = the world; vertices (V, 3) float32, m,
     in that frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique.
-    Vertices are shared only where the surface is smooth, so that averaged vertex normals can be used for
-    shading.
+    Vertices are shared only where the surface is smooth; averaged vertex normals can be used for shading.
     """
 
     joint: int

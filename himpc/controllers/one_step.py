@@ -66,7 +66,7 @@ class Law(NamedTuple):
 class OneStepController(TorqueController):
     """State, settings and their bumpless change for OSF, TDEOSF and HQP; subclasses implement the law.
 
-    A change of settings is bumpless: the jump of the torque that it would cause is subtracted, and this
+    A change of settings is bumpless: the jump of the torque that would occur is subtracted, and this
     correction fades out over BLEND_SECONDS. After `reset` there is no correction.
     """
 

@@ -14,8 +14,7 @@ Array = NDArray[np.float64]
 
 
 class OSF(OneStepController):
-    """τ = N_n + Σ_i J_{i|prec}ᵀ Λ_{i|prec} (ẍ_i − J̇_i q̇ − acceleration of level i that the levels above
-    cause).
+    """τ = N_n + Σ_i J_{i|prec}ᵀ Λ_{i|prec} (ẍ_i − J̇_i q̇ − acceleration of level i by the levels above).
 
     ẍ_i = ẍ_id − K_v (ẋ_i − ẋ_id) − K_p (x_i − x_id). Every level is feedback-linearised with the nominal M_n
     and N_n = C_n q̇ + G_n + F_n (`settings.nominal`), decoupled from the levels above by dynamically

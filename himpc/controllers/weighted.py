@@ -37,9 +37,9 @@ class Weighted(HIMPC):
     its residual, not its effort: R of (31) is the sum over all levels, up to the longest horizon.
 
     Evidence: entry p of the plan is the solution of the same problem with levels 1 … p alone; the last one is
-    applied. Its leak is therefore, as for HIMPC, the distance by which the levels below p move level p from
-    its solution without them. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs
-    that only the evidence needs.
+    applied. Its leak is, as for HIMPC, the distance by which the levels below p move level p from its
+    solution without them. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs that
+    only the evidence needs.
     """
 
     _evidence_us = 0.0

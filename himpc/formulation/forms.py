@@ -245,7 +245,7 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
 
 
 def usable(x: Array) -> bool:
-    """Whether values are finite, and so small that their squares and the differences of bounds are also
+    """Whether values are finite, and small enough that their squares and the differences of bounds are also
     finite."""
     return float(x @ x) < 1e18
 

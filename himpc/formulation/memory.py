@@ -41,7 +41,7 @@ class Memory(NamedTuple):
         return cls(q, v, T_s)
 
     def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:
-        """q*_{k+j|k−1}, j = 1 … N−1, shifted so that it begins at the measured q: (N−1, n), see (30).
+        """q*_{k+j|k−1}, j = 1 … N−1, shifted to begin at the measured q: (N−1, n), see (30).
 
         If the last prediction is too short for the horizon, it is continued at constant velocity.
         """

@@ -3,8 +3,8 @@
 With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖², and a row a becomes nᵀz ≥ β with n = ±L⁻¹a. The method starts
 at the unconstrained optimum and adds violated rows one by one, the most violated row first. Rows whose
 multiplier would become negative are removed. The active rows are stored as combinations of orthonormal ones.
-A row that depends on them does not enlarge this basis: it replaces one of them, or the rows contradict each
-other.
+A row that depends on them does not enlarge this basis, so it replaces one of them, or the rows contradict
+each other.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds
     range.
 
     A joint beyond a position bound moves back at up to a fifth of its speed limit. When input and jerk bounds
-    exclude each other (because a limit was tightened), the jerk bound holds.
+    exclude each other (after a limit was tightened), the jerk bound holds.
     """
     U = np.empty((N, len(start.v)))
     brake(*start, dt, period, bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j, U)

@@ -24,7 +24,7 @@ class Tracking:
     Attributes:
         name: name of the level.
         tasks: tasks of the level.
-        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured, so its cost is
+        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured: its cost is
             constant.
     """
 

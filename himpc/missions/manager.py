@@ -33,7 +33,7 @@ class Active:
         task: the task.
         reference: its planned motion.
         counts_from: time from which its goal counts, s.
-        reached: time since which its point has been at its goal while the task was first in the window, s;
+        reached: time at which its point reached its goal while the task was first in the window, s;
             None: it is not at its goal.
     """
 

@@ -92,7 +92,7 @@ class Target:
         return self._gathered(motion)
 
     def stays(self, t: float, seen: object) -> bool:
-        """Whether the preview at t equals `seen`, the previous one, because the target is at rest."""
+        """Whether the target is at rest, and its preview at t equals `seen`, the previous one."""
         if self._rest is None or self._rest[1] is not seen:
             return False
         self._time = t

@@ -22,7 +22,7 @@ DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 AHEAD = 0.5
 """m from the frame's origin at which a target starts, on the axis."""
 _NEAREST = 0.02
-"""m: a nearer point is treated as if it had this distance, because the direction to it could change
+"""m: a nearer point is treated as if it had this distance; the direction to it could otherwise change
 arbitrarily fast."""
 _ASIDE = 1e-2
 """Sine of the angle to the opposite direction below which ‖J‖ is constant (0.6°)."""

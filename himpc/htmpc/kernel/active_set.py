@@ -28,7 +28,7 @@ SOLVED, CONTRADICTION, LIMIT = range(3)
 SCRATCH = 7
 """Number of rows of the scratch array."""
 MOST_STEPS = 600
-"""Largest number of rows that are added or removed in one QP, so that its time is bounded."""
+"""Largest number of rows that are added or removed in one QP: it bounds the computing time."""
 _CLOSE = 0.05
 """Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are checked first."""
 _SATISFIED = 1e-9

@@ -12,7 +12,7 @@ from himpc.compilation.compiled import GIVEN_VECTOR, MATRIX, NUMBER, kernel
 Array = NDArray[np.float64]
 
 _NO_JERK_BOUND = 1e9
-"""Replaces an infinite jerk bound, so that its product with a speed of zero is not NaN."""
+"""Replaces an infinite jerk bound, whose product with a speed of zero would be NaN."""
 
 
 @kernel(
