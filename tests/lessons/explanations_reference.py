@@ -1,4 +1,4 @@
-"""The same as `explanations_exempt` for words in the source: the reference, and what the program says."""
+"""The same as `explanations_exempt` for texts in the source: the reference, and messages of the program."""
 
 from __future__ import annotations
 
