@@ -24,8 +24,8 @@ class Intervention:
     """A sentence that names a cause and its effect.
 
     Attributes:
-        at: its place: "lesson/place" for a step, "further/lesson" for a derivation on the lesson's page, or the
-            name of a document of `test_lessons_interventions.DOCUMENTS`.
+        at: its place: "lesson/place" for a step, "further/lesson" for a derivation on the lesson's page, or
+            the name of a document of `test_lessons_interventions.DOCUMENTS`.
         says: the sentence, or the part of it that names the cause, word for word.
         measure: the effect.
         there: its range with the cause, in the measure's unit.
