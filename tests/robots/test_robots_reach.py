@@ -1,4 +1,4 @@
-"""Reachability judged by placo, believed only by residual."""
+"""The reachability that placo computes is accepted only if our own residual confirms it."""
 
 from __future__ import annotations
 
