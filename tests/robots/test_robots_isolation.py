@@ -160,10 +160,13 @@ def test_check_and_load_go_the_same_way(tmp_path: Path) -> None:
 
 
 def test_a_crash_while_loading_is_reported_and_refused(monkeypatch, tmp_path: Path) -> None:
-    # A lambda cannot be sent to a process. monkeypatch.setattr("robots.load.import_robot", lambda *_: None)
-    monkeypatch.setattr("robots.load.isolated", _faulty) file = tmp_path / "arm.urdf"
-    file.write_text(two_joint_arm()) assert "SIGBUS" in str(check_urdf(file).findings) with
-    pytest.raises(InputError, match="SIGBUS"):
+    # A lambda cannot be sent to a process.
+    monkeypatch.setattr("robots.load.import_robot", lambda *_: None)
+    monkeypatch.setattr("robots.load.isolated", _faulty)
+    file = tmp_path / "arm.urdf"
+    file.write_text(two_joint_arm())
+    assert "SIGBUS" in str(check_urdf(file).findings)
+    with pytest.raises(InputError, match="SIGBUS"):
         load_urdf_text(two_joint_arm())
 
 
