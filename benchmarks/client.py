@@ -38,7 +38,7 @@ _TAB = "Joints"  # the tab with the most curves
 
 @dataclass
 class Second:
-    """What arrived within a second. plots, links: how often each chart and each node of the scene was
+    """The messages of one second. plots, links: how often each chart and each node of the scene was
     updated."""
 
     bytes: int = 0

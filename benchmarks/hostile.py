@@ -30,8 +30,8 @@ class HostileUser:
         return sum(self.actions.values()) >= len(self._actions())
 
     def act(self) -> None:
-        """Does a hostile action, or a normal one that changes the state of the page for the next action. Every
-        action is done once first; later ones are chosen at random."""
+        """Does a hostile action, or a normal one that changes the state of the page for the next action.
+        Every action is done once first; later ones are chosen at random."""
         actions = self._actions()
         if not self._due:
             self._due = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])

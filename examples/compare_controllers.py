@@ -12,7 +12,7 @@ CONTROLLERS = ("himpc", "hiqp", "weighted", "osf", "tdeosf", "hqp")
 
 
 def main(seconds: float = 8.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     jobs = [Job(RunSpec("planar3-conflict", controller=name, duration=seconds)) for name in CONTROLLERS]
     # All cores are used, except that timed jobs run one at a time so that they do not disturb each other.
     runs = perform_all(jobs)

@@ -15,7 +15,7 @@ from robots import Plant, convergence_gauge
 
 
 def main(seconds: float = 2.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     scene = load_scene("planar3-circle")
     for horizon in (1, 5, 20):
         print(f"N = {horizon}: {_outcome((f'horizon={horizon}',), seconds)}")

@@ -26,7 +26,7 @@ MISSION = (
 
 
 def main(seconds: float = 20.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot("ridgeback-ur10")
     plant = VelocityPlant(robot)
     progress = Progress(MISSION)

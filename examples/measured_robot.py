@@ -33,7 +33,7 @@ class Driver:
 
 
 def main(seconds: float = 2.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot, driver = load_robot("iiwa14"), Driver()
     tasks = FramePosition(name="hand"), FrameOrientation(name="wrist"), Posture(name="posture")
     controller = HIMPC(robot, Settings(tuple(Level((task,)) for task in tasks), tuple(robot.M_bar)))

@@ -25,7 +25,7 @@ STACK = (
 
 
 def main(seconds: float = 8.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot("ridgeback-ur10")
     plant = VelocityPlant(robot)
     settings = HTMPCSettings(STACK, obstacles=(POST, BALL), margin_m=0.05)

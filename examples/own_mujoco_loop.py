@@ -19,7 +19,7 @@ N = 5
 
 
 def main(seconds: float = 2.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     model = mujoco.MjModel.from_xml_path(str(CATALOG["planar3"].path))
     model.opt.timestep = T_S
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

@@ -23,7 +23,7 @@ LAMP = Path(lessons.__file__).parent / "course" / "lamp.urdf"
 
 
 def main(seconds: float = 3.0, urdf: Path = LAMP) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot(urdf)
     print(f"robot: {robot.name}, joints {', '.join(robot.joint_names)}, tip {robot.tip}")
     for finding in robot.report.findings:

@@ -15,7 +15,7 @@ from lessons.events import Set
 
 
 def main(seconds: float = 2.0, payload_kg: float = 3.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     for controller in ("himpc", "tdeosf", "osf"):
         session = begin(prepared(torque_scene("iiwa14-hold"), controller, ()), seed=0)
         half, ticks = 0.5 * seconds, round(seconds / session.settings.T_s)

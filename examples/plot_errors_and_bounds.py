@@ -17,7 +17,7 @@ from lessons.plots.recorded import Recorded, run_picture
 
 
 def main(seconds: float = 4.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     recording = run(prepared(load_scene("iiwa14-circle"), "himpc", ()), seconds)
 
     picture = run_picture("circle", Recorded(recording.layout, recording.rows), None, 1e-3)

@@ -19,7 +19,7 @@ from app.__main__ import main as himpc_lab
 
 
 def main(seconds: float = 2.0, file: Path | None = None) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     if file is None:
         file = Path("run.npz")
         himpc_lab(

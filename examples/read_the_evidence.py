@@ -13,7 +13,7 @@ from lessons import begin, prepared, torque_scene
 
 
 def main(seconds: float = 4.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     # A session is a run that your program advances one tick at a time.
     session = begin(prepared(torque_scene("planar3-conflict"), "himpc", ()), seed=0)
     ticks = round(seconds / session.settings.T_s)

@@ -18,7 +18,7 @@ from robots import Plant, load_robot
 
 
 def main(seconds: float = 4.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot("panda")
     plant = Plant(robot)
     _, position = plant.frame_pose(robot.tip)

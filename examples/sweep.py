@@ -15,7 +15,7 @@ from lessons.parallel import Spread, on_cores
 
 
 def main(seconds: float = 1.0, spread: Spread = on_cores) -> None:
-    """Prints what the module's docstring says. spread: distributes the runs over processes; see
+    """Prints the results that the module describes. spread: distributes the runs over processes; see
     `lessons.parallel`."""
     base = RunSpec("iiwa14-circle", duration=seconds)
     sweep = make_sweep(base, ("plant.payload_kg=0:4:2", "horizon=2:6:2"))

@@ -11,7 +11,7 @@ from lessons import chosen, torque_scene, tune
 
 
 def main(seconds: float = 1.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     trials = []
     scene = torque_scene("iiwa14-circle")
     for trial in tune(scene, start=0.1, factor=2.0, accuracy=5e-4, noise=0.05, seconds=seconds):

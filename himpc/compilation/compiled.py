@@ -16,7 +16,7 @@ VECTOR, MATRIX, MATRICES = float64[::1], float64[:, ::1], float64[:, :, ::1]
 INDICES, TABLE, FLAGS = intp[::1], int64[:, ::1], boolean[:, ::1]
 """Contiguous arrays that this package allocates."""
 FIXED, FIXED_VECTOR = types.Array(float64, 2, "C", readonly=True), types.Array(float64, 1, "C", readonly=True)
-"""The same, read-only."""
+"""Read-only contiguous arrays that this package allocates."""
 GIVEN_VECTOR = types.Array(float64, 1, "A", readonly=True)
 GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """Arrays from callers, which may be slices."""

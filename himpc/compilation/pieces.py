@@ -59,7 +59,7 @@ class _Loose(_Linking):
 
 
 class _Compiling(Compiler, ABC):
-    """Compiles into one of the two libraries above."""
+    """Base class of compilers for the two libraries above; `library` is the class of the library."""
 
     library: type[_Linking]
 

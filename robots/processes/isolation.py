@@ -197,7 +197,7 @@ def _let_go(out: int) -> None:
 
 
 def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, seconds: float) -> bytes:
-    """Returns what the process prints. Raises TimeoutExpired after the seconds that `Allowance` grants."""
+    """Returns the output of the process. Raises TimeoutExpired after the seconds that `Allowance` grants."""
     began, longest, more = time.monotonic(), PATIENCE * seconds, seconds
     while True:
         try:

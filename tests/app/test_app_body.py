@@ -188,7 +188,7 @@ def test_pacer_owes_simulated_time_but_never_piles_it_up() -> None:
 
 
 def test_a_choice_may_bring_settings_and_a_seed() -> None:
-    """"Reset all" restores the settings and the seed with which the scene was loaded."""
+    """The button "Reset all" restores the settings and the seed with which the scene was loaded."""
     made = SimulationRunner(
         SceneChoice(RunSpec("planar3-hold", set=("order=posture,position,orientation", "horizon=3"), seed=4))
     )

@@ -83,7 +83,7 @@ def test_one_level_or_none_offers_nothing_that_is_not_there() -> None:
 
 @pytest.mark.parametrize("scene", VELOCITY_SCENES)
 def test_roles_have_the_levels_that_are_told(scene: str) -> None:
-    """This also holds after a swap, and while a role has no task."""
+    """The guide names the level of each role, also after a swap, and while a role has no task."""
     made = load_scene(scene)
     assert isinstance(made.settings, VelocitySettings)
     roles = [level.name for level in made.settings.levels]

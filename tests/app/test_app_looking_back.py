@@ -87,7 +87,7 @@ def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
 
 @pytest.mark.parametrize("rate", [30.0, 10.0])
 def test_the_tape_holds_no_more_than_a_minute(rate: float) -> None:
-    """This also holds if a busy machine shows fewer frames per second than are stored."""
+    """The history has at most a minute of frames, also if a busy machine shows fewer frames per second."""
     tape = PoseHistory()
     lengths: list[int] = []
     for k in range(round(150 * rate)):

@@ -136,7 +136,7 @@ def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
 
 
 def test_a_request_that_a_proxy_passes_on_is_not_the_owners(own: Path) -> None:
-    """This also holds for requests with the owner's secret or cookie."""
+    """A forwarded request does not count as the owner's, even with the owner's secret or cookie."""
     protocol: Any = [f"viser-v{__version__}"]
     with serving(own, max_sessions=3) as server:
         cookie = let_in(server.link)

@@ -144,7 +144,7 @@ def dial(port: int, certificate: Path, origin: str, cookie: str) -> Any:
 
 
 def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path]) -> None:
-    """It works with TLS, the token and web sockets; other origins and hosts are refused."""
+    """The page opens with TLS, the token and web sockets; other origins and hosts are refused."""
     server, port, certificate = proxied
     origin = f"https://{NAME}:{port}"
     assert " 403 " in get(port, certificate)

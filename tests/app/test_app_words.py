@@ -120,7 +120,7 @@ def test_what_is_no_message_is_refused(raw: bytes) -> None:
 
 
 def test_a_hostile_user_stops_nothing() -> None:
-    """A few seconds of `benchmarks.monkey --hostile`."""
+    """The page survives a few seconds of `benchmarks.monkey --hostile` without a fault."""
     with StandardError() as terminal:
         server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=4, grace=0.2)
         try:
@@ -170,8 +170,8 @@ def test_what_is_written_before_there_is_a_session_is_checked(capfd: pytest.Capt
 
 
 def test_what_strangers_send_reaches_no_other_page_and_no_terminal() -> None:
-    """Such messages are not stored for other pages either: viser would broadcast that a form was changed,
-    even if it does not exist."""
+    """Invalid messages of a page are neither broadcast nor printed; viser would broadcast that a form was
+    changed, even if the form does not exist."""
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)

@@ -250,7 +250,7 @@ def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_flag_says_no_twice(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """No flag has an opposite flag either, because one of the two would be the default."""
+    """No flag begins with --no-no-, and no flag is listed together with its opposite."""
     with pytest.raises(SystemExit) as ended:
         main([command, "--help"])
     told = capsys.readouterr().out

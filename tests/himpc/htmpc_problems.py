@@ -110,12 +110,12 @@ class Oracle:
         return np.array([point(self.robot, q, frame)[axes] - goal for q in self.states(u)[0]])
 
     def tracking(self, level: int, u: Array) -> float:
-        """Returns (8) without knot 0."""
+        """Returns the tracking cost (8) without knot 0."""
         e, weight = self.errors(level, u), float(np.asarray(self.settings.stack[level].Q))
         return 0.5 * weight * float((e[:-1] ** 2).sum() + self.settings.terminal * (e[-1] ** 2).sum())
 
     def effort(self, u: Array) -> float:
-        """Returns (10)."""
+        """Returns the effort cost (10)."""
         settings = self.settings
         S, R, W = (
             float(np.asarray(each))

@@ -28,8 +28,8 @@ def largest(M: Array, M_bar: Array) -> float:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one(seed: int) -> None:
-    """This holds unless a joint is limited by LARGEST; with links above half the nominal mass the eigenvalue
-    stays below 2."""
+    """The largest eigenvalue is 1 at the payload unless a joint is limited by LARGEST; with links above half
+    the nominal mass the eigenvalue stays below 2."""
     rng = np.random.default_rng(seed)
     n, m = int(rng.integers(1, 9)), float(rng.uniform(0.0, 6.0))
     M, Phi = inertias(rng, n)

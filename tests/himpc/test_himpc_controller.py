@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 
 def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
-    """It is added as the last level if the enabled levels leave freedom, is absent otherwise, and can be
-    switched off."""
+    """The damping level is added as the last level if the enabled levels leave freedom, is absent otherwise,
+    and can be switched off."""
     previews = holds(iiwa, 5)
 
     def names(**changes: Any) -> list[str]:

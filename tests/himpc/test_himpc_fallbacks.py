@@ -168,7 +168,7 @@ def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) ->
 @given(seeds, st.integers(1, 6), st.integers(1, 5), st.booleans())
 @settings(max_examples=60)
 def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, position_rows: bool) -> None:
-    """Random, mostly contradictory state rows: some fallback returns a finite point within the torque bounds,
+    """For random, mostly contradictory state rows a fallback returns a finite point within the torque bounds,
     and no level leaks."""
     hierarchy = random_hierarchy(seed, max(n, 2), N, 3, position_rows)
     rng = np.random.default_rng(seed)

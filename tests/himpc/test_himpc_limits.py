@@ -201,7 +201,8 @@ def test_loosened_limits_hold_at_once() -> None:
 @given(st.floats(-10, 10), st.floats(-1, 1), st.floats(-2, 2))
 @settings(max_examples=15)
 def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) -> None:
-    """They never exclude the present value within one tick, never become wider again, and reach the goal."""
+    """Tightened limits never exclude the present value within one tick, never become wider again, and reach
+    the goal."""
     goal = force_of(tau=3.0, v=0.5, q_low=-0.2, q_high=0.3)
     path = settled(force_of(), goal, tau, q, v)
     seconds = 1e-3 * len(path)

@@ -64,7 +64,7 @@ def test_the_velocity_of_a_path_is_that_of_its_motion(path: Path, part: float) -
 
 
 def test_a_quintic_segment_starts_and_ends_softly() -> None:
-    """It is at rest without acceleration at both ends, and reaches exactly the cruise speed in the middle."""
+    """Velocity and acceleration are zero at both ends, and the speed in the middle is the cruise speed."""
     path = segment(np.zeros(2), np.array([3.0, 4.0]), cruise=0.5)
     for t in (0.0, path.duration):
         preview = path.preview(t, 0.1, 0)

@@ -183,7 +183,7 @@ def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Cap
 @given(seed=seeds, angle=st.floats(0.01, np.pi))
 @settings(max_examples=8)
 def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: float) -> None:
-    """The same on SO(3), for rotations of up to 180°; the preview's vectors are in world axes."""
+    """A dragged target on SO(3) keeps its caps and previews, for rotations of up to 180°, in world axes."""
     rng = np.random.default_rng(seed)
     axis = rng.normal(0, 1, 3)
     start = exp3(rng.normal(0, 1, 3))

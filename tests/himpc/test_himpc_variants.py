@@ -62,7 +62,7 @@ def test_a_variant_is_made_by_its_name(iiwa: Robot, name: str) -> None:
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(iiwa: Robot, name: str) -> None:
-    """As in HIMPC: no exception, no NaN, no torque beyond its bound."""
+    """For any state the variants raise no exception, and no torque is NaN or beyond its bound."""
     controller = make_controller(name, iiwa, iiwa_settings(iiwa))
     rng = np.random.default_rng(0)
     for size in (0.1, 10.0, 1e4, 1e12, np.nan, 1.0):

@@ -48,7 +48,7 @@ def test_gradients_of_the_distances(robot: Robot) -> None:
 
 
 def test_distances_by_hand(robot: Robot) -> None:
-    """The distances to a ball beside the tool, to the floor below it, and to a ball around it."""
+    """The tool's distances to a ball next to it, to the floor and to a ball around it are as expected."""
     at = point(robot, robot.home)
     radius = next(sphere.radius for sphere in covering_spheres(robot) if sphere.link == "tool")
     x, y, z = at

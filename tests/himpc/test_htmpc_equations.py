@@ -365,7 +365,7 @@ def test_guards_follow_12_and_11(robot: Robot) -> None:
 
 
 def test_guard_rows_always_contain_no_change(robot: Robot) -> None:
-    """This also holds where an intermediate level has used its tolerance, so that |e| > |e*|."""
+    """A zero step satisfies the guard rows, also if a level used its tolerance and |e| > |e*|."""
     tick = tick_of(robot)
     level = tracking(robot, tick.settings.stack[0], tick.settings)
     other = tracking(robot, tick.settings.stack[1], tick.settings)

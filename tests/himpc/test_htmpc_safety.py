@@ -71,7 +71,8 @@ def measurements(draw: st.DrawFn) -> tuple[dict[int, float], dict[int, float]]:
 def test_bounds_hold_on_every_command(
     robot: Robot, kind: Any, readings: list[tuple[dict[int, float], dict[int, float]]], **changes: Any
 ) -> None:
-    """Valid measurements, invalid ones, and valid ones again."""
+    """Every command is within its bounds for valid measurements, for invalid ones, and for valid ones
+    again."""
     balls = (Ball("ball", (1.0, 1.0, 0.8), 0.2),) if changes.pop("obstacle") else ()
     controller = kind(robot, mobile_settings(horizon=5, obstacles=balls, **changes))
     references, period = at_home(robot, NEAR), controller.settings.period

@@ -38,7 +38,7 @@ REFERENCE = (
         ("lessons/settings/assignments.py", "The controller comes first"),
         ("lessons/settings/missions.py", "Scenes whose tasks last for the whole run"),
     )),
-    # ---------------------------------------- what follows from equations
+    # ---------------------------------------- sentences that follow from equations
     Exempt("mathematics", (
         LESSONS + "derivations.py::test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar"
     ), (
@@ -92,7 +92,7 @@ REFERENCE = (
     Exempt("mathematics", LESSONS + "geometry.py::test_geometry_and_solver_find_the_same_points", (
         ("lessons/scenes/plane.py", "The wrist is where joint 3 sits"),
     )),
-    # ---------------------------------------- what the program does
+    # ---------------------------------------- sentences about the program
     Exempt("software", ROBOTS + "reach.py::test_a_target_out_of_reach_is_said_to_be", (
         ("robots/reach.py", "Tasks are soft"),
     )),

@@ -66,7 +66,7 @@ def seconds(*assignments: str) -> float:
     return progress.progress.completed[-1][1]
 
 
-# ------------------------------------------------------------------ what differs
+# ------------------------------------------------------------------ differences
 
 
 @pytest.mark.parametrize("rule", [(), STRICT, ("base_tolerance=0.25",)])

@@ -32,8 +32,8 @@ from lessons.session.torque import TorqueSession
     ids=["frame", "relative"],
 )
 def test_a_large_free_rotation_does_not_undo_the_orientation(turn: OrientationTask) -> None:
-    """K_p = 50 and K_v = 5 on x and y with a rotation of 120° about z: an error of 3° decays within a second.
-    The components of log₃ would have grown to 14° (real part 1.6 1/s)."""
+    """With K_p = 50 and K_v = 5 on x and y and a rotation of 120° about z, an error of 3° decays within a
+    second. As components of log₃ it would have grown to 14° (real part 1.6 1/s)."""
     scene = torque_scene("iiwa14-hold")
     levels = (Level((FramePosition(name="position"),)), Level((turn,)), Level((Posture(name="posture"),)))
     session = TorqueSession(replace(scene, settings=replace(scene.settings, levels=levels)))

@@ -61,7 +61,7 @@ def test_geometry_and_solver_find_the_same_points(assignments: tuple[str, ...]) 
     ("scene", "horizon"), [("planar3-hold", 1), ("iiwa14-hold", 1), ("planar3-circle", 1)]
 )
 def test_each_level_is_best_in_the_cut_through_its_own_solution(scene: str, horizon: int) -> None:
-    """This holds for every robot and for all values of the other joints."""
+    """In the plane of two joints, with the other joints at the level's solution, this solution is optimal."""
     session = TorqueSession(prepared(torque_scene(scene), None, (f"horizon={horizon}",)))
     for _ in range(200):
         session.advance()
