@@ -116,7 +116,7 @@ def target_of(session: TorqueSession) -> str | None:
 
 
 def cells(given: argparse.Namespace) -> Iterator[Cell]:
-    """The cells that the command line asks for."""
+    """The cells that the command line selects."""
     if given.quick:
         yield from QUICK
         return

@@ -38,7 +38,7 @@ _TAB = "Joints"  # the tab with the most curves
 
 @dataclass
 class Second:
-    """What arrived within a second. plots, links: how often each chart and each node of the scene was
+    """The messages of one second. plots, links: how often each chart and each node of the scene was
     updated."""
 
     bytes: int = 0
@@ -71,7 +71,7 @@ class Viewer:
         self._said = ""
 
     def connect(self, slow: bool = False) -> Connection:
-        """slow: emulates a slow line that reads some kilobytes at a time."""
+        """Connects to the page. slow: emulates a slow line that reads some kilobytes at a time."""
         protocol: Any = [f"viser-v{__version__}"]
         line = socket()
         if slow:
@@ -79,7 +79,8 @@ class Viewer:
         address = urlsplit(self._url)
         line.connect((address.hostname, address.port))
         queue = 1 if slow or self._delay else 16
-        # Pages send no pings; ours would close the connection on a machine that is too busy to answer them.
+        # The page's clients send no pings: on a machine that is too busy to answer a ping, this library would
+        # close the connection.
         connection = connect(
             self._url,
             sock=line,
@@ -168,7 +169,7 @@ class Viewer:
                 pass
 
     def _note(self, message: dict[str, Any]) -> None:
-        """Notes where charts are, and which control reports the visible ones."""
+        """Stores the position of each chart in the page, and the control that reports the visible charts."""
         props = message.get("props", {})
         if "container_uuid" in message:
             self._parents[message["uuid"]] = message["container_uuid"]

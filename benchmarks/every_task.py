@@ -39,9 +39,14 @@ SETTLED = {"m": 1e-3, "rad": np.deg2rad(0.1)}
 
 @dataclass(frozen=True)
 class Found:
-    """The error of a task: its largest coordinate over the tasks of its kind, divided by `SETTLED` of its
-    unit, which is m for prismatic joints. moved: the distance of the drag, in the same units. calm:
-    largest ratio of |v| to its limit at the end."""
+    """The errors of all tasks of one kind in a run.
+
+    Attributes:
+        held, settled: the largest error of a coordinate after holding and after dragging, divided by the
+            value of `SETTLED` for its unit (a prismatic joint has the unit m).
+        moved: the distance of the drag, in the same units.
+        calm: the largest ratio of |v| to its limit at the end.
+    """
 
     robot: str
     kind: str

@@ -93,8 +93,8 @@ def optimum(
 def _dual_method(system: _System, point: _Point, side: Array) -> Exact | None:
     """Goldfarb and Idnani's method, from a point whose multipliers have the right signs.
 
-    On the way to the point that holds one more row, multipliers change linearly. Where the first of them
-    vanishes, its row is released, and the way goes on from there.
+    Multipliers change linearly between the present point and the point that holds one more row. At the step
+    at which the first of them vanishes, its row is released, and the method continues from there.
     """
     for _ in range(_CHANGES):
         value = times(system.L, point.U)
@@ -303,7 +303,7 @@ class _System:
         return rows.reshape(len(rows), K * n)
 
     def independent(self, side: Array) -> NDArray[np.bool_]:
-        """As many of the given rows as depend neither on (33) nor on one another."""
+        """A largest set of the given rows that depend neither on (33) nor on one another."""
         row, joint = np.nonzero(side)
         held = np.zeros(side.shape, bool)
         if not len(row):
@@ -318,8 +318,8 @@ class _System:
         return held
 
     def dependence(self, side: Array, new: tuple[Any, ...]) -> Array | None:
-        """How multipliers of the rows that are held make room for one of the new row, if it depends on them
-        and on (33); None if it is independent."""
+        """Returns the changes of the multipliers of the rows that are held per unit of the new row's
+        multiplier, if the new row depends on those rows and on (33); None if it is independent of them."""
         held = side != 0.0
         held[new] = False
         row, joint = (np.append(*pair) for pair in zip(new, np.nonzero(held), strict=True))

@@ -140,7 +140,7 @@ def event(rng: np.random.Generator, session: TorqueSession) -> Event:
 
 
 def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan, spent: float) -> None:
-    """Checks what must be true of every plan."""
+    """Checks the conditions that every plan must satisfy."""
     tally.ticks += 1
     tally.fallbacks.update(level.fallback for level in plan.levels)
     tally.longest_ms = max(tally.longest_ms, 1e3 * spent)

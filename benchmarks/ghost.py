@@ -80,7 +80,7 @@ def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[st
 
 
 def measured(learner: SimulationClient, lines: list[str], seconds: float) -> dict[str, float]:
-    """lines: the output of the client, one per second."""
+    """Returns the measured figures of a ghost. lines: the output of the client, one per second."""
     busy = {name: psutil.Process(pid) for name, pid in pids(learner).items()}
     for process in busy.values():
         process.cpu_percent()

@@ -30,8 +30,8 @@ class HostileUser:
         return sum(self.actions.values()) >= len(self._actions())
 
     def act(self) -> None:
-        """Does one hostile action, or one that a learner may do, so that the next action meets another state
-        of the page. Each is done once, then at random."""
+        """Does a hostile action, or a normal one that changes the state of the page for the next action.
+        Every action is done once first; later ones are chosen at random."""
         actions = self._actions()
         if not self._due:
             self._due = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])

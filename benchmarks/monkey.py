@@ -93,7 +93,7 @@ class Monkey:
         if "showSaveFilePicker" not in error.message:
             self.found.blame(f"the browser: {error}")
 
-    # ---------------------------------------------------------------- hands
+    # ---------------------------------------------------------------- the user's actions
 
     def _one(self, selector: str) -> Locator | None:
         elements = self.page.locator(selector)
@@ -164,7 +164,7 @@ class Monkey:
     def _reload(self) -> None:
         load(self.page, self.server.link)
 
-    # ---------------------------------------------------------------- eyes
+    # ---------------------------------------------------------------- checks
 
     def look(self) -> None:
         """Checks everything that happened since the last check."""

@@ -1,4 +1,4 @@
-"""Values, messages and cameras that no browser would send, and random numbers of which some are such."""
+"""Values, messages and cameras that no browser would send, and random numbers, some of which are invalid."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Odd(Random):
     """A stream of random numbers and messages, of which some are odd."""
 
     def number(self) -> float:
-        """Every second one is odd."""
+        """Returns a random number; every second one is taken from `NUMBERS`."""
         return self.choice(NUMBERS) if self.random() < 0.5 else self.gauss(0.0, 1.0)
 
     def numbers(self, count: int) -> tuple[Any, ...]:

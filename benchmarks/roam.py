@@ -1,4 +1,4 @@
-"""A hostile user roams about a server, see `hostile`, and what happened is checked."""
+"""Runs a hostile user (`benchmarks.hostile`) against a server, and checks the server and the page."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def roam(server: PageServer, seconds: float, seed: int, complaints: Callable[[],
 
 
 def _look(server: PageServer, page: Wire, found: Findings, complaints: Callable[[], str]) -> None:
-    """Checks what happened."""
+    """Adds a fault for every message on the terminal, every closed page and every failed simulation."""
     said = complaints()
     for word in ("Traceback", "Exception", "Warning", "[viser]"):
         if word in said:

@@ -1,9 +1,9 @@
-"""Whether all scenes under all controllers still give what they gave at another commit.
+"""Compares the results of all scenes under all controllers with those of another commit.
 
-python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, headless,
-here and in a checkout of COMMIT, and compares the results of `himpc-lab run --json`, timing keys apart.
---tolerance T lets numbers differ by that share of the larger one (and by 1e-9), and the route and what it
-leaves as residuals altogether. Exit code 1 if any differs.
+python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, without a
+page, here and in a checkout of COMMIT, and compares the results of `himpc-lab run --json`, except the keys of
+`TIMING`. With --tolerance T, numbers may differ by that share of the larger one (and by 1e-9), and the keys
+of `_HOW` (the route and its residuals) are not compared. Exit code 1 if any result differs.
 """
 
 from __future__ import annotations

@@ -51,7 +51,13 @@ GROWTH, PER_100, SPARE = 1.05, 5.0, 3
 
 @dataclass(frozen=True)
 class Sample:
-    """minute: since the start; server, children: MB of their own, see `written`; rss: MB of the server."""
+    """One measurement.
+
+    Attributes:
+        minute: time since the start.
+        server, children: MB of their own memory, see `written`.
+        rss: MB of the server, shared memory included.
+    """
 
     minute: float
     server: float

@@ -1,9 +1,9 @@
-"""The cost of a start: CPU and wall time until the page listens, of lists and help, and of compiling.
+"""The cost of a start: CPU and wall time until the page listens, and CPU time of lists, help and compiling.
 
     python benchmarks/start.py [--runs 5] [--cold]
 
-CPU is of the process alone (user and system), medians of several runs; `--cold` also compiles once, into a
-folder of its own.
+CPU time is user and system time: of the server's process alone, or of a command and its children. Medians of
+several runs are printed; `--cold` also compiles once, into a folder of its own.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from lessons.session.torque import TorqueSession
 
 
 def measure(scene: str, ticks: int) -> dict[str, dict[str, float] | float]:
-    """Runs a scene and times the parts of every tick apart, on the same states as the whole tick."""
+    """Runs a scene, and times the parts of every tick separately, on the same states as the whole tick."""
     session = TorqueSession(torque_scene(scene))
     T_s, N = session.settings.T_s, session.settings.horizon
     spent: dict[str, list[int]] = {"tick": [], "reference": [], "control step": [], "telemetry": []}

@@ -1,4 +1,4 @@
-"""Visitors without access reach nothing, and silent or flooding connections delay nobody: measured.
+"""Measures that visitors without access read nothing, and that silent or flooding connections delay nobody.
 
     python -m benchmarks.visitors [--silent 200] [--seconds 5] [--no-browser]
 
@@ -6,8 +6,8 @@ Starts the real server in a process of its own and tries to connect as other sit
 `null`, another port's origin, a rebinding name, and with 40 sockets from a page of another site in Chromium.
 Then, while a page is open, many silent connections are opened (half without a request, half web sockets
 without a message) and one that sends as fast as it can, and a new visitor arrives. Prints JSON; exit code 0
-if nothing of the first kind was read, started or lost, the new visitor was served within 2 s and the page
-kept at least half its rate.
+if the foreign sites read, started and closed nothing, the new visitor was served within 2 s and the page kept
+at least half its rate.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def strangers(url: str) -> dict[str, int]:
 
 
 def from_chromium(url: str) -> int:
-    """How many of 40 sockets a page of another site in Chromium can open."""
+    """Returns how many of 40 sockets a page of another site in Chromium can open."""
 
     class Quiet(http.server.BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -272,8 +272,8 @@ def main() -> int:
             besieged_rate = page.rate(options.seconds)
             result["newcomer_s"] = [round(newcomer(url), 2) for _ in range(3)]
             besieged_rate = min(besieged_rate, page.rate(options.seconds))
-        # The page may still have been starting before, and the machine is shared: the better of both rates
-        # counts.
+        # The page may still have been starting during the first measurement, and the machine is shared, so
+        # the better of both rates counts.
         time.sleep(2.0)
         free = max(free, page.rate(options.seconds))
         result["packets_hz"] = {"free": round(free, 1), "besieged": round(besieged_rate, 1)}

@@ -1,1 +1,1 @@
-"""The documentation's pictures, and the scripts that take them: `python -m docs.NAME` in a checkout."""
+"""Scripts that make the documentation and its pictures: run `python -m docs.NAME` in a checkout."""

@@ -1,8 +1,8 @@
 """Builds the documentation site: `python -m docs.build [--out out/site]`.
 
-Pages are made anew from the code: lessons from the course, the reference from docstrings, examples from
-their files, the rest from README, CONTRIBUTING and docs/. Every warning is an error. The result is static and
-needs no server: open index.html.
+Each build makes all pages anew: lessons from the course, the reference from docstrings, examples from their
+files, the rest from README, CONTRIBUTING and docs/. Every warning is an error. The result is static and needs
+no server: open index.html.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def write_sources(folder: Path) -> None:
-    """All pages as Sphinx reads them."""
+    """Writes all pages in the form that Sphinx reads."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / "docs" / "site", folder, ignore=shutil.ignore_patterns("__pycache__", "*.json"))
     pages: dict[str, str] = {}
@@ -37,7 +37,7 @@ def write_sources(folder: Path) -> None:
 
 
 def write_films(folder: Path) -> None:
-    """The player and a scene per lesson, beside the pages: Sphinx has no part in them."""
+    """Writes the 3D player and one recorded scene per lesson next to the built pages, without Sphinx."""
     folder.mkdir(parents=True)
     (folder / "player.html").write_text(films.player(), encoding="utf-8")
     for name in COURSE:
@@ -46,7 +46,7 @@ def write_films(folder: Path) -> None:
 
 
 def build(out: Path) -> int:
-    """Sphinx's exit code."""
+    """Builds the site and returns Sphinx's exit code."""
     from sphinx.cmd.build import build_main
 
     source = out.parent / f"{out.name}-source"
@@ -60,7 +60,7 @@ def build(out: Path) -> int:
 
 
 def main() -> int:
-    """The command line."""
+    """Builds the site as the command line says."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "site")
     out = parser.parse_args().out.resolve()

@@ -1,7 +1,7 @@
-"""What a lesson's robot did, to be watched in 3D without a server: viser's own player and a scene per lesson.
+"""3D recordings of the lessons that need no server: viser's own player, and one recorded scene per lesson.
 
-The player is one file for all; a scene is a script beside it, since a page that was opened from a disk may
-load scripts and nothing else.
+All scenes use the same player file. A scene is a JavaScript file beside it, because a page that was opened
+from a disk may load scripts, but no other files.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 _BALL = 0.03
-"""Of a target, m."""
+"""The radius of the ball that marks a target, m."""
 _LOOK_UP = """<script>
 (() => {
   const asked = location.hash.slice(1).split(",");
@@ -40,7 +40,8 @@ _LOOK_UP = """<script>
 
 
 def player() -> str:
-    """viser's client, which reads the scene that its address names: `player.html#NAME` or `#NAME,dark`."""
+    """Returns the HTML of viser's client, which loads the scene that its address names: `player.html#NAME` or
+    `#NAME,dark`."""
     client = Path(viser.__file__).parent / "client" / "build" / "index.html"
     text = client.read_text(encoding="utf-8")
     head = text.index("</head>")
@@ -48,8 +49,8 @@ def player() -> str:
 
 
 def film(lesson: Lesson, motion: Mapping[str, Any]) -> str:
-    """The script of a lesson's scene."""
-    with contextlib.redirect_stdout(io.StringIO()):  # it greets with a panel
+    """Returns the script of a lesson's scene."""
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a panel at its start
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         return (
@@ -95,7 +96,8 @@ def _filmed(server: viser.ViserServer, lesson: Lesson, motion: Mapping[str, Any]
 
 
 def _poses(robot: Robot, q: Array) -> Array:
-    """(k, n, 7) over a way q (k, n) of the joints; where control was lost it stands still."""
+    """Returns the poses of the links (k, n, 7) along a path q (k, n) of the joints. After control was lost,
+    the last valid pose is repeated."""
     links, found = LinkPoses(robot), []
     for each in q:
         at = links.at(each)
@@ -104,11 +106,11 @@ def _poses(robot: Robot, q: Array) -> Array:
 
 
 def _in_space(way: Array) -> Array:
-    """(k, 3): what has two coordinates lies on the floor or in the plane."""
+    """Returns points (k, 3) from points of two or three coordinates; with two coordinates, z = 0."""
     return way if way.shape[1] == 3 else np.column_stack([way, np.zeros(len(way))])
 
 
 def motion_of(path: Path) -> Mapping[str, Any]:
-    """What `docs.record` kept of how a lesson's robot moved."""
+    """Returns the recorded motion of a lesson's robot from a file that `docs.record` wrote."""
     told: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return told["motion"]

@@ -1,4 +1,4 @@
-"""Walks through every lesson in a real browser and keeps what it saw: docs/lessons/NAME.webp and an index.
+"""Walks through every lesson in a real browser and stores screenshots: docs/lessons/NAME.webp and an index.
 
 python -m docs.gallery [NAME …] [--out docs/lessons]
 """
@@ -25,13 +25,14 @@ from lessons.teaching.lesson import Lesson, Step
 
 ROOT = Path(__file__).parents[1]
 WIDTH, HEIGHT = 1200, 920
-PLOTS = 404  # width of the panel on the left, which has nothing to show before a run
-SHOWN = 0.58  # of the pixels, in the pictures that are kept
+PLOTS = 404  # width, pixels, of the panel on the left, which shows nothing before a run
+SHOWN = 0.58  # scale of the stored pictures
 QUALITY = 25
 
 
 def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image]]:
-    """(title, before, after the run) of every step and of the challenge's start."""
+    """Returns (title, picture before the run, picture after it) of every step and of the challenge's
+    start."""
     open_lesson(page, lesson)
     parts, found = parts_of(lesson), []
     for part in parts:
@@ -48,13 +49,13 @@ def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image
 
 
 def look(page: Page) -> Image.Image:
-    page.mouse.move(PLOTS + 100, HEIGHT - 20)  # or a hint would cover something
+    page.mouse.move(PLOTS + 100, HEIGHT - 20)  # elsewhere the mouse would show a hint over the page
     page.wait_for_timeout(1200)
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
 def sheet(screens: list[tuple[str, Image.Image, Image.Image]]) -> Image.Image:
-    """A row per step."""
+    """Returns one picture with a row per step."""
     line = 18
     height = round(HEIGHT * SHOWN) + line
     left = round((WIDTH - PLOTS) * SHOWN)
@@ -91,7 +92,7 @@ def main() -> None:
 
 
 def write_index(out: Path) -> None:
-    """A page with all pictures."""
+    """Writes a page with all pictures."""
     lines = [
         "# The lessons, walked through",
         "",

@@ -1,4 +1,4 @@
-"""Takes the README's picture, which moves: docs/page.webp, a lesson's step as the page plays it back.
+"""Makes the README's animated picture, docs/page.webp: a lesson's step as the page plays it back.
 
 python -m docs.picture
 """
@@ -22,7 +22,7 @@ OUT = Path(__file__).parents[1] / "docs" / "page.webp"
 EXERCISE = LessonPlace("a-redundant-arm", 2)
 SIZE = (1080, 675)
 EVERY, LAST = 100, 1500
-"""ms that a picture stands; the last one longer, to be read."""
+"""Time, ms, for which a picture is shown; the last one is shown longer so that it can be read."""
 
 
 def main() -> None:
@@ -54,9 +54,10 @@ def main() -> None:
 
 
 def played_back(page: Page, seconds: float) -> list[Image.Image]:
-    """The run once more by looking back at it: whatever the machine's pace, a tenth of a second each."""
-    press(page, "Pause")  # a robot that runs is not looked back at
-    page.mouse.move(700, 850)  # or a hint would cover something
+    """Returns pictures of the run, one per tenth of a second of simulated time, taken while looking back at
+    it, so that the speed of the machine does not matter."""
+    press(page, "Pause")  # looking back requires a paused robot
+    page.mouse.move(700, 850)  # elsewhere the mouse would show a hint over the page
     for _ in range(round(seconds) + 1):
         key(page, "Shift+J")
     pictures = []

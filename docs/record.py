@@ -1,7 +1,7 @@
-"""Runs every step of every lesson once and keeps what the site draws of it: `python -m docs.record [NAME …]`.
+"""Runs every step of every lesson once and stores the site's curves: `python -m docs.record [NAME …]`.
 
 docs/site/recorded/NAME.json holds, per step, the curves of its plots, of the run and of its ghost, and per
-lesson how the robot moved in one of its steps.
+lesson the robot's motion in one of its steps.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from lessons.teaching.lesson import Lesson, Step
 
 FOLDER = Path(__file__).parents[1] / "docs" / "site" / "recorded"
 RATE = 25.0
-"""Pictures a second, at most, of a motion."""
+"""The largest number of stored configurations per second of a motion."""
 PLAYED = {"a-redundant-arm": 1, "no-model-needed": 1, "one-task": 1, "swap-the-priorities": 2, "two-tasks": 1}
-"""Which step of a lesson is seen moving; of the others the first."""
+"""The step of a lesson whose motion is stored; for other lessons the first step."""
 
 Array = NDArray[np.float64]
 
 
 def recorded(lesson: Lesson) -> dict[str, Any]:
-    """What is kept of a lesson."""
+    """Returns the stored data of a lesson."""
     steps, played = [], PLAYED.get(lesson.name, 0)
     motion: dict[str, Any] = {}
     for place, step in enumerate(lesson.steps):
@@ -43,14 +43,14 @@ def recorded(lesson: Lesson) -> dict[str, Any]:
 
 
 def runs_of(lesson: Lesson, step: Step) -> list[Recording]:
-    """The step's run and, if there is one, its ghost's."""
+    """Returns the step's run and, if there is a ghost, the ghost's run."""
     own = lesson.run_of(step)
     wanted = [own] if step.ghost is None else [own, own.but(*step.ghost.set)]
     return [run(each.prepared(), to_the_end=True) for each in wanted]
 
 
 def plot(step: Step, place: int, runs: list[Recording]) -> dict[str, Any]:
-    """One signal: per run when and what."""
+    """Returns one signal: its times and values for each run."""
     signal = step.plots[place]
     drawn = [thinned(each["t"][:, 0], signal.over(each)) for each in runs]
     return {
@@ -62,7 +62,8 @@ def plot(step: Step, place: int, runs: list[Recording]) -> dict[str, Any]:
 
 
 def moved(lesson: Lesson, step: Step, runs: list[Recording]) -> dict[str, Any]:
-    """How the joints and the targets moved: seconds, joint angles of each run, targets by task."""
+    """Returns the motion of the joints and of the targets: period in s, joint angles of each run, targets by
+    task."""
     own = runs[0]
     T_s = own.session.settings.T_s
     every = max(1, round(1.0 / (RATE * T_s)))
@@ -80,7 +81,8 @@ def moved(lesson: Lesson, step: Step, runs: list[Recording]) -> dict[str, Any]:
 
 
 def rounded(values: Array, digits: int | None = None) -> list[Any]:
-    """As JSON takes it: four significant digits, or so many after the point; None for no number."""
+    """Returns values for JSON: rounded to four significant digits, or to `digits` decimals; None for NaN and
+    infinities."""
     if values.ndim > 1:
         return [rounded(row, digits) for row in values]
     return [
@@ -90,7 +92,7 @@ def rounded(values: Array, digits: int | None = None) -> list[Any]:
 
 
 def write(name: str, folder: Path = FOLDER) -> Path:
-    """Runs one lesson and keeps it."""
+    """Runs one lesson and writes its file."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.json"
     told = json.dumps(recorded(load_lesson(name)), ensure_ascii=False, separators=(",", ":"))
@@ -101,7 +103,7 @@ def write(name: str, folder: Path = FOLDER) -> Path:
 
 
 def main() -> None:
-    """The command line."""
+    """Records the lessons that the command line names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", default=list(COURSE))
     for name in parser.parse_args().names:

@@ -23,7 +23,7 @@ Made by `python -m docs.settings`.
 
 
 def text() -> str:
-    """The whole file."""
+    """Returns the whole file."""
     torque = [name for name in SCENES if name != "hold"]
     return "\n".join(
         [

@@ -1,5 +1,5 @@
-"""What the documentation site adds to Sphinx: equations as MathML, docstrings as they are written; and what
-saves a quarter of its time."""
+"""Extensions of Sphinx for the documentation site: equations as MathML, docstrings as plain text, and two
+changes that save a quarter of the build time."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _SECTIONS = ("Args", "Attributes", "Returns", "Raises", "Yields")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Called by Sphinx."""
+    """Registers the extensions; Sphinx calls this function."""
     app.add_html_math_renderer("mathml", (_inline, None), (_displayed, None))
-    # Before napoleon, which reads the sections.
+    # Must run before napoleon, which reads the sections.
     app.connect("autodoc-process-docstring", _plain, priority=100)
-    # Before the theme, which asks for the tree.
+    # Must run before the theme, which requests the tree of pages.
     app.connect("html-page-context", _titles_alone, priority=100)
     app.add_domain(Names, override=True)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 class Names(PythonDomain):
-    """Looks for a name of a signature once, since it looks through all there are."""
+    """Stores the result of each search for a name, because a search goes through all names."""
 
     def __init__(self, env: BuildEnvironment) -> None:
         super().__init__(env)
@@ -44,7 +44,7 @@ class Names(PythonDomain):
         type: str | None,
         searchmode: int = 0,
     ) -> list[tuple[str, ObjectEntry]]:
-        """What Sphinx finds while there are as many names."""
+        """Returns Sphinx's result, stored as long as the number of known names is the same."""
         key = (modname, classname, name, type, searchmode, len(self.objects))
         if key not in self._found:
             self._found[key] = super().find_obj(env, modname, classname, name, type, searchmode)
@@ -52,7 +52,7 @@ class Names(PythonDomain):
 
 
 def _titles_alone(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """The tree beside every page has the titles of pages: what stands on them need not be copied for it."""
+    """Builds the tree beside every page from page titles alone, without copying the pages' sections."""
     tree, known = context["toctree"], app.env.metadata
     leaves = app.env.found_docs - set(app.env.toctree_includes)
 
@@ -81,7 +81,8 @@ def _displayed(translator: Any, node: nodes.math_block) -> None:
 
 
 def _plain(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Docstrings here are plain words with `code`; to Sphinx many of their signs would mean something."""
+    """Escapes docstrings, which are plain text with `code`, so that reStructuredText does not interpret their
+    characters."""
     section = ""
     for k, line in enumerate(lines):
         if line.strip().rstrip(":") in _SECTIONS and line.endswith(":"):
@@ -95,7 +96,7 @@ def _plain(app: Sphinx, what: str, name: str, obj: object, options: object, line
 
 
 def safe(text: str) -> str:
-    """A line whose words mean nothing to reStructuredText, but for its code."""
+    """Returns a line in which only code is markup for reStructuredText."""
     parts = _CODE.split(text)
     for k, part in enumerate(parts):
         if k % 2:

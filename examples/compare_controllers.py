@@ -1,4 +1,4 @@
-"""Comparing controllers: the same scene, the same seed, all of them; as a table.
+"""Compares all torque controllers on the same scene with the same seed, as a table.
 
 Prints a line per controller: the RMS error of level 1, the largest torque and velocity as a share of their
 limits, the priority leak, and the median time of a step.
@@ -12,9 +12,9 @@ CONTROLLERS = ("himpc", "hiqp", "weighted", "osf", "tdeosf", "hqp")
 
 
 def main(seconds: float = 8.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     jobs = [Job(RunSpec("planar3-conflict", controller=name, duration=seconds)) for name in CONTROLLERS]
-    # On all cores; jobs that are timed run by themselves, so that they are.
+    # All cores are used, except that timed jobs run one at a time so that they do not disturb each other.
     runs = perform_all(jobs)
     for job in jobs:
         found = runs[job]

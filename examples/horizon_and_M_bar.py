@@ -1,9 +1,9 @@
-"""N and M̄ by hand: what the horizon costs and brings, and when the diagonal M̄ is too large.
+"""N and M̄ by hand: the cost and the benefit of the horizon, and when the diagonal M̄ is too large.
 
 M̄ replaces the robot's mass matrix M. Time-delay estimation multiplies its error by I − M⁻¹M̄ from tick to
-tick, so the spectral radius of that matrix has to stay below 1; where it is, a smaller M̄ is only less exact.
-Prints a line per N and a line per factor on M̄: the RMS error of level 1 after the first quarter, the median
-time of a step, and the spectral radius at the start. "control lost" is an outcome, too.
+tick, so the spectral radius of that matrix has to stay below 1. A smaller M̄ keeps it below 1, but is less
+accurate. Prints a line per N and a line per factor on M̄: the RMS error of level 1 after the first quarter,
+the median time of a step, and the spectral radius at the start. "control lost" is a valid result.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robots import Plant, convergence_gauge
 
 
 def main(seconds: float = 2.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     scene = load_scene("planar3-circle")
     for horizon in (1, 5, 20):
         print(f"N = {horizon}: {_outcome((f'horizon={horizon}',), seconds)}")

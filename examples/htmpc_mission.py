@@ -1,8 +1,8 @@
-"""A mission of your own under HTMPC: the hand visits two points, the base a place; two tasks at a time.
+"""A mission of your own under HTMPC: the hand visits two points and the base one, two tasks at a time.
 
-The task manager hands the controller a window of the next two tasks: the first one has priority, the second
-one is prepared with the freedom that is left. Prints a line per completed task with its time, and at the end
-where hand and base are.
+The task manager gives the controller a window of the next two tasks: the first one has priority, the second
+one is prepared with the remaining freedom. Prints a line per completed task with its time, and at the end the
+positions of hand and base.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MISSION = (
 
 
 def main(seconds: float = 20.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot("ridgeback-ur10")
     plant = VelocityPlant(robot)
     progress = Progress(MISSION)
@@ -40,7 +40,7 @@ def main(seconds: float = 20.0) -> None:
         for name, t in progress.completed[done:]:
             print(f"completed: {name} at {t:.1f} s")
         done = len(progress.completed)
-        # The window becomes the stack: its first task is level 1. The plan under way goes on.
+        # The window becomes the stack: its first task is level 1. The controller keeps its present plan.
         window = {active.task.role: active.reference for active in progress.window}
         stack = tuple(Level((ROLES[role],), Q=100.0) for role in window)
         controller.configure(replace(settings, stack=stack))

@@ -1,7 +1,7 @@
-"""A robot that is measured, not simulated: feed q and v from your own source, take the torque to your bus.
+"""A measured robot instead of a simulated one: pass q and v from your source, send the torque to your bus.
 
-The loop needs `read` and `write` only: joints in the order of the URDF, rad, rad/s, N·m. The driver here
-gives one broken reading. Prints the ticks, how many were late, what happened then, and where the hand ends.
+The loop needs only `read` and `write`: joints in the order of the URDF, rad, rad/s, N·m. This driver returns
+one invalid reading. Prints the ticks, the late ticks, the reaction to that reading, and the hand's error.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ T_S = 1e-3
 
 
 class Driver:
-    """Replace it by yours. `write` returns the torque that really acts."""
+    """Replace this class by your driver. `write` returns the torque that really acts."""
 
     def __init__(self) -> None:
         self.plant = Plant(load_robot("iiwa14"), PlantSettings(encoder_resolution_deg=0.001))
@@ -33,7 +33,7 @@ class Driver:
 
 
 def main(seconds: float = 2.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot, driver = load_robot("iiwa14"), Driver()
     tasks = FramePosition(name="hand"), FrameOrientation(name="wrist"), Posture(name="posture")
     controller = HIMPC(robot, Settings(tuple(Level((task,)) for task in tasks), tuple(robot.M_bar)))

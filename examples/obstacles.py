@@ -1,8 +1,9 @@
-"""Obstacles: HTMPC drives a mobile manipulator up to a post and under a ball; torque control avoids nothing.
+"""Obstacles: HTMPC drives a mobile manipulator up to a post and under a ball. Torque control has no
+obstacles.
 
-The hand is asked to stay where it is; the base, ranked below it, to come close to a post, which it may not
-touch. Prints the smallest distance to an obstacle along the way, how far the hand was from its place at most,
-and where the base is at the end.
+The task of level 1 keeps the hand at its place. The task of level 2 moves the base towards a post, which it
+must not touch. Prints the smallest distance to an obstacle along the path, the largest distance of the hand
+from its place, and the final position of the base.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ STACK = (
 
 
 def main(seconds: float = 8.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot("ridgeback-ur10")
     plant = VelocityPlant(robot)
     settings = HTMPCSettings(STACK, obstacles=(POST, BALL), margin_m=0.05)

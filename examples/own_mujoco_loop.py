@@ -1,8 +1,8 @@
-"""The controller in your own MuJoCo loop: your model, your step, your rate; nothing of our plant.
+"""The controller in your own MuJoCo loop: your model, your step, your rate, without this project's plant.
 
 The controller knows the arm's geometry and limits from a URDF. MuJoCo simulates an arm with other masses and
-with friction that nobody told the controller of. Prints how many control steps were taken, and the largest
-distance between the hand and the circle it follows.
+with friction, which the controller does not know. Prints how many control steps were taken, and the largest
+distance between the hand and its circular path.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ N = 5
 
 
 def main(seconds: float = 2.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     model = mujoco.MjModel.from_xml_path(str(CATALOG["planar3"].path))
     model.opt.timestep = T_S
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

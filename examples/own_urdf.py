@@ -1,4 +1,4 @@
-"""Your own URDF under your own stack: what the import says of the file, and a hand that is sent 5 cm away.
+"""Your own URDF with your own stack: prints the findings of the import and moves the hand by 5 cm.
 
     python examples/own_urdf.py [FILE.urdf]
 
@@ -23,7 +23,7 @@ LAMP = Path(lessons.__file__).parent / "course" / "lamp.urdf"
 
 
 def main(seconds: float = 3.0, urdf: Path = LAMP) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot(urdf)
     print(f"robot: {robot.name}, joints {', '.join(robot.joint_names)}, tip {robot.tip}")
     for finding in robot.report.findings:

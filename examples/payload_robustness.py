@@ -1,8 +1,9 @@
-"""A payload nobody told the controller of, picked up while the arm holds still: who notices?
+"""An unknown payload is added while the arm holds still: compares how three controllers react.
 
-After half of the time the plant's hand gets heavier. Prints a line per controller: how far the hand sagged at
-most, and how far it still is from its place at the end. Incremental control (himpc) takes the new weight for
-one more thing that the last torque already balanced; a model (osf) stays wrong by its weight.
+After half of the time the plant's hand becomes heavier; the controllers do not know it. Prints a line per
+controller: how far the hand sagged at most, and how far it is from its place at the end. Incremental control
+(himpc) counts from the last torque, which already balances the new weight after one tick; model-based control
+(osf) keeps an error that is proportional to the weight.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from lessons.events import Set
 
 
 def main(seconds: float = 2.0, payload_kg: float = 3.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     for controller in ("himpc", "tdeosf", "osf"):
         session = begin(prepared(torque_scene("iiwa14-hold"), controller, ()), seed=0)
         half, ticks = 0.5 * seconds, round(seconds / session.settings.T_s)
         errors = []
         for tick in range(ticks):
             if tick == ticks // 2:
-                # What happens to a run is an event; it takes effect when the next tick begins.
+                # A change during a run is an event; it takes effect at the beginning of the next tick.
                 session.post(Set("plant.payload_kg", payload_kg))
             session.tick()
             if session.t > half and session.plan is not None:

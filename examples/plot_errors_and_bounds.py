@@ -1,6 +1,6 @@
 """A plot of a run: errors per task, and torques, velocities and positions inside their bounds.
 
-Writes `circle.png` as the page draws it, in one call, and `by-hand.png` for those who want other curves.
+Writes `circle.png`, the page's picture, by one call, and `by-hand.png`, which shows how to plot other curves.
 Prints the names of the files and the largest share of a torque bound.
 """
 
@@ -17,7 +17,7 @@ from lessons.plots.recorded import Recorded, run_picture
 
 
 def main(seconds: float = 4.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     recording = run(prepared(load_scene("iiwa14-circle"), "himpc", ()), seconds)
 
     picture = run_picture("circle", Recorded(recording.layout, recording.rows), None, 1e-3)

@@ -1,10 +1,10 @@
-"""Reading a recording: the arrays of `himpc-lab run SCENE --npz FILE` with nothing but NumPy.
+"""Reading a recording: the arrays of `himpc-lab run SCENE --npz FILE`, read with NumPy alone.
 
     python examples/read_npz.py [FILE.npz]
 
-Without a file a short run is made and written first, as the command line does it. Prints the scene and
-controller, then per task its level and its RMS error per coordinate, then per joint how much of its torque
-limit the run needed.
+Without a file, the program first makes a short run and writes it, as the command line does. Prints the scene
+and controller, then per task its level and its RMS error per coordinate, then per joint how much of its
+torque limit the run needed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from app.__main__ import main as himpc_lab
 
 
 def main(seconds: float = 2.0, file: Path | None = None) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     if file is None:
         file = Path("run.npz")
         himpc_lab(

@@ -1,8 +1,8 @@
-"""Reading the evidence of a tick: cost, KKT residual, priority leak, and which bound binds on whom.
+"""Reading the evidence of a tick: cost, KKT residual, priority leak, and which bound limits which level.
 
-The planar arm's two tasks cannot both be had. Prints, for one tick in the middle of the run, a line per level
-and a line per binding constraint; then, over the whole run, the largest KKT residual, the largest priority
-leak and the QPs that had no verified solution.
+The planar arm cannot do both of its tasks at once. Prints, for one tick in the middle of the run, a line per
+level and a line per binding constraint; then, over the whole run, the largest KKT residual, the largest
+priority leak and the number of QPs without a verified solution.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from lessons import begin, prepared, torque_scene
 
 
 def main(seconds: float = 4.0) -> None:
-    """Prints what the module's docstring says."""
-    # A session is a run that you advance yourself, one tick at a time.
+    """Prints the results that the module describes."""
+    # A session is a run that your program advances one tick at a time.
     session = begin(prepared(torque_scene("planar3-conflict"), "himpc", ()), seed=0)
     ticks = round(seconds / session.settings.T_s)
     residual, leak, unsolved, solved = 0.0, 0.0, 0, 0
     for tick in range(ticks):
         session.tick()
         plan = session.plan
-        assert plan is not None  # there is one after every tick
+        assert plan is not None  # every tick sets the plan
         residual = max(residual, plan.kkt_residual)
         leak = max(leak, plan.leak or 0.0)
         unsolved, solved = unsolved + plan.unsolved, solved + len(plan.levels)

@@ -1,8 +1,8 @@
 """Swapping priorities while the robot moves: `configure` takes new settings between two ticks, bumplessly.
 
-The hand ranks first and the posture second; half-way the posture is ranked first.
-Prints the error of the hand before the swap and at the end, that of the posture likewise, and the largest
-step of the torque at the swap beside the largest one elsewhere.
+The hand has the first priority and the posture the second; half-way they are swapped. Prints the errors of
+hand and posture before the swap and at the end, and the largest step of the torque at the swap beside the
+largest one elsewhere.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robots import Plant, load_robot
 
 
 def main(seconds: float = 4.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     robot = load_robot("panda")
     plant = Plant(robot)
     _, position = plant.frame_pose(robot.tip)

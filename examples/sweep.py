@@ -1,7 +1,8 @@
-"""A sweep in Python: a grid of runs on all cores, kept in a folder, carried on if it was stopped.
+"""A sweep in Python: a grid of runs on all cores, stored in a folder, and continued after an interruption.
 
 The grid is payload × horizon. Prints how many cells there are, the error of each, and the best one; the
-folder `sweep-out` holds cells.jsonl, results.json and map.png. Run it again: nothing is computed twice.
+folder `sweep-out` holds cells.jsonl, results.json and map.png. A second run of this program computes no cell
+again.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from lessons.parallel import Spread, on_cores
 
 
 def main(seconds: float = 1.0, spread: Spread = on_cores) -> None:
-    """Prints what the module's docstring says. spread: how the work is spread; see `lessons.parallel`."""
+    """Prints the results that the module describes. spread: distributes the runs over processes; see
+    `lessons.parallel`."""
     base = RunSpec("iiwa14-circle", duration=seconds)
     sweep = make_sweep(base, ("plant.payload_kg=0:4:2", "horizon=2:6:2"))
     print(f"cells: {len(sweep.points)}")

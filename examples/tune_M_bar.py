@@ -1,4 +1,5 @@
-"""Tuning M̄ as Remark 4 of the paper says: begin small, increase until it is good enough or grows noisy.
+"""Tuning M̄ as Remark 4 of the paper says: begin small, increase it until the error is small or torques are
+noisy.
 
 Prints a line per trial: the factor on the scene's M̄, the error of level 1, the roughness of the torque and
 the verdict; then the diagonal that was chosen, as an assignment for the command line.
@@ -10,7 +11,7 @@ from lessons import chosen, torque_scene, tune
 
 
 def main(seconds: float = 1.0) -> None:
-    """Prints what the module's docstring says."""
+    """Prints the results that the module describes."""
     trials = []
     scene = torque_scene("iiwa14-circle")
     for trial in tune(scene, start=0.1, factor=2.0, accuracy=5e-4, noise=0.05, seconds=seconds):

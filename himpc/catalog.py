@@ -16,7 +16,7 @@ CONTROLLERS: dict[str, str] = {
     "tdeosf_damped": "TDEOSF with damped least squares near singularities",
     "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
 }
-"""Torque level."""
+"""Torque-level controllers: name and description."""
 
 VELOCITY_CONTROLLERS: dict[str, str] = {
     "htmpc": "hierarchical-task MPC: velocity level, lexicographic, previews its references",
@@ -24,18 +24,19 @@ VELOCITY_CONTROLLERS: dict[str, str] = {
     "stmpc": "single-task MPC: the first task of the window, nothing else",
     "htidkc": "hierarchical-task inverse differential kinematics: cascaded QPs, no prediction",
 }
-"""Velocity level."""
+"""Velocity-level controllers: name and description."""
 
 Route = Literal["compiled", "explicit"]
-"""How a tick is computed: by the kernel, or with all rows as printed."""
+"""The implementation that computes a tick: the compiled kernel, or the equations with all rows as printed."""
 
 OWN_METHOD = "goldfarb-idnani"
 """The active-set method of the compiled code, which needs no QP solver."""
 
 
 def qp_method(controller: str, route: Route, solver: str) -> str | None:
-    """The method that solves the QPs of a torque-level controller: `OWN_METHOD`, the solver, or None for a
-    controller that solves none. A level without an optimum may ask DAQP besides."""
+    """Returns the method that solves the QPs of a torque-level controller: `OWN_METHOD`, the solver, or None
+    for a controller that solves none. If the method finds no optimum of a level, DAQP may be used in
+    addition."""
     if controller == "hqp":
         return solver
     if controller not in ("himpc", "hiqp", "nhimpc", "weighted"):

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Solver = Literal["daqp", "proxqp", "qpoases"]
-"""The names of the solvers. `qpoases`, which the paper uses, is part of CasADi and needs it installed, see
-`is_installed`."""
+"""The names of the solvers. The paper uses `qpoases`, which is part of CasADi, see `is_installed`."""
 
 KKT_TOLERANCE = 1e-6
 """A point whose scaled KKT residual is larger counts as unsolved, whatever the solver's status is."""
@@ -62,7 +61,7 @@ def solve_qp(
     solver: Solver = "daqp",
     iterations: int | None = None,
 ) -> QPSolution:
-    """min ½xᵀHx + fᵀx subject to lower ≤ Ax ≤ upper; a row with lower = upper is an equality.
+    """Solves min ½xᵀHx + fᵀx subject to lower ≤ Ax ≤ upper; a row with lower = upper is an equality.
 
     Args:
         H: (k, k), positive definite.
@@ -133,8 +132,9 @@ def _daqp(
     **options: float,
 ) -> tuple[Array, Array, str]:
     if scaled:
-        # DAQP takes rows that are small against √H for zero and drops them without a word: bring H to
-        # size one and rows to length one. Rows that are rounding noise must not be blown up to constraints.
+        # DAQP treats rows that are small relative to √H as zero and ignores them without a message. H is
+        # therefore scaled to size one and rows to length one; rows that are rounding errors must not be
+        # scaled up to constraints.
         size = float(H.trace()) / len(H)
         length = np.sqrt(np.einsum("ij,ij->i", A, A))
         stretch = np.where(length > _NOISE, 1.0 / np.maximum(length, _NOISE), 1.0)
@@ -162,8 +162,8 @@ _DAQP = (
     partial(_daqp, eps_prox=1e-2, eta_prox=1e-12),
     partial(_daqp, scaled=False),
 )
-"""DAQP cycles on, or calls infeasible, 1 % of hard but feasible QPs: proximal steps, or another scaling, then
-find the optimum."""
+"""DAQP does not terminate on, or calls infeasible, 1 % of hard but feasible QPs; proximal steps or another
+scaling then find the optimum."""
 
 
 def _proxqp(
@@ -188,7 +188,7 @@ def _qpoases(
     casadi = import_module("casadi")
     shapes = {"h": casadi.Sparsity.dense(*H.shape), "a": casadi.Sparsity.dense(*A.shape)}
     options = {"printLevel": "none", "error_on_fail": False, "print_time": False}
-    # A solver of its own for every QP: a warm start would make the point depend on what was solved before.
+    # Every QP gets a new solver object: with a warm start, the point would depend on the QPs solved before.
     with redirect_stdout(StringIO()):  # qpOASES prints its licence
         qp = casadi.conic("qp", "qpoases", shapes, options)
         found = qp(h=H, g=f, a=A, lba=lower, uba=upper)
@@ -203,10 +203,10 @@ _ATTEMPTS = {"daqp": _DAQP, "proxqp": (_proxqp,), "qpoases": (_qpoases,)}
 def kkt_residual(
     H: Array, f: Array, A: Array, lower: Array, upper: Array, x: Array, multipliers: Array
 ) -> float:
-    """Largest violation of the KKT conditions, in part scaled by max(1, ‖H‖‖x‖, ‖f‖).
+    """Returns the largest violation of the KKT conditions, in part scaled by max(1, ‖H‖‖x‖, ‖f‖).
 
-    Stationarity, the multipliers' signs and complementarity are scaled; feasibility is absolute.
-    A point that is not finite has an infinite residual.
+    Stationarity, the multipliers' signs and complementarity are scaled; feasibility is absolute. A point that
+    is not finite has an infinite residual.
     """
     gradient = H @ x + f + A.T @ multipliers
     scale = max(1.0, _norm(H) * _norm(x), _norm(f))
@@ -227,7 +227,7 @@ def row_residual(value: Array, lower: Array, upper: Array, multipliers: Array, s
     if not value.size:
         return 0.0
     gap = np.minimum(upper - value, value - lower)
-    # A multiplier belongs to the bound it pushes from: its product with that bound's gap must vanish.
+    # The sign of a multiplier selects one of the two bounds: the product with that bound's gap must be zero.
     # The cap makes the product of an infinite gap and a zero multiplier zero.
     own = np.where(multipliers > 0, upper - value, value - lower)
     product = np.abs(multipliers) * np.minimum(np.abs(own), 1e6)

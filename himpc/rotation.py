@@ -13,23 +13,23 @@ _ORIGIN = np.zeros(3)
 
 
 def log3(R: Array) -> Array:
-    """Rotation vector of R, (3,) rad, ‖·‖ ≤ π."""
+    """Returns the rotation vector of R, (3,) rad, ‖·‖ ≤ π."""
     return pin.log3(R)
 
 
 def exp3(w: Array) -> Array:
-    """Rotation matrix (3, 3) of the rotation vector w, rad."""
+    """Returns the rotation matrix (3, 3) of the rotation vector w, rad."""
     return pin.exp3(w)
 
 
 def quaternion(R: Array) -> Array:
-    """Unit quaternion (x, y, z, w) of R, with w ≥ 0."""
+    """Returns the unit quaternion (x, y, z, w) of R, with w ≥ 0."""
     # pin.Quaternion(R) is not used: each call leaks 80 bytes, which is 5 MB per minute of simulation.
     q = pin.SE3ToXYZQUAT(pin.SE3(R, _ORIGIN))[3:]
     return q if q[3] >= 0 else -q
 
 
 def from_quaternion(xyzw: Array) -> Array:
-    """Rotation matrix of a quaternion (x, y, z, w) of any non-zero length."""
+    """Returns the rotation matrix of a quaternion (x, y, z, w) of any non-zero length."""
     x, y, z, w = np.asarray(xyzw, float) / math.sqrt(float(np.dot(xyzw, xyzw)))
     return pin.Quaternion(w, x, y, z).toRotationMatrix()

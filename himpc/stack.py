@@ -54,7 +54,7 @@ Stack = tuple[Level, ...]
 
 
 def check_names(stack: Stack) -> None:
-    """Raises InputError if two tasks share a name: events and telemetry could not tell them apart."""
+    """Raises InputError if two tasks have the same name: events and telemetry refer to tasks by name."""
     names = [task.name for level in stack for task in level.tasks]
     twice = {name for name in names if names.count(name) > 1}
     if twice:
@@ -62,24 +62,24 @@ def check_names(stack: Stack) -> None:
 
 
 def essence(task: Task) -> Task:
-    """Returns the task without its gains: the quantity that it controls."""
+    """Returns the task without its gains: they do not change the quantity that it controls."""
     return replace(task, K_p=0.0, K_v=0.0)
 
 
 def about(task: Task) -> Task:
-    """Returns the essence without name and axes: tasks that are equal in this control the same quantity of
-    the same frame or joints."""
+    """Returns the task without gains, name and axes: equal results control the same quantity of the same
+    frame or joints."""
     task = replace(task, name="", K_p=0.0, K_v=0.0)
     return replace(task, axes=AXES) if isinstance(task, OnAxes) else task
 
 
 def active_levels(stack: Stack, damping: bool, freedom: int) -> Stack:
-    """The levels a controller solves, highest priority first.
+    """Returns the levels that a controller solves, highest priority first.
 
     Args:
         stack: all levels.
         damping: whether the last level may be added.
-        freedom: directions that the enabled levels leave free (`freedom_left`).
+        freedom: number of directions that the enabled levels leave free (`freedom_left`).
     """
     enabled = tuple(level for level in stack if level.enabled)
     return (*enabled, DAMPING_LEVEL) if damping and freedom else enabled
@@ -92,8 +92,8 @@ def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, in
     """Returns for each enabled level the number of directions that it can control at this configuration, and
     its number of rows.
 
-    The first number is what its Jacobian adds to the rank of the levels above. If it is smaller than the
-    number of rows, the levels above or the arm itself leave too few directions.
+    The first number is the amount by which its Jacobian increases the rank of the levels above. If it is
+    smaller than the number of rows, the levels above or the arm itself leave too few directions.
     """
     found: dict[str, tuple[int, int]] = {}
     J, before = np.zeros((0, configuration.q.size)), 0
@@ -115,8 +115,8 @@ _RANK = 1e-6
 def freedom_left(robot: Robot, stack: Stack) -> int:
     """Returns n minus the generic rank of the enabled levels' stacked Jacobian.
 
-    Generic: the largest rank over a few random configurations, so that a passing singularity does
-    not count as freedom.
+    Generic: the largest rank over a few random configurations, so that a singularity at a single
+    configuration does not count as freedom.
     """
     tasks = [task for level in stack if level.enabled for task in level.tasks]
     if not tasks:

@@ -58,7 +58,7 @@ _PER_JOINT = (
     "v_measured",
 )
 PER_LEVEL = ("cost", "kkt", "rung", "time_us", "leak", "active")
-"""Fields of one number per level, side by side."""
+"""The fields of each level, one number each, in this order."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,11 @@ class TaskInfo:
 class Layout:
     """The position of each field in a row.
 
-    `q` and `v` are the plant's, `q_measured` and `v_measured` what the controller was given; `tau_0` is what
-    acted until then. Per task `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w),
-    `error/<task>`, `v_d/<task>`, `a_d/<task>` (m each; three where the target is a point to look at); per
-    level the fields cost, kkt, rung (index into FALLBACKS), time_us, leak and active (number of binding
-    constraints), NaN where the level was not solved.
+    `q` and `v` are the plant's, `q_measured` and `v_measured` the values that the controller received;
+    `tau_0` is the torque that acted until then. Per task `x/<task>` and `x_d/<task>` (coordinates, or a
+    quaternion x y z w), `error/<task>`, `v_d/<task>`, `a_d/<task>` (m each; three if the target is a point to
+    look at); per level the fields cost, kkt, rung (index into FALLBACKS), time_us, leak and active (number of
+    binding constraints), NaN for a level that was not solved.
     """
 
     size: int
@@ -90,7 +90,8 @@ class Layout:
 
 
 def layout_of(robot: Robot, stack: Stack) -> Layout:
-    """The layout for a robot and all levels of a stack, whatever their order; damping comes last."""
+    """Returns the layout for a robot and all levels of a stack, independent of their order; damping comes
+    last."""
     ordered = tuple(sorted(stack, key=lambda level: level.name))
     levels = (*(level.name for level in ordered), DAMPING_LEVEL.name)
     return arranged(robot, ordered, levels, _SCALARS, _PER_JOINT, PER_LEVEL)
@@ -147,8 +148,8 @@ def arranged(
 
 
 def relaid(rows: Array, old: Layout, new: Layout) -> Array:
-    """Converts rows, (k, size), to another layout; fields that the rows do not have in the same width become
-    NaN."""
+    """Converts rows, (k, size), to another layout; fields that do not exist in the rows with the same width
+    become NaN."""
     found = np.full((len(rows), new.size), math.nan)
     for name, where in new.fields.items():
         before = old.fields.get(name)

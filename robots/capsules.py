@@ -58,7 +58,7 @@ def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[MeshP
 
 
 def _farthest(model: pin.Model, joint: int) -> np.ndarray:
-    """Position of the farthest frame that a last body carries, in its joint's frame, m."""
+    """Returns the position of the farthest frame on a body without children, in its joint's frame, m."""
     own = [frame.placement.translation for frame in model.frames if frame.parentJoint == joint]
     return max(own, key=lambda at: float(np.linalg.norm(at)))
 
@@ -103,14 +103,15 @@ def _drum(model: pin.Model, joint: int, radius: float) -> MeshPart:
 
 
 def _along(vertices: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Vertices modelled along z, turned so that z points along `direction`."""
+    """Returns vertices that are modelled along z, rotated so that z points along `direction`."""
     unit = direction / np.linalg.norm(direction)
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), unit).toRotationMatrix()
     return vertices @ turn.T
 
 
 def _hard_edged(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Caps and mantle with vertices of their own, so that shading does not blur the rim."""
+    """Returns the mesh with separate vertices for caps and mantle, so that shading keeps the edge between
+    them sharp."""
     faces = np.asarray(solid.faces)
     directions = np.round(1.2 * np.asarray(solid.face_normals)).astype(int)
     mantle = np.where(np.abs(directions[:, 2]) > 0, directions[:, 2], 0)
@@ -122,7 +123,8 @@ def _hard_edged(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _radius(model: pin.Model, joint: int, thickness: float) -> float:
-    """Radius of a capsule, m: it decreases towards the tip, which makes the chain easier to see."""
+    """Returns the radius of a capsule, m: it decreases towards the tip, which makes the chain easier to
+    see."""
     depth = len(model.supports[joint]) - 1
     deepest = max(len(support) for support in model.supports) - 1
     return thickness * (1.0 - 0.4 * depth / max(deepest, 1))

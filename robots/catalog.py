@@ -15,7 +15,7 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class CatalogEntry:
-    """One robot of the catalog. Angles in degrees here, because that is how the sources print them."""
+    """One robot of the catalog. Angles are in degrees, as in the sources."""
 
     name: str
     title: str
@@ -31,7 +31,7 @@ class CatalogEntry:
 
     @property
     def home(self) -> np.ndarray:
-        """(n,) rad."""
+        """Home configuration, (n,) rad."""
         import numpy as np  # imported here, which keeps NumPy out of programs that only list the catalog
 
         return np.radians(self.home_deg)

@@ -35,7 +35,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Box:
-    """A box in the world: centre and edge lengths, m, turned about the vertical by yaw, rad."""
+    """A box in the world: centre and edge lengths, m, rotated about the vertical by yaw, rad."""
 
     name: str
     centre: Point
@@ -48,7 +48,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Floor:
-    """Everything below a height, m; spheres of a mobile base, which stands on it, are exempt."""
+    """Everything below a height, m; spheres of a mobile base, which stands on the floor, are exempt."""
 
     name: str = "floor"
     height: float = 0.0
@@ -145,7 +145,7 @@ def _shape(obstacle: Obstacle, joint: Indices, base: int) -> _Shape:
 
 
 def _own_base(base: int, joint: Indices, centre: Array, radius: Array) -> _Shape:
-    """The base as the box around its own spheres; links next to it cannot be kept clear of it."""
+    """Returns the base as the box around its own spheres; the links next to it are not checked against it."""
     own = joint == base
     low = (centre[own] - 0.6 * radius[own, None]).min(axis=0)
     high = (centre[own] + 0.6 * radius[own, None]).max(axis=0)

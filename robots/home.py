@@ -38,10 +38,10 @@ def find_home(
 ) -> np.ndarray:
     """Returns a configuration (n,), rad, inside the limits and away from singularities and from the limits.
 
-    Maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖² over samples and then by coordinate
-    steps, J with its linear part over the reach; deterministic. Joints that do not move the frame rest
-    at the middle of their range (unbounded ones at 0). A chain that dips below
-    the floor (z = 0, or the first joint if lower) gets a lower score, an elbow above the tip a higher one.
+    Maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖² over samples and then by random steps, with
+    the linear part of J divided by the reach; deterministic. Joints that do not move the frame are at the
+    middle of their range (unbounded ones at 0). A chain that reaches below the floor (z = 0, or the first
+    joint if lower) gets a lower score, an elbow above the tip a higher one.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -114,7 +114,7 @@ def sensible_a_max(
 
 
 def _reach(model: pin.Model, frame: int) -> float:
-    """m, the length of the chain from the first joint to the frame."""
+    """Returns the length of the chain from the first joint to the frame, m."""
     chain = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0][1:]
     lengths = [float(np.linalg.norm(model.jointPlacements[joint].translation)) for joint in chain]
     return sum(lengths) + float(np.linalg.norm(model.frames[frame].placement.translation))

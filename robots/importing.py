@@ -68,7 +68,7 @@ def import_robot(
 
 
 def bounds(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Position limits of a canonical model, ±inf where a joint is unbounded."""
+    """Returns the position limits of a canonical model, ±inf for unbounded joints."""
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
     return np.where(lower <= -UNBOUNDED, -np.inf, lower), np.where(upper >= UNBOUNDED, np.inf, upper)
 

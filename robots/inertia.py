@@ -35,7 +35,7 @@ def sample_configurations(
 
 
 def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
-    """M(q), kg·m², symmetric (Pinocchio's `crba` fills the upper triangle only)."""
+    """Returns M(q), kg·m², symmetric (Pinocchio's `crba` fills the upper triangle only)."""
     return _symmetric(pin.crba(model, data, q))
 
 
@@ -47,19 +47,19 @@ def _symmetric(M: np.ndarray) -> np.ndarray:
 def suggest_M_bar(
     model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray, samples: int = 200, seed: int = 0
 ) -> np.ndarray:
-    """(n,) a constant diagonal M̄, kg·m², for which time-delay estimation converges on all samples.
+    """Returns a constant diagonal M̄, (n,) kg·m², for which time-delay estimation converges on all samples.
 
-    The estimation error is multiplied by I − M⁻¹M̄ from one period to the next, so its spectral radius has
-    to be below 1 (HIMPC, T-RO 2024, Remark 4). M⁻¹M̄ is similar to S = M̄^½ M⁻¹ M̄^½, symmetric and positive
+    The estimation error is multiplied by I − M⁻¹M̄ from one period to the next, so its spectral radius has to
+    be below 1 (HIMPC, T-RO 2024, Remark 4). M⁻¹M̄ is similar to S = M̄^½ M⁻¹ M̄^½, symmetric and positive
     definite, so its eigenvalues are real and positive, and the radius is below 1 iff λ_max(S) < 2. Steps:
 
-    1. shape: D_i = min over samples of 1/(M⁻¹)_ii, the least inertia joint i ever shows when the other
-       joints are free, so joints of very different size each get their own scale;
+    1. shape: D_i = min over samples of 1/(M⁻¹)_ii, the least inertia of joint i while the other joints are
+       free, so joints of very different size each get their own scale;
     2. size: M̄ = LARGEST_EIGENVALUE · D / max over samples of λ_max(D^½ M⁻¹ D^½). Between the samples
-       λ(S) is larger: the page of the lesson *Your robot* finds 1.74 on its lamp, which leaves room for a
+       λ(S) is larger: the page of the lesson *Your robot* finds 1.74 on its lamp, which is still stable for a
        plant that is 13 % lighter than the model.
 
-    Larger M̄ estimates better and amplifies noise (Remark 4).
+    A larger M̄ improves the estimate and amplifies noise (Remark 4).
     """
     data = model.createData()
     configurations = sample_configurations(q_lower, q_upper, samples, seed)
@@ -71,10 +71,11 @@ def suggest_M_bar(
 
 
 def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
-    """(‖I − M⁻¹M̄‖₂, spectral radius of I − M⁻¹M̄) for a mass matrix M (n, n) and a diagonal M̄ (n,), kg·m².
+    """Returns (‖I − M⁻¹M̄‖₂, spectral radius of I − M⁻¹M̄) for a mass matrix M (n, n) and a diagonal M̄ (n,),
+    kg·m².
 
-    Below 1 in the norm: every error shrinks at every step (the paper's condition). Below 1 in the radius
-    only: errors die out, but may grow first. Raises LinAlgError if M is singular.
+    If the norm is below 1, every error shrinks at every step (the paper's condition). If only the radius is
+    below 1, errors vanish, but may grow first. Raises LinAlgError if M is singular.
     """
     diagonal = np.asarray(M_bar, dtype=float)
     inverse, root = np.linalg.inv(M), np.sqrt(diagonal)
@@ -86,9 +87,10 @@ def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
 
 
 def convergence_eigenvalues(M: np.ndarray, M_bar: np.ndarray) -> np.ndarray:
-    """Eigenvalues of I − M⁻¹M̄, (n,), the largest first: what a step leaves of each mode of the error.
+    """Returns the eigenvalues of I − M⁻¹M̄, (n,), the largest first: the factors by which a step multiplies
+    each mode of the error.
 
-    All are real, for M⁻¹M̄ is similar to a symmetric matrix: near 1 an error dies out slowly, below 0 it
+    All are real, for M⁻¹M̄ is similar to a symmetric matrix: near 1 an error decays slowly, below 0 it
     changes its sign at every step, below −1 it grows. Arguments and errors as in `convergence_gauge`.
     """
     root = np.sqrt(np.asarray(M_bar, dtype=float))

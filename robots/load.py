@@ -20,7 +20,7 @@ from robots.urdf import canonicalise, load_bytes
 def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
     """Returns the robot with this catalog name, or the one that a URDF file describes.
 
-    tip: its default end-effector frame; None takes the catalog's, or the end of the longest chain.
+    tip: its default end-effector frame; None: the catalog's, or the end of the longest chain.
     within: a folder, without symbolic links, that must contain the URDF file and its meshes (installed meshes
     excepted); None: they may be anywhere.
     Raises InputError, one sentence that says what to do, for an unknown name, a missing file, a
@@ -48,9 +48,9 @@ def load_urdf_text(text: str, tip: str | None = None) -> Robot:
 
 
 def check_urdf(path: str | Path) -> ImportReport:
-    """Returns the import report of a URDF file: what the import repairs, fills, fixes or refuses.
+    """Returns the import report of a URDF file: everything that the import repairs, adds, fixes or refuses.
 
-    Never raises for bad content; raises InputError when there is no such file.
+    Invalid content raises no exception; InputError is raised if there is no such file.
     """
     return _import_file(Path(path), None).report
 

@@ -61,8 +61,8 @@ def installed_mesh(uri: str) -> Path | None:
 def find_mesh(uri: str, folder: Path) -> Path | None:
     """Returns the file that a mesh URI names in a URDF of the machine's owner, or None.
 
-    Plain paths and `file://` count from `folder`. `package://pkg/rest` is looked up in the ancestors of
-    `folder`, the ROS package path and the installed packages; nothing is ever fetched.
+    Plain paths and `file://` are relative to `folder`. `package://pkg/rest` is looked up in the ancestors of
+    `folder`, the ROS package path and the installed packages; nothing is downloaded.
     """
     if not uri.strip() or "\0" in uri:
         return None
@@ -78,7 +78,8 @@ def find_mesh(uri: str, folder: Path) -> Path | None:
 
 
 def _package_parts(uri: str) -> tuple[str, str] | None:
-    """(package, path inside it) of a `package://` URI that stays inside its package."""
+    """Returns (package, path inside it) of a `package://` URI that stays inside its package; None for any
+    other URI."""
     scheme, separator, rest = uri.partition("://")
     package, _, path = rest.partition("/")
     if scheme not in ("package", "model") or not separator or "\0" in rest or "\\" in rest:

@@ -64,9 +64,9 @@ class NominalModel:
         self._damping = plant.per_joint("damping", robot.n)
 
     def mass_matrix(self, q: Array) -> Array:
-        """M(q) with armature, (n, n) symmetric, kg·m²."""
+        """Returns M(q) with armature, (n, n) symmetric, kg·m²."""
         return mass_matrix(self._model, self._data, q)
 
     def bias(self, q: Array, v: Array) -> Array:
-        """The torque that keeps q̈ = 0, (n,) N·m."""
+        """Returns the torque that keeps q̈ = 0, (n,) N·m."""
         return np.asarray(pin.nonLinearEffects(self._model, self._data, q, v) + self._damping * v)

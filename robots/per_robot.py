@@ -1,4 +1,4 @@
-"""`per_robot`: results that are computed once for each robot and forgotten with it."""
+"""`per_robot`: results that are computed once for each robot and deleted together with it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ Result = TypeVar("Result")
 
 
 def per_robot(compute: Callable[Concatenate[Robot, P], Result]) -> Callable[Concatenate[Robot, P], Result]:
-    """Keeps the results of a function of a robot and other hashable arguments for as long as the robot lives.
+    """Stores the results of a function of a robot and other hashable arguments for as long as the robot
+    exists.
 
     A server builds a new robot for every page that opens a scene: `functools.lru_cache` would keep hundreds
-    of robots that nobody uses any more. The results must not refer to the robot.
+    of robots that are no longer used. The results must not refer to the robot.
     """
     results: WeakKeyDictionary[Robot, dict[Any, Result]] = WeakKeyDictionary()
 

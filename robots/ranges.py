@@ -34,7 +34,7 @@ class Range:
         )
 
     def __str__(self) -> str:
-        """For messages: "from 1 to 60", "above 0", nothing if every number is allowed."""
+        """Returns the range for messages: "from 1 to 60", "above 0", nothing if every number is allowed."""
         if math.isfinite(self.low) and math.isfinite(self.high):
             return f"{'above' if self.above else 'from'} {self.low:g} to {self.high:g}"
         if math.isfinite(self.low):
@@ -65,7 +65,7 @@ def field_types(owner: type) -> dict[str, Any]:
 
 
 def check_fields(owner: Any, prefix: str = "") -> None:
-    """Raises InputError, naming the field and what is allowed, if a number of a dataclass is outside its
+    """Raises InputError, naming the field and the allowed values, if a number of a dataclass is outside its
     range or a word is not in its Literal. Fields without range and Literal are not checked.
 
     Args:
@@ -87,7 +87,7 @@ def check_numbers(name: str, value: Any, allowed: Range, whole: bool = False) ->
     several = isinstance(value, (list, tuple, np.ndarray))
     for each in np.ravel(np.asarray(value, dtype=object)) if several else (value,):
         number = isinstance(each, (int, float, np.integer, np.floating)) and not isinstance(each, bool)
-        # A whole number may be too long for a float.
+        # An integer may be too large for a float.
         if not number or abs(each) > 1e300 or not allowed.holds(float(each)):
             what = "whole number" if whole else "number"
             give = f"numbers {allowed}" if several else f"a {what} {allowed}"

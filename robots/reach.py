@@ -24,8 +24,13 @@ _MARGIN = 1e-4
 
 @dataclass(frozen=True)
 class ReachResult:
-    """q (n,) rad, the best configuration found inside the limits; position_error m; rotation_error rad (0 if
-    no rotation was given); reachable: both within 2 mm and 1°.
+    """The best configuration found.
+
+    Attributes:
+        q: (n,) rad, inside the limits.
+        position_error: m.
+        rotation_error: rad; 0 if the target has no rotation.
+        reachable: whether the errors are within 2 mm and 1°.
     """
 
     q: Array

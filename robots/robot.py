@@ -60,7 +60,7 @@ class Robot:
         return tuple(self._frame_ids)
 
     def frame_id(self, name: str) -> int:
-        """Index of a frame in `model.frames`.
+        """Returns the index of a frame in `model.frames`.
 
         Raises InputError, with the nearest name and the full list, for a name that is not a link.
         """
@@ -70,7 +70,8 @@ class Robot:
             raise unknown_name(f"frame of robot '{self.name}' called", name, self.frames) from None
 
     def moving_body(self, name: str) -> int:
-        """Pinocchio index of the joint that moves a body, named by that joint or by any frame on it.
+        """Returns the Pinocchio index of the joint that moves a body; the body is named by that joint or by
+        any frame on it.
 
         Raises InputError for an unknown name and for a frame that is fixed to the world.
         """

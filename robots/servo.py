@@ -30,12 +30,13 @@ class VelocityPlantSettings:
             τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
         bandwidth: bandwidth of the servos, 1/s.
         lag_ms: time constant of a first-order lag between command and servo.
-        delay_ms: the command acts this much later.
+        delay_ms: delay of the command.
         position_noise: standard deviation of white Gaussian noise on the measured q, rad (m).
         velocity_noise: the same on the measured v, rad/s (m/s).
-        payload_kg: payload of the mechanics as in `PlantSettings`, in "servo" mode only.
-        friction: likewise; the servo does not know of it.
-        damping: likewise.
+        payload_kg: payload of the mechanics as in `PlantSettings`, in "servo" mode only; the servo's model
+            does not contain it.
+        friction: the same for friction.
+        damping: the same for damping.
         saturate: clip at the torque limits.
 
     Raises InputError, naming the field, for values that are not allowed.
@@ -57,7 +58,7 @@ class VelocityPlantSettings:
         self.mechanics()  # checks saturate
 
     def mechanics(self) -> PlantSettings:
-        """The settings of the mechanics below the servos."""
+        """Returns the settings of the mechanics that the servos drive."""
         return PlantSettings(
             payload_kg=self.payload_kg, friction=self.friction, damping=self.damping, saturate=self.saturate
         )
@@ -110,7 +111,7 @@ class VelocityPlant:
         return self._plant.tau if self.settings.mode == "servo" else None
 
     def reset(self, q: np.ndarray, v: np.ndarray | None = None) -> None:
-        """Puts the robot at q with velocity v (default 0), as if v had been commanded for long; t = 0.
+        """Puts the robot at q with velocity v (default 0), as if v had been commanded for a long time; t = 0.
 
         Raises ValueError for vectors of the wrong length or with non-finite entries.
         """
@@ -123,7 +124,7 @@ class VelocityPlant:
         self._noise = self._random.standard_normal((2, self.n))
 
     def configure(self, settings: VelocityPlantSettings) -> None:
-        """Changes the plant while it runs: t, q, v and the commands under way stay.
+        """Changes the plant while it runs; t, q, v and the delayed commands are kept.
 
         Raises InputError, and changes nothing, for per-joint lists of the wrong length.
         """
@@ -133,13 +134,13 @@ class VelocityPlant:
         self.settings = settings
 
     def measure(self) -> PlantState:
-        """The state as the sensors see it. Calling it changes nothing; the noise is new after every step."""
+        """Returns the measured state. Calling it changes nothing; the noise is new after every step."""
         settings = self.settings
         q = self._q + settings.position_noise * self._noise[0]
         return PlantState(self._t, q, self._v + settings.velocity_noise * self._noise[1])
 
     def step(self, command: np.ndarray, period: float) -> np.ndarray:
-        """Gives the velocity command (n,) for `period` s; returns the velocity (n,) at its end.
+        """Applies the velocity command (n,) for `period` s; returns the velocity (n,) at its end.
 
         Raises ValueError for a command that is not n finite numbers: nothing is simulated then.
         """
@@ -163,7 +164,7 @@ class VelocityPlant:
         return self._v.copy()
 
     def _serve(self, wanted: np.ndarray, h: float) -> None:
-        """One internal step under the servos' torque."""
+        """Computes one internal step under the servos' torque."""
         plant = self._plant
         push = self.settings.bandwidth * (wanted - self._v)
         plant.step(plant.mass_matrix() @ push + plant.bias(), h)

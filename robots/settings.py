@@ -17,7 +17,7 @@ PerJoint = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """Parameters of the plant, which no controller sees. The defaults describe the nominal robot.
+    """Parameters of the plant, which controllers do not use. The defaults describe the nominal robot.
 
     Attributes:
         payload_kg: kg, a point mass at the robot's tip frame.
@@ -26,12 +26,13 @@ class PlantSettings:
         damping: N·m·s/rad, viscous friction.
         armature: kg·m², reflected rotor inertia, added to M_ii.
         mass_scale: factor on the mass of the body each joint moves.
-        inertia_scale: factor on its rotational inertia about its centre of mass, whose position stays. The
-            same value for both factors describes a body of another density. The payload is not scaled.
-        diagonal_scale: factor on the diagonal entries of M(q) in the dynamics, whatever q, off-diagonal
-            entries, C and g left as they are: the literal reading of the HIMPC paper's Table V. No mechanism
-            behaves like this: energy is not kept, and below 1 M(q) may lose definiteness (the run then flies
-            apart).
+        inertia_scale: factor on its rotational inertia about its centre of mass, whose position is not
+            changed. The same value for both factors describes a body of another density. The payload is not
+            scaled.
+        diagonal_scale: factor on the diagonal entries of M(q) in the dynamics at every q, with off-diagonal
+            entries, C and g unchanged: the literal reading of the HIMPC paper's Table V. No mechanism behaves
+            like this: energy is not conserved, and below 1 M(q) may become indefinite (the simulation then
+            diverges).
         encoder_resolution_deg: degrees; with a value above 0 the measured position of revolute joints is
             rounded to multiples of it and the measured velocity is their backward difference.
         torque_lag_ms: ms, time constant of a first-order lag of the motors.
@@ -46,7 +47,8 @@ class PlantSettings:
     friction: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
     damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
     armature: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    # Below, a link is practically massless, or M(q) all but surely indefinite: the simulation is meaningless.
+    # With smaller factors a link has practically no mass, or M(q) is almost certainly indefinite, and the
+    # simulation is meaningless.
     mass_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
     inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
     diagonal_scale: Annotated[PerJoint, Range(0.1, 10.0)] = 1.0

@@ -20,16 +20,16 @@ from robots.urdf.read import Refusal, placement
 MAX_TOTAL = 400_000  # faces of a robot
 _FARTHEST = 1e3  # m, largest distance of a point from its joint
 _COLOURS = 8  # largest number of shapes of a link: each is a separate object on the page
-_DEFAULT = (205, 209, 216)  # colour of a mesh that names none
+_DEFAULT = (205, 209, 216)  # colour of a mesh without a colour
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
     """One coloured piece of a robot's surface.
 
-    joint: the Pinocchio joint whose frame it moves with, 0 = the world; vertices (V, 3) float32, m, in that
-    joint's frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique.
-    Vertices are shared only where the surface is smooth; averaged vertex normals shade it well.
+    joint: the Pinocchio joint in whose frame the piece is fixed, 0 = the world; vertices (V, 3) float32, m,
+    in that frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique.
+    Vertices are shared only where the surface is smooth; averaged vertex normals can be used for shading.
     """
 
     joint: int
@@ -95,7 +95,7 @@ def _visual(
 
 
 def _geometry(shape: Element, meshes: Mapping[str, tuple[Piece, ...]]) -> Iterator[Piece]:
-    """Raises ValueError for a size that is no number."""
+    """Yields the pieces of one geometry element. Raises ValueError for a size that is no number."""
     if shape.tag == "mesh":
         scale = np.broadcast_to(_numbers(shape, "scale", "1 1 1"), 3)
         for colour, vertices, faces in meshes.get(shape.get("filename", ""), ()):

@@ -25,7 +25,7 @@ class PlantState:
 class Motors:
     """Command → torque on the joints: saturation, then pure delay, then first-order lag.
 
-    The memory is kept in time, not in steps, so the internal step may change between commands.
+    Commands are stored with their times and not by steps, so the internal step may change between commands.
     """
 
     def __init__(self, tau: np.ndarray, t: float) -> None:
@@ -33,7 +33,7 @@ class Motors:
         self.torque = tau.copy()  # (n,) N·m acting on the joints
 
     def command(self, tau: np.ndarray, t: float) -> None:
-        """Takes a (clipped) command given at time t, s."""
+        """Stores a (clipped) command given at time t, s."""
         commands = self._commands
         commands.append((t, tau))
         while len(commands) > 1 and commands[1][0] < t - _MEMORY_S:
@@ -70,17 +70,17 @@ class Encoders:
         self._samples: deque[tuple[float, np.ndarray]] = deque([(t, q.copy())])
 
     def record(self, q: np.ndarray, t: float) -> None:
-        """Remembers the true position at time t, s."""
+        """Stores the true position at time t, s."""
         samples = self._samples
         samples.append((t, q))
         while samples[0][0] < t - _SAMPLES_S:
             samples.popleft()
 
     def read(self, period: float, resolution: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(q, v) as measured: q rounded to multiples of `resolution` (n,), rad; 0 leaves it as it is.
+        """Returns (q, v) as measured: q rounded to multiples of `resolution` (n,), rad; 0 means no rounding.
 
-        v is the difference to the rounded position one `period` (s) ago; before the first period the
-        joints are taken to have come with the velocity they were reset to. Reading changes nothing.
+        v is the difference to the rounded position one `period` (s) ago; for times before the reset, the
+        joints are assumed to have moved with the velocity of the reset. Reading changes nothing.
         """
         now, q = self._samples[-1]
         then, before = self._at(now - period)
@@ -100,13 +100,13 @@ class Encoders:
 
 
 def quantise(q: np.ndarray, resolution: np.ndarray) -> np.ndarray:
-    """q rounded to the nearest multiple of `resolution`, element by element; 0 leaves it as it is."""
+    """Returns q rounded to the nearest multiple of `resolution`, element by element; 0 means no rounding."""
     safe = np.where(resolution > 0.0, resolution, 1.0)
     return np.where(resolution > 0.0, np.round(q / safe) * safe, q)
 
 
 def as_vector(name: str, value: np.ndarray, n: int) -> np.ndarray:
-    """A copy of n finite numbers. Raises ValueError, naming what it is, for anything else."""
+    """Returns a copy of n finite numbers. Raises ValueError, with the name, for any other value."""
     array = np.array(value, dtype=float)
     if array.shape != (n,) or not (math.isfinite(array.sum()) or np.isfinite(array).all()):
         raise ValueError(f"{name} must be {n} finite numbers, not {array}")

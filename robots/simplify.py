@@ -1,4 +1,4 @@
-"""Fewer triangles for the browser, by clustering vertices on a grid."""
+"""Reduces the number of triangles for the browser, by clustering vertices on a grid."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 
 def simplify(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """(vertices, faces) with at most about `most` faces; unchanged when there are few enough.
+    """Returns (vertices, faces) with at most about `most` faces; they are unchanged if there are few enough.
 
-    Vertices in one cell of a grid move to their mean; they stay apart when their normals point to
-    different sides, so creases survive, but share the position, so no gap opens. The cell grows until it
-    is coarse enough.
+    Vertices in one cell of a grid move to their mean. Vertices whose normals point to different sides stay
+    separate, so creases are kept, but have the same position, so no gap opens. The cell grows until it is
+    coarse enough.
     """
     if len(faces) <= most:
         return vertices, faces
@@ -23,7 +23,7 @@ def simplify(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.nda
         0.5
         * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     )
-    # Two triangles per cell cover the surface; half of that size is a safe place to start.
+    # Two triangles per cell cover the surface; the search begins with half of that cell size.
     cell = max(0.5 * float(np.sqrt(2.0 * area / most)), 1e-6 * extent)
     result = vertices, faces
     while len(result[1]) > most and cell < extent:
@@ -52,7 +52,7 @@ def _cluster(
 
 
 def _labels(rows: np.ndarray) -> np.ndarray:
-    """A number per row, equal for equal rows of integers."""
+    """Returns a number per row, equal for equal rows of integers."""
     shifted = rows - rows.min(axis=0)
     spans = shifted.max(axis=0) + 1
     codes = np.zeros(len(rows), dtype=np.int64)

@@ -37,11 +37,11 @@ _SLENDER = 0.05
 
 
 def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:
-    """Returns the spheres of a robot: placed by hand for the mobile manipulator of the catalog, and along the
-    links for other robots.
+    """Returns the spheres of a robot: given by hand for the mobile manipulator of the catalog, generated
+    along the links for other robots.
 
-    The generated ones follow the straight lines from each joint to the next and to the tip, in steps of
-    their radius, a twentieth of the chain's length.
+    The generated ones follow the straight lines from each joint to the next and to the tip, in steps of their
+    radius, a twentieth of the chain's length.
     """
     return _BY_ROBOT.get(robot.name) or _along_links(robot)
 

@@ -12,7 +12,8 @@ _STARTS = 8
 
 
 def horizontal_reach(robot: Robot, first: int) -> float:
-    """The largest horizontal distance of the tip from the base's own axis, m, within the joints' range.
+    """Returns the largest horizontal distance of the tip from the base's own axis, m, within the joints'
+    range.
 
     Args:
         robot: the robot.

@@ -10,10 +10,10 @@ from robots.settings import PlantSettings
 
 
 def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
-    """A copy of the robot's model with the plant's masses, inertias, payload, armature and gravity.
+    """Returns a copy of the robot's model with the plant's masses, inertias, payload, armature and gravity.
 
-    Each joint's body is scaled first; then the payload, a point mass at the tip, is added to the
-    body that carries the tip. Raises InputError for a per-joint list of the wrong length.
+    Each joint's body is scaled first; then the payload, a point mass at the tip, is added to the body that
+    carries the tip. Raises InputError for a per-joint list of the wrong length.
     """
     model: pin.Model = robot.model.copy()
     scales = zip(
@@ -34,26 +34,29 @@ def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
 
 
 def joint_axis(model: pin.Model, joint: int) -> tuple[bool, np.ndarray]:
-    """(prismatic, unit axis in the joint's frame) of a one-axis joint, which is the same in every pose."""
+    """Returns (prismatic, unit axis in the joint's frame) of a one-axis joint, which is the same in every
+    pose."""
     motion = np.asarray(model.joints[joint].createData().S, dtype=float).reshape(6)
     prismatic = bool(np.abs(motion[:3]).max() > 0.5)
     return prismatic, motion[:3] if prismatic else motion[3:]
 
 
 def encoder_resolution(robot: Robot, settings: PlantSettings) -> np.ndarray:
-    """(n,) rad, the resolution of each joint's sensor; 0 is ideal, as prismatic joints always are."""
+    """Returns the resolution of each joint's sensor, (n,) rad; 0 is ideal. Sensors of prismatic joints are
+    always ideal."""
     revolute = [not joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
     return np.where(revolute, np.radians(settings.encoder_resolution_deg), 0.0)
 
 
 def pose(placement: pin.SE3) -> dict[str, np.ndarray]:
-    """Position (3,) m and unit quaternion (w, x, y, z), named as MuJoCo's specification names them."""
+    """Returns the position (3,) m and unit quaternion (w, x, y, z) under the names of MuJoCo's
+    specification."""
     # The quaternion is built from a vector: each pin.Quaternion of a matrix leaks 80 bytes.
     x, y, z, w = pin.Quaternion(pin.SE3ToXYZQUAT(placement)[3:]).normalized().coeffs()
     return {"pos": placement.translation, "quat": np.array([w, x, y, z])}
 
 
 def inertial(inertia: pin.Inertia) -> tuple[float, np.ndarray, list[float]]:
-    """Mass (kg), centre of mass (3,) m, and Ixx, Iyy, Izz, Ixy, Ixz, Iyz (kg·m²) about it."""
+    """Returns the mass (kg), centre of mass (3,) m, and Ixx, Iyy, Izz, Ixy, Ixz, Iyz (kg·m²) about it."""
     I = inertia.inertia
     return inertia.mass, inertia.lever, [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]

@@ -1,4 +1,4 @@
-"""QP solvers and a kernel that find nothing, for tests of what happens then."""
+"""QP solvers and a kernel that find no solution, for tests of the fallbacks."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ NONSENSE = {
 
 
 def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Every QP solver answers nonsense, whatever it is asked, and calls it a solution; and the method that
-    starts from the point above finds nothing."""
+    """Makes every QP solver return an invalid point with the status of a solution, and disables the method
+    that starts from the point above."""
 
     def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
         return NONSENSE[kind](f, A)
@@ -34,7 +34,7 @@ def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
 
 
 def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
-    """The kernel finds no optimum, at one level or at all, and the printed QP is of no help."""
+    """Makes the kernel find no optimum, at one level or at all, and disables the printed QP."""
     healthy = fallbacks.solve_level
 
     def broken(*arguments: Any) -> bool:

@@ -1,4 +1,4 @@
-"""What every test shares: one thread per matrix product, and the same examples in every run."""
+"""Settings for all tests: one thread per matrix product, and the same random examples in every run."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
-# Before NumPy is imported anywhere: the matrices are tiny, and threads only fight over the cores.
+# Set before NumPy is imported: the matrices are tiny, and threads would only compete for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# A job in the background inherits that Ctrl-C means nothing, and so would every program that a test starts.
+# A process in the background ignores Ctrl-C, and so would every program that a test starts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -39,11 +39,12 @@ _TOGETHER = (
         "tests/lessons/test_lessons_interventions.py",
     ),
 )
-"""Beginnings of files that share what is dear: a browser, which one core can draw; all runs of the course."""
+"""Beginnings of the paths of test files that share an expensive resource: a browser, or all runs of the
+course."""
 
 
 class OneWorkerForWhatIsShared(LoadScopeScheduling):
-    """Tests of `_TOGETHER` go to one worker; so does every other file."""
+    """Sends all tests of an entry of `_TOGETHER`, and all tests of any other file, to one worker each."""
 
     def _split_scope(self, nodeid: str) -> str:
         shared = (files[0] for files in _TOGETHER if nodeid.startswith(files))
@@ -62,7 +63,8 @@ _LONG = (
     "tests/lessons/test_lessons_interventions.py",
     "tests/commands/test_commands_reproduce.py",
 )
-"""What takes long comes first, of that what mostly waits: no worker is left alone with it at the end."""
+"""Long tests come first, in particular those that mostly wait, so that no worker runs one alone at the
+end."""
 
 
 _QUICK = (
@@ -79,11 +81,11 @@ _QUICK = (
     "tests/lessons/test_lessons_settings.py",
     "tests/lessons/test_lessons_stack.py",
 )
-"""Files of the mark `quick`."""
+"""The files of the mark `quick`."""
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With `-m quick` no other file is read."""
+    """With `-m quick` pytest collects these files only."""
     if config.getoption("markexpr") != "quick" or collection_path.suffix != ".py":
         return None
     return True if collection_path.relative_to(_ROOT).as_posix() not in _QUICK else None
@@ -105,8 +107,8 @@ _COLD = pytest.StashKey[tuple[str, str]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """What is compiled is compiled before the tests: it takes a minute, for which none of them waits. In a
-    fresh clone the first run does it, and is kept for the test that compares it with the second."""
+    """Compiles all functions before the tests, because compilation takes a minute. In a fresh clone the first
+    run compiles them, and is stored for the test that compares it with the second run."""
     if hasattr(config, "workerinput") or _few_files(config):
         return
     if not any(_ROOT.glob("himpc/**/__pycache__/compiled/*.code")) and "NUMBA_CACHE_DIR" not in os.environ:
@@ -117,18 +119,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _few_files(config: pytest.Config) -> bool:
-    """Whether only files were named, no folder: each then compiles what it needs."""
+    """Whether only files were named on the command line, no folder: each file then compiles the functions
+    that it needs."""
     named = [Path(str(config.rootpath), each.split("::")[0]) for each in config.args]
     return len(named) <= 3 and all(each.is_file() for each in named)
 
 
 def pytest_configure_node(node: Any) -> None:
-    """What a worker is told."""
+    """Passes the stored first run to a worker."""
     node.workerinput["cold"] = node.config.stash.get(_COLD, None)
 
 
 def _run(file: Path, **environment: str) -> str:
-    """What a run says on standard error."""
+    """Returns the standard error of a run."""
     command = ["run", "iiwa14-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
     done = subprocess.run(
         [sys.executable, "-m", "app", *command],
@@ -146,7 +149,7 @@ Run = tuple[Path, str]
 
 @pytest.fixture
 def first_and_second_run(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Run, Run]:
-    """What a run recorded and said where nothing was compiled, and the same run after it."""
+    """The recording and the standard error of a run with an empty cache, and of the same run after it."""
     config, second = request.config, tmp_path / "second.npz"
     on_compiled = getattr(config, "workerinput", {"cold": config.stash.get(_COLD, None)})
     if (cold := on_compiled["cold"]) is not None:
@@ -180,7 +183,8 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="session")
 def example_urdf() -> Callable[[str], str]:
-    """Path of a URDF of example-robot-data; skips where the extra `meshes` is not installed."""
+    """Returns a function that gives the path of a URDF of example-robot-data; it skips the test if the extra
+    `meshes` is not installed."""
     import pinocchio
 
     def find(path: str) -> str:

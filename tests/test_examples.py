@@ -1,4 +1,4 @@
-"""The programs in examples/: they run, briefly, and print what their first lines promise."""
+"""The programs in examples/ run in a short time and print the results that their docstrings announce."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SECONDS = {
     "sweep": 0.02,
     "tune_M_bar": 0.05,
 }
-"""Simulated seconds of the test; 0.2 for all others."""
+"""Simulated seconds in the test; 0.2 for all other examples."""
 EXAMPLES = sorted(path.stem for path in FOLDER.glob("*.py"))
 
 
@@ -29,7 +29,7 @@ EXAMPLES = sorted(path.stem for path in FOLDER.glob("*.py"))
 def test_an_example_runs_and_prints_numbers(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every line is a label and what belongs to it, and every number printed is finite."""
+    """Every line is a label and its values, and every printed number is finite."""
     monkeypatch.chdir(tmp_path)
     main = runpy.run_path(str(FOLDER / f"{name}.py"))["main"]
     serial = {"spread": one_by_one} if "spread" in inspect.signature(main).parameters else {}
@@ -44,7 +44,7 @@ def test_an_example_runs_and_prints_numbers(
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_short_and_says_what_it_prints(name: str) -> None:
-    """Under 60 lines, docstring and blank lines counted; the README lists it."""
+    """An example has fewer than 60 lines, including docstring and blank lines, and the README lists it."""
     text = (FOLDER / f"{name}.py").read_text()
     told = ast.get_docstring(ast.parse(text)) or ""
     assert "Prints" in told
@@ -53,7 +53,7 @@ def test_an_example_is_short_and_says_what_it_prints(name: str) -> None:
 
 
 def test_examples_use_what_is_public() -> None:
-    """No name that begins with an underscore is imported or looked up in a package of ours."""
+    """No name of our packages that begins with an underscore is imported or used as an attribute."""
     for name in EXAMPLES:
         for node in ast.walk(ast.parse((FOLDER / f"{name}.py").read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
@@ -63,7 +63,7 @@ def test_examples_use_what_is_public() -> None:
 
 
 def test_the_mission_of_the_example_is_completed(capsys: pytest.CaptureFixture[str]) -> None:
-    """Run to its end, all three tasks are done."""
+    """At the end of the run all three tasks are completed."""
     runpy.run_path(str(FOLDER / "htmpc_mission.py"))["main"]()
     printed = capsys.readouterr().out
     assert re.findall(r"completed: (\w+) at", printed) == ["pick", "drive", "place"]

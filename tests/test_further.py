@@ -1,4 +1,4 @@
-"""What the site derives and asks beyond the lessons: equations hold, answers compute their numbers."""
+"""Derivations and questions of the site: their equations hold, and their answers contain computed numbers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_every_lesson_derives_something(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "k"), LINES)
 def test_an_equation_holds(name: str, k: int) -> None:
-    """Both sides are computed, for several random numbers."""
+    """Both sides of the equation are equal for several sets of random numbers."""
     each = line(name, k)
     for seed in range(5):
         left, right = each.sides(np.random.default_rng(seed))
@@ -44,7 +44,7 @@ def test_an_equation_holds(name: str, k: int) -> None:
 
 @pytest.mark.parametrize(("name", "k"), QUESTIONS)
 def test_an_answer_computes_its_numbers(name: str, k: int) -> None:
-    """A number of an answer is computed, given in the question or the lesson, or a count below ten."""
+    """A number in an answer is computed, given in the question or the lesson, or a count below ten."""
     asked = question(name, k)
     lesson = load_lesson(name)
     given = asked.asked + "".join(step.text + step.why for step in lesson.steps)
@@ -61,7 +61,7 @@ def test_an_answer_computes_its_numbers(name: str, k: int) -> None:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_texts_can_be_rendered(name: str) -> None:
-    """Dollar signs come in pairs, and what stands between them is LaTeX."""
+    """Dollar signs come in pairs, and the text between them is LaTeX."""
     own = further(name)
     texts = [each.words for each in own.derivation]
     texts += [text for each in own.questions for text in (each.asked, each.answered)]

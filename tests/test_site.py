@@ -1,4 +1,5 @@
-"""The documentation site: built without a warning, complete, its links whole, nothing loaded from others."""
+"""The documentation site is built without a warning, complete, with valid links, and loads nothing from other
+hosts."""
 
 from __future__ import annotations
 
@@ -23,11 +24,11 @@ from lessons.course import COURSE, load_lesson
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning")
 QUICK = "one-task"
-"""A lesson whose numbers are measured again here."""
+"""The lesson whose numbers are measured again by these tests."""
 
 
 class Parts(HTMLParser):
-    """What a page links to, what it loads, and its anchors."""
+    """The links of a page, the resources that it loads, and its anchors."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -49,21 +50,21 @@ class Parts(HTMLParser):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built by the command's own function; every warning would be an error."""
+    """The site, built by the function of the command; every warning would be an error."""
     out = tmp_path_factory.mktemp("docs") / "site"
     assert build(out) == 0
     return out
 
 
 def test_every_link_leads_somewhere(site: Path) -> None:
-    """Pages, anchors and pictures; from a file as from a server, since all are relative."""
+    """Links to pages, anchors and pictures are relative and valid, from a file and from a server."""
     pages = {path: Parts(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
     assert len(pages) > 60
     for path, parts in pages.items():
         for link in (*parts.links, *parts.loads):
             goal = urlsplit(link)
             if goal.scheme == "data":
-                continue  # it is in the page itself
+                continue  # part of the page itself
             if goal.scheme:
                 assert link in parts.links, f"{path.name} loads {link}"
                 continue
@@ -81,7 +82,8 @@ def test_styles_load_nothing_from_elsewhere(site: Path) -> None:
 
 
 def test_every_lesson_is_a_page(site: Path) -> None:
-    """With its steps, its claims and equations that a browser draws by itself."""
+    """The page of a lesson contains its steps, its claims, and equations that a browser displays without a
+    script."""
     text = ""
     for name in COURSE:
         text = (site / "lessons" / f"{name}.html").read_text(encoding="utf-8")
@@ -93,7 +95,8 @@ def test_every_lesson_is_a_page(site: Path) -> None:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_a_lesson_has_curves_a_derivation_and_answers(site: Path, name: str) -> None:
-    """Curves of every step that was recorded, a film, equations, and three answers to unfold."""
+    """The page contains curves of every recorded step, a film, equations, and three answers that can be
+    opened."""
     text = (site / "lessons" / f"{name}.html").read_text(encoding="utf-8")
     steps = load_lesson(name).steps
     assert text.count('<figure class="curves">') == len(steps)
@@ -113,7 +116,7 @@ def test_every_claim_on_a_page_has_been_measured(site: Path) -> None:
 
 
 def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:
-    """Steps, plots and ghosts; and the curve that one lesson gives now."""
+    """Recorded steps, plots and ghosts agree with the lessons, and the curve of one lesson is recomputed."""
     for name in COURSE:
         kept = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))["steps"]
         for step, drawn in zip(load_lesson(name).steps, kept, strict=True):
@@ -133,7 +136,8 @@ def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:
 def test_the_site_in_a_browser(
     site: Path, browser: Browser, width: int, height: int, scheme: Literal["light", "dark"]
 ) -> None:
-    """From a file: nothing wider than the screen or loaded from elsewhere; film, answers and search work."""
+    """From a file, no page is wider than the screen or loads anything from elsewhere; film, answers and
+    search work."""
     asked: list[str] = []
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
     page.set_default_timeout(SLOW)
@@ -165,7 +169,8 @@ def test_what_one_would_search_for_is_in_the_index(site: Path) -> None:
 
 
 def test_a_quoted_number_is_still_so(tmp_path: Path) -> None:
-    """What pages quote of a lesson is what the lesson measures now, to the three digits that are printed."""
+    """The numbers that pages quote of a lesson agree with a new measurement, to the three digits that are
+    printed."""
     told = measured(ROOT / MEASURED)[QUICK]
     path = tmp_path / "now.json"
     assert main(["lessons", "--check", QUICK, "--json", str(path)]) == 0

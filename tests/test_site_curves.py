@@ -1,4 +1,4 @@
-"""Curves of the site: thinned without losing or moving a peak, and drawn on an axis that shows something."""
+"""Curves of the site keep their peaks when they are thinned, and have an axis that suits their values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from docs.pages.curves import FLOORS, figure, label
 
 
 def test_a_peak_is_neither_lost_nor_moved() -> None:
-    """One tick far above and one far below, and the two ends, each at its own time."""
+    """One tick far above, one far below, and both ends are kept, each at its own time."""
     t = np.linspace(0.0, 8.0, 8000)
     y = np.sin(t)
     y[[1234, 6543]] = 5.0, -5.0
@@ -35,14 +35,14 @@ def test_what_is_not_known_stays_a_gap() -> None:
 
 
 def drawn(values: list[float], unit: str) -> str:
-    """A plot of one curve."""
+    """Returns the plot of one curve."""
     plot: dict[str, Any] = {"words": "error", "unit": unit, "t": [[0.1 * k for k in range(len(values))]]}
     return figure({"plots": [{**plot, "curves": [values]}]}, None)
 
 
 @pytest.mark.parametrize("unit", FLOORS)
 def test_a_logarithmic_axis_ends_where_only_rounding_is_left(unit: str) -> None:
-    """And the caption tells."""
+    """The caption names the value at which the axis ends."""
     floor = FLOORS[unit]
     text = drawn([1e4 * floor * 10.0 ** (-k) for k in range(20)], unit)
     end = f"{label(floor, log=True)} {unit}"
@@ -53,7 +53,7 @@ def test_a_logarithmic_axis_ends_where_only_rounding_is_left(unit: str) -> None:
 
 
 def test_an_error_that_starts_at_zero_has_an_ordinary_axis() -> None:
-    """One value of rounding says nothing of how far the others spread."""
+    """A single value at rounding level does not make the axis logarithmic."""
     text = drawn([1e-15, *np.linspace(0.5, 16.0, 99).tolist()], "deg")
     assert "Below" not in text and ">10</text>" in text and ">5</text>" in text
 

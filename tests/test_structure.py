@@ -1,4 +1,5 @@
-"""The architecture as rules: imports go one way, heavy dependencies have one door, files stay small."""
+"""The architecture as rules: imports have one direction, heavy dependencies have one door, files stay
+small."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ORDER = ("robots", "himpc", "lessons", "app", "tests")
-"""Each may import itself and what stands before it."""
+"""Each package may import itself and the packages before it."""
 
 DOORS = {
     "mujoco": ("robots/plant.py",),
@@ -39,13 +40,14 @@ def sources(*packages: str) -> list[Path]:
 
 @cache
 def tree(path: Path) -> ast.Module:
-    """A file, parsed once."""
+    """Returns the syntax tree of a file, cached."""
     return ast.parse(path.read_text())
 
 
 @cache
 def imports(path: Path) -> frozenset[str]:
-    """Every module or name a file imports, in dotted form, wherever in the file and for types too."""
+    """Returns every module or name that a file imports, in dotted form, anywhere in the file and also for
+    types."""
     found: set[str] = set()
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
@@ -69,7 +71,7 @@ def within(name: str, package: str) -> bool:
 
 @pytest.mark.parametrize("package", ORDER[:-1])
 def test_imports_go_one_way(package: str) -> None:
-    """tests → app → lessons → himpc → robots, never back."""
+    """Imports go in the direction tests → app → lessons → himpc → robots, never back."""
     later = ORDER[ORDER.index(package) + 1 :]
     files = sources(package)
     assert files
@@ -84,7 +86,7 @@ def test_imports_go_one_way(package: str) -> None:
 
 
 def test_himpc_is_tested_without_lessons_and_app() -> None:
-    """Its tests show how it is used alone."""
+    """The tests of himpc use it without the other packages, and thus show its use as a library."""
     files = sources("tests/himpc")
     assert files
     assert not {
@@ -107,19 +109,19 @@ APP = {
     "html": (),
     "adapter": (),
 }
-"""What each folder of app/ may import beside itself: two houses that meet in `link`. Only the server
-knows both: it hands the simulation's entry point in."""
+"""The folders that each folder of app/ may import beside itself: page and simulation meet only in `link`.
+Only the server imports both; it passes the entry point of the simulation on."""
 
 
 def test_app_is_the_folders_it_says() -> None:
-    """Every folder has its rule, and no file stands between them."""
+    """Every folder has its rule, and app/ contains no other file."""
     folders = {path.name for path in (ROOT / "app").iterdir() if path.is_dir() and path.name[0] not in "._"}
     assert folders == set(APP)
     assert {path.name for path in (ROOT / "app").glob("*.py")} == {"__init__.py", "__main__.py"}
 
 
 def test_the_way_through_app_names_files_that_are_there() -> None:
-    """What app/__init__.py tells of a target's way down and a row's way up is about these files."""
+    """The files that app/__init__.py names on the path of a target and of a row exist."""
     told = ast.get_docstring(tree(ROOT / "app" / "__init__.py")) or ""
     named = set(re.findall(r"`(\w+/\w+)`", told))
     assert len(named) >= 10
@@ -127,7 +129,7 @@ def test_the_way_through_app_names_files_that_are_there() -> None:
 
 
 def test_contributing_names_what_is_there() -> None:
-    """Its walks and recipes are about files and functions of this tree."""
+    """The files and functions that the walks and recipes of CONTRIBUTING.md name exist."""
     text = (ROOT / "CONTRIBUTING.md").read_text()
     paths = {each for each in re.findall(r"`([\w./]+/[\w./]*)`", text) if "NAME" not in each}
     paths |= set(re.findall(r"\btests/[\w/]+(?:\.py)?", text))
@@ -141,7 +143,8 @@ def test_contributing_names_what_is_there() -> None:
 
 @pytest.mark.parametrize("folder", APP)
 def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
-    """commands → server → page → panels → view → client → link ← worker, never back and never across."""
+    """Imports go in the direction commands → server → page → panels → view → client → link ← worker, never
+    back and never across."""
     files = sources(f"app/{folder}")
     assert files
     wrong = {
@@ -181,22 +184,24 @@ LESSONS = {
     "replay": ("course", "scenes/run_spec", "scenes", "settings", "events", "own"),
     "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots"),
 }
-"""What each part of lessons/ may import beside itself. A run names its scene, which may be that of a file:
-only trying it out in a session shows whether it can be used, and so runs stand above sessions."""
+"""The parts that each part of lessons/ may import beside itself. A run names its scene, which may be that of
+a file, and only a trial in a session shows whether such a file can be used; therefore runs are above
+sessions."""
 
 
 def lessons_part(name: str) -> str:
-    """The part of lessons/ that a dotted name is of."""
+    """Returns the part of lessons/ that a dotted name belongs to."""
     words = name.split(".")
     here = [ROOT / "lessons" / f"{word}{end}" for word in words[1:2] for end in ("", ".py")]
     if here and not any(place.exists() for place in here):
-        words = origins(ROOT / "lessons" / "__init__.py")[words[1]].split(".")  # it is shown by the package
+        words = origins(ROOT / "lessons" / "__init__.py")[words[1]].split(".")  # the package exports it
     return next((part for k in (3, 2) if (part := "/".join(words[1:k])) in LESSONS), "")
 
 
 @pytest.mark.parametrize("part", LESSONS)
 def test_lessons_are_built_in_one_direction(part: str) -> None:
-    """settings, events ← scenes ← session ← runs ← teaching, experiments ← course, papers."""
+    """Imports go in the direction settings, events ← scenes ← session ← runs ← teaching, experiments ←
+    course, papers."""
     files = [path for path in sources("lessons") if lessons_part(dotted(path)) == part]
     assert files
     wrong = {
@@ -209,19 +214,19 @@ def test_lessons_are_built_in_one_direction(part: str) -> None:
 
 
 def test_lessons_have_no_other_parts() -> None:
-    """Every file belongs to one."""
+    """Every file belongs to one part."""
     assert {path for path in sources("lessons") if not lessons_part(dotted(path))} == {
         ROOT / "lessons" / "__init__.py"
     }
 
 
 def dotted(path: Path) -> str:
-    """The name of a file's module."""
+    """Returns the name of a file's module."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
 HIMPC_ROOT = ("catalog", "constants", "qp", "rotation", "stack", "telemetry")
-"""Files of himpc/ beside its folders; they have their place in the order as well."""
+"""Files of himpc/ outside its folders; they have their place in the order as well."""
 THEORY = {
     "catalog": (),
     "constants": (),
@@ -242,7 +247,7 @@ THEORY = {
     "plan": ("telemetry", "cascade", "limits", "tasks", "references", "rotation", "constants"),
     "missions": ("tasks", "kinematics", "references", "rotation"),
 }
-"""What each part of himpc/ that is not compiled may import beside itself."""
+"""The parts that each part of himpc/ without compiled code may import beside itself."""
 COMPILED = {
     "compilation": (),
     "tick/kernel": ("compilation", "constants"),
@@ -260,18 +265,18 @@ COMPILED = {
         *("rotation", "qp"),
     ),
 }
-"""The same for what is compiled, and what runs it."""
+"""The same for the compiled parts and the parts that run them."""
 HIMPC = THEORY | COMPILED
 
 
 def part_of(path: Path) -> str:
-    """The part of himpc/ that a file belongs to; "" for the package itself."""
+    """Returns the part of himpc/ that a file belongs to, or "" for the package itself."""
     names = path.relative_to(ROOT / "himpc").with_suffix("").parts
     return next(("/".join(names[:k]) for k in (2, 1) if "/".join(names[:k]) in HIMPC), "")
 
 
 def home_of(name: str) -> Path:
-    """The file that an imported name of himpc comes from."""
+    """Returns the file that an imported name of himpc comes from."""
     parts = name.split(".")
     files = (
         ROOT.joinpath(*parts[:k]).with_suffix(".py") if k > 0 else ROOT.joinpath(*parts[:-k], "__init__.py")
@@ -283,7 +288,8 @@ def home_of(name: str) -> Path:
 
 @pytest.mark.parametrize("part", HIMPC)
 def test_himpc_is_built_in_one_direction(part: str) -> None:
-    """references, kinematics, tasks, limits ← cascade ← formulation, plan ← tick ← controllers; htmpc."""
+    """Imports go in the direction references, kinematics, tasks, limits ← cascade ← formulation, plan ← tick
+    ← controllers; htmpc."""
     files = [path for path in sources("himpc") if part_of(path) == part]
     assert files
     wrong = {
@@ -296,7 +302,7 @@ def test_himpc_is_built_in_one_direction(part: str) -> None:
 
 
 def test_himpc_has_no_other_parts() -> None:
-    """Every file belongs to one, and the tables go one way: nobody may import whoever may import it."""
+    """Every file belongs to one part, and the tables have no cycles."""
     files = sources("himpc")
     assert {path for path in files if not part_of(path)} == {ROOT / "himpc" / "__init__.py"}
     assert {path.stem for path in (ROOT / "himpc").glob("*.py")} == {"__init__", *HIMPC_ROOT}
@@ -310,7 +316,7 @@ def test_himpc_has_no_other_parts() -> None:
 
 
 def below_of(table: dict[str, tuple[str, ...]], part: str) -> set[str]:
-    """All that a part may import, directly or through others."""
+    """Returns all parts that a part may import, directly or through others."""
     found: set[str] = set()
     waiting = [*table.get(part, ())]
     while waiting:
@@ -322,7 +328,8 @@ def below_of(table: dict[str, tuple[str, ...]], part: str) -> set[str]:
 
 
 def test_the_theory_imports_nothing_compiled() -> None:
-    """Directly or through others: the equations can be read, and run, without a compiler."""
+    """The equations can be read and run without a compiler: no part of the theory imports a compiled part,
+    directly or through others."""
     assert not {(part, each) for part in THEORY for each in below_of(HIMPC, part) if each in COMPILED}
 
 
@@ -330,7 +337,8 @@ PRIVATE_OF_NUMBA = {"private", "private_views", "pieces", "keeping", "loading"}
 
 
 def test_few_files_touch_private_names_of_numba() -> None:
-    """The other files of the tool chain use what `numba` itself shows: they are the way out."""
+    """The other files of the tool chain use only public names of `numba`; they work also if private names
+    change."""
     touching, using = set(), set()
     for path in sources("himpc/compilation"):
         of_numba = {name for name in imports(path) if within(name, "numba")}
@@ -347,7 +355,7 @@ NO_PICTURE = ("worker", "link", "client", "html")
 
 @pytest.mark.parametrize("folder", NO_PICTURE)
 def test_what_needs_no_picture_knows_no_viser(folder: str) -> None:
-    """A simulation loads nothing of the page's, and what the page was told is plain data."""
+    """The simulation does not load viser, and the state of the page is plain data."""
     assert not {name for path in sources(f"app/{folder}") for name in imports(path) if within(name, "viser")}
 
 
@@ -355,11 +363,11 @@ PRIVATE = "app/adapter/private.py"
 
 
 def test_one_file_touches_private_names_of_viser() -> None:
-    """What begins with one underscore belongs to the class it is used in, or stands in the one file that
-    tests it before anything is served."""
+    """A name with one leading underscore belongs to the class that uses it, or is in the one file that checks
+    it before the server starts."""
     files = sources(*(f"app/{folder}" for folder in APP if folder not in NO_PICTURE))
     touching: dict[str, set[str]] = {}
-    ours = {"_exit"}  # of os, and no secret of anybody
+    ours = {"_exit"}  # of os, and not private
     for path in files:
         name = str(path.relative_to(ROOT))
         for node in ast.walk(tree(path)):
@@ -380,7 +388,7 @@ def test_one_file_touches_private_names_of_viser() -> None:
 
 
 def test_one_file_has_the_names_of_visers_page() -> None:
-    """In scripts and styles; the table beside them is checked before anything is served."""
+    """Scripts and styles use the constants of one module, whose table is checked before the server starts."""
     name = re.compile(r"__viser\w|mantine-[A-Z]|\.uplot|\.u-\w|20em")
     files = {str(path.relative_to(ROOT)) for path in sources("app") if name.search(path.read_text())}
     assert files == {"app/adapter/names.py"}
@@ -392,7 +400,7 @@ def is_private(name: str) -> bool:
 
 @pytest.mark.parametrize("library", DOORS)
 def test_heavy_dependencies_have_one_door(library: str) -> None:
-    """A library is imported behind its door only, and the door exists."""
+    """A library is imported only behind its door, and the door exists."""
     users = {
         str(path.relative_to(ROOT))
         for path in sources(*ORDER[:-1])
@@ -403,7 +411,7 @@ def test_heavy_dependencies_have_one_door(library: str) -> None:
 
 
 def test_what_is_imported_is_declared() -> None:
-    """Not left to another package to bring along."""
+    """Every imported package is a declared dependency, not one that another package happens to install."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = [
         *project["dependencies"],
@@ -418,7 +426,7 @@ def test_what_is_imported_is_declared() -> None:
 
 
 def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:
-    """Distances are in closed form; the collision library only checks them."""
+    """Distances are computed in closed form; the collision library is used only to check them."""
     packages, tests = (
         any(within(name, "coal") for path in sources(*where) for name in imports(path))
         for where in (ORDER[:-1], ORDER[-1:])
@@ -428,7 +436,7 @@ def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:
 
 
 def test_the_controller_cannot_peek() -> None:
-    """himpc never imports the plant: what it does not see it cannot use."""
+    """himpc never imports the plant; thus a controller cannot use the true mechanics."""
     names = {name for path in sources("himpc") for name in imports(path)}
     assert names
     peeking = {name for name in names if within(name, "robots.plant") or name in ("robots.Plant", "robots.*")}
@@ -442,14 +450,14 @@ MAY_ASK = ("lessons/scenes/catalog.py", "lessons/session/torque.py", "lessons/se
 
 
 def test_who_tells_torque_from_velocity() -> None:
-    """Only the catalog and the two sessions ask of which kind something is; else there is one table."""
+    """Only the catalog and the two sessions distinguish the two kinds; everything else uses one table."""
     asking = {str(path.relative_to(ROOT)) for path in sources("lessons", "app") if asks_for_kind(path)}
     assert "lessons/scenes/catalog.py" in asking, "the test sees nothing any more"
     assert asking <= set(MAY_ASK)
 
 
 def asks_for_kind(path: Path) -> bool:
-    """Whether a class of one kind is tested for, compared with, or matched."""
+    """Whether a file tests for, compares with, or matches a class of one kind."""
     for node in ast.walk(tree(path)):
         about: list[ast.AST] = []
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("isinstance", "issubclass"):
@@ -465,11 +473,13 @@ def asks_for_kind(path: Path) -> bool:
 
 
 EXTENDED = ("himpc/controllers/himpc.py:HIMPC", "himpc/htmpc/htmpc.py:HTMPC")
-"""The papers tell their relatives (HIQP, NHIMPC, …; STMPC, HTMPC_WPT) by what they change in them."""
+"""The papers describe the variants (HIQP, NHIMPC, …; STMPC, HTMPC_WPT) by their differences from these two
+classes."""
 
 
 def test_classes_are_abstract_or_final() -> None:
-    """Who is subclassed here lacks a method, or says that it is a base; nothing else is extended."""
+    """Every class that is subclassed has an abstract method or is a declared base class, except those in
+    EXTENDED."""
     classes = {(path, each.name): each for path in sources(*ORDER[:-1]) for each in classes_of(path)}
     lines: dict[tuple[Path, str], list[tuple[Path, str]]] = {}
     for path, name in classes:
@@ -502,20 +512,20 @@ def classes_of(path: Path) -> list[ast.ClassDef]:
 
 
 def words_of(nodes: list[ast.expr]) -> list[str]:
-    """The last word of each name, subscripts left out."""
+    """Returns the last word of each name, without subscripts."""
     plain = [node.value if isinstance(node, ast.Subscript) else node for node in nodes]
     return [str(getattr(node, "id", getattr(node, "attr", ""))) for node in plain]
 
 
 @cache
 def origins(path: Path) -> dict[str, str]:
-    """Where the names of a file come from."""
+    """Returns the modules that the names of a file come from."""
     nodes = [node for node in ast.walk(tree(path)) if isinstance(node, ast.ImportFrom)]
     return {alias.asname or alias.name: str(node.module) for node in nodes for alias in node.names}
 
 
 def stands_in(path: Path, module: str) -> bool:
-    """Whether a file is that module, or one that the package of that name hands on."""
+    """Whether a file is that module, or one whose names the package of that name exports."""
     return bool(module) and within(".".join(path.relative_to(ROOT).with_suffix("").parts), module)
 
 
@@ -530,9 +540,9 @@ def test_files_stay_readable() -> None:
 
 
 def test_no_file_names_a_package_index() -> None:
-    """What is installed comes from whatever index the machine is set up with."""
+    """Packages are installed from the index that the machine is configured with."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
-    # One by one: what begins with given letters is found far sooner than one of several such.
+    # One by one: a search for a fixed beginning is far faster than one for several beginnings.
     patterns = [
         *map(re.compile, ("--(extra-)?index[-]url", "--find-links", r"py[p]i\.org", "python[h]osted")),
         re.compile(r"https?://[^\s\"'<>)]*/simple\b"),

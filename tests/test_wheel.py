@@ -1,4 +1,4 @@
-"""What `pip install` brings: a built wheel in an environment of its own, run far away from the checkout."""
+"""A built wheel works in an environment of its own, outside the checkout."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from himpc.compilation.compiling import compile_all
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("robots", "himpc", "lessons", "app")
 _ELSEWHERE = "NUMBA_CACHE_DIR" in os.environ
-"""Whether compiled code is kept in a folder of the tester's: then there is none to take along."""
+"""Whether the tester keeps compiled code in another folder; then there is none to copy."""
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built from the files that are under version control, as from a fresh clone."""
+    """A wheel built from the files under version control, as from a fresh clone."""
     folder = tmp_path_factory.mktemp("wheel")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
     for name in filter(None, listed.stdout.split("\0")):
@@ -52,7 +52,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`himpc-lab` of an environment that holds the wheel; what it depends on is taken from here."""
+    """`himpc-lab` of an environment that contains the wheel; its dependencies are those of this
+    environment."""
     home = tmp_path_factory.mktemp("venv")
     venv.create(home, with_pip=False, symlinks=True)
     with zipfile.ZipFile(wheel) as archive:
@@ -68,7 +69,7 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "-q",
         "--no-deps",
     ]
-    # Whoever has the checkout in PYTHONPATH would be told that it is installed already.
+    # With the checkout in PYTHONPATH, pip would consider the package as installed.
     alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(
         [*pip, "--no-index", str(wheel)], env=alone, capture_output=True, text=True, check=False
@@ -76,14 +77,15 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stderr
     here = Path(sysconfig.get_path("purelib"))
     (there,) = home.glob("lib/python*/site-packages")
-    # The checkout is installed here in place, by a finder of its own: it must not be found.
+    # The checkout is installed here in place, by its own import finder, which the environment must not use.
     (there / "dependencies.pth").write_text(f"{here}\n{here / 'cmeel.prefix' / there.relative_to(home)}\n")
     _take_compiled_code_along(there)
     return home / "bin" / "himpc-lab"
 
 
 def _take_compiled_code_along(there: Path) -> None:
-    """A new place has no compiled code, and compiling it for a minute is no part of this test."""
+    """Copy the compiled code into the new environment, as its compilation takes a minute and is not tested
+    here."""
     compile_all(lambda *_: None)
     found = [*ROOT.glob("himpc/**/__pycache__/compiled/*.code")]
     assert found or _ELSEWHERE
@@ -94,7 +96,7 @@ def _take_compiled_code_along(there: Path) -> None:
 
 
 def run(command: Path, folder: Path, what: Sequence[str]) -> str:
-    """What the command prints, started in `folder` with nothing of this process's paths."""
+    """Returns the output of the command, started in `folder` without the paths of this process."""
     processor = {name: value for name, value in os.environ.items() if name == "NUMBA_CPU_NAME"}
     environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", **processor}
     done = subprocess.run(
@@ -106,7 +108,7 @@ def run(command: Path, folder: Path, what: Sequence[str]) -> str:
 
 
 def test_everything_that_is_no_code_is_in_it(wheel: Path) -> None:
-    """Every file of the packages that is under version control."""
+    """The wheel contains every file of the packages that is under version control."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", *PACKAGES], cwd=ROOT, capture_output=True, text=True, check=True
     )
@@ -116,7 +118,7 @@ def test_everything_that_is_no_code_is_in_it(wheel: Path) -> None:
 
 
 def test_it_runs_without_the_checkout(command: Path, tmp_path: Path) -> None:
-    """Scenes are listed, a lesson's file is found, and a run gives its numbers."""
+    """The installed command lists the scenes, finds a lesson's file, and computes the numbers of a run."""
     python = command.parent / "python"
     home = run(python, tmp_path, ["-c", "import app, robots; print(app.__file__); print(robots.__file__)"])
     assert str(ROOT) not in home

@@ -1,4 +1,5 @@
-"""What a lesson's page derives and asks beyond the lesson: one file per lesson, each defines `FURTHER`."""
+"""Derivations and questions that a lesson's page adds to the lesson: one file per lesson, each defines
+`FURTHER`."""
 
 from __future__ import annotations
 
@@ -8,6 +9,6 @@ from docs.further.kit import Further
 
 
 def further(lesson: str) -> Further:
-    """Of a lesson by its name."""
+    """Returns the derivation and the questions of the lesson with this name."""
     found: Further = import_module(f"docs.further.{lesson.replace('-', '_')}").FURTHER
     return found

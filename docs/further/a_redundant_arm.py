@@ -1,4 +1,4 @@
-"""A redundant arm: what the null space is, and how large."""
+"""A redundant arm: the null space of its Jacobian, and its dimension."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _all_solutions(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def _freedoms(rng: np.random.Generator) -> tuple[float, float]:
     J = rng.normal(size=(6, 7))
-    J[5] = J[4]  # a coordinate that says nothing new
+    J[5] = J[4]  # a row that depends on another one
     return float(np.trace(np.eye(7) - np.linalg.pinv(J) @ J)), 7.0 - np.linalg.matrix_rank(J)
 
 

@@ -1,4 +1,4 @@
-"""Deadlines: what one tick of delay does to time-delay estimation."""
+"""Deadlines: the effect of one tick of delay on time-delay estimation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ MU = 0.1
 
 
 def _run(mu: float, ticks: int, late: int) -> np.ndarray:
-    """Error of acceleration at each tick, if the torque of tick k acts from k + 1 + late on; M = 1, M̄ = μ."""
+    """Returns the error of the acceleration at each tick, if the torque of tick k acts from k + 1 + late on;
+    M = 1, M̄ = μ."""
     wanted = 1.0
     torque = [0.0] * (ticks + 2)
     for k in range(ticks - late):
@@ -36,7 +37,7 @@ def _bought(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _cliff(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Whether errors die out, in time and late, below and above μ = 2."""
+    """Whether errors vanish, without and with delay (columns), below and above μ = 2 (rows)."""
     alive = [[abs(_run(mu, 4000, late)[-1]) < 1e-3 for late in (0, 1)] for mu in (1.98, 2.02)]
     return np.array(alive, float), np.array([[1.0, 1.0], [0.0, 0.0]])
 

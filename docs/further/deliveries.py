@@ -1,4 +1,4 @@
-"""Deliveries: what a window of two tasks saves, and where a base waits."""
+"""Deliveries: the time that a window of two tasks saves, and the point where the base waits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ def _serial(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _overlapped(rng: np.random.Generator) -> tuple[float, float]:
-    """Tasks as events: base and hand set out together; the next round begins when both are done."""
+    """The round as a sequence of events: base and hand start at the same time, and the next delivery begins
+    when both have finished."""
     drive, reach, wait = rng.uniform(1, 9, 3)
     ready = 0.0
     for _ in range(4):

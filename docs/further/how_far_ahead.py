@@ -1,4 +1,4 @@
-"""How far ahead: the stacked prediction, why it is deadbeat, and what a horizon changes about the price."""
+"""How far ahead: the stacked prediction, why it is deadbeat, and the effect of the horizon on the cost."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from himpc.prediction.task import residual_model
 
 
 def effects(N: int, K_p: float = 100.0, K_v: float = 20.0) -> np.ndarray:
-    """c_l of (28) as a lower triangular matrix, (N, N), for T_s = 1 ms."""
+    """Returns c_l of (28) as a lower triangular matrix, (N, N), for T_s = 1 ms."""
     return residual_model(np.array([K_p]), np.array([K_v]), N, 1e-3).C[:, 0, :]
 
 
 def first_left(N: int, Q: float, R: float, g: float) -> float:
-    """Share of a constant e that is left at the first knot, of one coordinate with gain g."""
+    """Returns the share of a constant e that is left at the first knot, for one coordinate with gain g."""
     C = g * effects(N)
     U = -np.linalg.solve(Q * C.T @ C + R * np.eye(N), Q * C.T @ np.ones(N))
     return 1.0 + float(C[0, 0] * U[0])
 
 
 def _printed(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """(15) with its own matrices, N times, against the sums of c_l."""
+    """(15) with its own matrices, N times, and the sums of c_l."""
     T, N, K_p, K_v = 1e-3, 6, 100.0, 20.0
     A_11 = np.array([[1, T, 0], [0, 2, 0], [0, 0, 1.0]])
     A_12 = np.diag([0.0, -1.0, 0.0])

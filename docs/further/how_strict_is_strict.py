@@ -1,4 +1,4 @@
-"""How strict is strict: (12) inside (11), and tangents that leave a curve."""
+"""How strict is strict: (12) implies (11), and the error of a tangent to a curve."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from docs.further.kit import Further, Line, Question, planar
 
 
 def _inner(rng: np.random.Generator) -> tuple[float, float]:
-    """By how much plans that keep (12) break (11)."""
+    """The amount by which plans that satisfy (12) violate (11), which is zero."""
     Q, best = rng.uniform(0.1, 3, size=(11, 3)), rng.normal(size=(11, 3))
     worst = 0.0
     for _ in range(200):

@@ -39,7 +39,8 @@ def _touching(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(rng: np.random.Generator) -> tuple[float, float]:
-    """What a little more room is worth to level 2, where one bound cuts the line before its optimum."""
+    """The decrease of level 2's cost per unit by which a bound is relaxed, and the bound's multiplier; the
+    bound cuts the line before its optimum."""
     _, H, slope, Z, first, second = _level_2(rng)
     z = Z[:, 0]
     joint = int(np.argmax(np.abs(z)))

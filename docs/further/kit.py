@@ -1,4 +1,5 @@
-"""A derivation whose every equation is tried on numbers, and questions whose answers compute theirs."""
+"""Data types for derivations, whose equations a test evaluates on random numbers, and for questions with
+computed answers."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 Sides = Callable[[np.random.Generator], tuple[ArrayLike, ArrayLike]]
 
 LINK = 0.3
-"""Of the planar arm, m; it has three."""
+"""Length of each of the three links of the planar arm, m."""
 
 _HOLE = re.compile(r"⟨(\w+)⟩")
 _MEASURED = Path(__file__).parents[1] / "site" / "measured.json"
@@ -28,10 +29,10 @@ class Line:
     """One step of a derivation.
 
     Attributes:
-        words: why it follows.
+        words: the reason for the step.
         equation: in LaTeX.
-        sides: both of its sides for random numbers, by ways of their own where there are two.
-        tolerance: by how much they may differ, relative to the larger and absolutely.
+        sides: returns both sides of the equation for random numbers, computed independently where possible.
+        tolerance: the allowed difference of the sides, relative to the larger and absolute.
     """
 
     words: str
@@ -46,9 +47,9 @@ class Question:
 
     Attributes:
         asked: the question.
-        answer: with ⟨name⟩ where a number stands.
-        numbers: name: value and how it is written. It has no number that neither stands here nor is given
-            in the question or the lesson.
+        answer: the answer; ⟨name⟩ marks the place of a number.
+        numbers: name: value and format. All other numbers of the answer are given in the question or in the
+            lesson.
     """
 
     asked: str
@@ -57,21 +58,22 @@ class Question:
 
     @property
     def answered(self) -> str:
-        """The answer with its numbers. Raises KeyError for one that is not computed."""
+        """The answer with its numbers. Raises KeyError for a name that is not in `numbers`."""
         return _HOLE.sub(lambda hole: format(*self.numbers[hole[1]]), self.answer)
 
 
 @dataclass(frozen=True)
 class Further:
-    """What belongs to one lesson."""
+    """The derivation and the questions of one lesson."""
 
     derivation: tuple[Line, ...]
     questions: tuple[Question, Question, Question]
 
 
 def measured(lesson: str, claim: str, there: bool = False) -> float:
-    """What `himpc-lab lessons --check` measured for the claim that begins so; there: under its wrong setting.
-    Raises KeyError if there is no such claim or no number."""
+    """Returns the value that `himpc-lab lessons --check` measured for the claim whose text begins with
+    `claim`; there: under the setting with which the claim fails. Raises KeyError if the lesson has no such
+    claim."""
     for check in _checks().get(lesson, ()):
         if check["what"].startswith(claim):
             return float(check["measured_there" if there else "measured"])
@@ -85,7 +87,7 @@ def _checks() -> dict[str, list[dict[str, Any]]]:
 
 
 def planar(q: ArrayLike) -> tuple[Array, Array]:
-    """The planar arm's hand (2,), m, and its Jacobian (2, 3) at q (3,), rad."""
+    """Returns the position (2,), m, of the planar arm's hand and its Jacobian (2, 3) at q (3,), rad."""
     angles = np.cumsum(np.asarray(q, float))
     ends = LINK * np.array([np.cos(angles), np.sin(angles)])
     turned = np.array([-ends[1], ends[0]])
@@ -93,12 +95,12 @@ def planar(q: ArrayLike) -> tuple[Array, Array]:
 
 
 def inertia(rng: np.random.Generator, n: int) -> Array:
-    """Some symmetric positive definite matrix (n, n)."""
+    """Returns a random symmetric positive definite matrix (n, n)."""
     root = rng.normal(size=(n, n))
     return root @ root.T + n * np.eye(n)
 
 
 def null_space(J: Array) -> Array:
-    """Columns that span what J (m, n) maps to zero, (n, n − rank), orthonormal."""
+    """Returns an orthonormal basis of the null space of J (m, n) as columns, (n, n − rank)."""
     _, size, rows = np.linalg.svd(J)
     return rows[int((size > 1e-10).sum()) :].T

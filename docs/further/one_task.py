@@ -1,4 +1,5 @@
-"""One task under MPC: the wish (4), what a change of torque does to it, and what R takes away."""
+"""One task under MPC: the desired error dynamics (4), the effect of a torque change on them, and the effect
+of R."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ def _critically(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def simulated(K_p: float, K_v: float, T: float, steps: int) -> np.ndarray:
-    """e at knots 1 … after a unit of J M̄⁻¹Δτ at knot 0, by (14) as it is printed."""
+    """Returns e at knots 1 … after a unit of J M̄⁻¹Δτ at knot 0, by (14) as it is printed."""
     x = v = v_before = a = 0.0
     found = []
     for k in range(steps):

@@ -1,4 +1,5 @@
-"""Seeing ahead: what preview knows, what a gain does, and what accelerations allow."""
+"""Seeing ahead: the knots that preview changes, the response of a gain, and the limits that accelerations
+set."""
 
 from __future__ import annotations
 
@@ -12,12 +13,14 @@ V, A = 1.1, 2.5
 
 
 def shortest(d: float) -> float:
-    """s from rest to rest over d, m, with the base's speed and acceleration."""
+    """Returns the shortest time, s, from rest to rest over d, m, with the base's limits of speed and
+    acceleration."""
     return d / V + V / A if d >= V**2 / A else 2 * math.sqrt(d / A)
 
 
 def _preview(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Knots k = 1 … 10 whose own reference is already the new one, at t before the jump."""
+    """The number of knots k = 1 … 10 whose reference is already the new one at a time before the jump,
+    counted and by the formula."""
     before = np.round(rng.uniform(0.05, 1.0, 20), 3)
     knots = np.arange(1, 11)
     counted = [(8.0 - t + 0.1 * knots >= 8.0 - 1e-9).sum() for t in before]

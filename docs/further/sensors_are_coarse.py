@@ -1,4 +1,4 @@
-"""Sensors are coarse: what differencing does to a rounding error."""
+"""Sensors are coarse: the effect of finite differences on a rounding error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T_S = 1e-3
 
 
 def digit(degrees: float, T: float = T_S) -> float:
-    """N·m that one digit of an encoder makes."""
+    """Returns the torque, N·m, that one digit of an encoder, degrees, causes."""
     return M_BAR * math.radians(degrees) / T**2
 
 
@@ -25,7 +25,7 @@ def _differences(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _spread(rng: np.random.Generator) -> tuple[float, float]:
-    """RMS over independent rounding errors, against δ/(√2 T_s²)."""
+    """The RMS over independent rounding errors, and δ/(√2 T_s²)."""
     delta = rng.uniform(1e-5, 1e-3)
     errors = rng.uniform(-0.5 * delta, 0.5 * delta, size=(400_000, 3))
     a = errors @ np.array([1.0, -2.0, 1.0]) / T_S**2

@@ -19,7 +19,7 @@ REACTION_TIME = T_S + REACTION / Limits().velocity_approach
 
 
 def viable(d: float, t: float) -> float:
-    """The speed, rad/s, that stops within d, rad, if nothing happens for t, s."""
+    """Returns the speed, rad/s, from which a joint stops within d, rad, if it starts to brake after t, s."""
     return A * (-t + math.sqrt(t**2 + 2 * d / A))
 
 

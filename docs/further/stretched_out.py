@@ -1,4 +1,4 @@
-"""Stretched out: a Hessian that is positive definite whatever the Jacobian."""
+"""Stretched out: the Hessian is positive definite for every Jacobian."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Swap the priorities: how much (33) leaves in which order."""
+"""Swap the priorities: the freedom that (33) leaves to each level in each order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GONE = measured("swap-the-priorities", "In the end the hand is off by more than 
 
 
 def _between_hands() -> float:
-    """mm between the hand at home and with the posture that is asked for."""
+    """Returns the distance, mm, between the positions of the hand at home and in the desired posture."""
     scene = torque_scene("iiwa14-hold")
     plant, places = Plant(scene.robot), []
     for q in (scene.q_0, np.array(BENT)):
@@ -31,7 +31,7 @@ def _dimension(rng: np.random.Generator) -> tuple[float, float]:
 
 def _all_taken(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     M_bar, first = np.diag(rng.uniform(0.01, 1.0, 7)), rng.normal(size=7)
-    # Solved for Δτ_i, as (33) reads with J_p = I.
+    # (33) with J_p = I, solved for Δτ_i.
     return np.linalg.solve(np.linalg.inv(M_bar), np.linalg.solve(M_bar, first)), first
 
 

@@ -1,4 +1,4 @@
-"""Torque has a limit: bounds on a sum of changes, who may be limited by them, and what a bound costs."""
+"""Torque has a limit: bounds on a sum of changes, the levels that they limit, and the cost of a bound."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NEED = measured("torque-has-a-limit", "prediction: Which share of the reduced li
 
 
 def _inertia() -> float:
-    """Of the planar arm about joint 1 where the circle begins, kg·m²."""
+    """Returns the inertia of the planar arm about joint 1 at the start of the circle, kg·m²."""
     scene = torque_scene("planar3-circle")
     plant = Plant(scene.robot, scene.settings.plant)
     plant.reset(scene.q_0)
@@ -23,7 +23,7 @@ def _inertia() -> float:
 
 
 def _dry_friction() -> float:
-    """Of joint 1 of the planar arm, N·m."""
+    """Returns the dry friction of joint 1 of the planar arm, N·m."""
     return float(np.broadcast_to(torque_scene("planar3-circle").settings.plant.friction, 3)[0])
 
 
@@ -35,7 +35,7 @@ def _rows(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inherited(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Level 3's candidate Δτ₂* against what levels 1 and 2 must keep."""
+    """The effects on levels 1 and 2 of level 3's candidate Δτ₂*, and the effects that (33) requires."""
     G_1, G_2, first = rng.normal(size=(2, 7)), rng.normal(size=(2, 7)), rng.normal(size=7)
     second = first + null_space(G_1) @ rng.normal(size=5)
     return np.concatenate([G_1 @ second, G_2 @ second]), np.concatenate([G_1 @ first, G_2 @ second])

@@ -1,4 +1,4 @@
-"""Two tasks, one arm: what a sum does, and what (33) leaves."""
+"""Two tasks, one arm: the optimum of a weighted sum, and the freedom that (33) leaves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def _problem(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
 
 
 def weighted(G_1: np.ndarray, G_2: np.ndarray, e_1: np.ndarray, e_2: np.ndarray, Q_1: float) -> np.ndarray:
-    """The optimum of the sum with Q₂ = R = 1, (3,)."""
+    """Returns the optimum of the weighted sum with Q₂ = R = 1, (3,)."""
     H = Q_1 * G_1.T @ G_1 + G_2.T @ G_2 + np.eye(3)
     return -np.linalg.solve(H, Q_1 * G_1.T @ e_1 + G_2.T @ e_2)
 

@@ -1,4 +1,4 @@
-"""When tasks fight: a singularity that is made by the projection."""
+"""When tasks fight: the projection into a null space causes a singularity."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ M_BAR = 0.033
 
 
 def _sigma(q_3: float) -> float:
-    """‖J₂P₁‖ for joint 1's task below the hand's, links 2 and 3 at q_3 degrees."""
+    """Returns ‖J₂P₁‖ for joint 1's task below the hand's task, with an angle of q_3 degrees between links 2
+    and 3."""
     J = planar(np.radians([-40.0, 100.0, q_3]))[1]
     return float(np.linalg.norm((np.eye(3) - np.linalg.pinv(J) @ J)[0]))
 

@@ -1,4 +1,4 @@
-"""Your robot: how M̄ is suggested for a file nobody has measured."""
+"""Your robot: the rule that suggests M̄ for a robot of which no measurements exist."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TILT = measured("your-robot", "It is tilted by more than 5°.")
 
 @cache
 def _lamp() -> tuple[Robot, np.ndarray, np.ndarray]:
-    """The lesson's robot, the pose it starts in, (5,), and the M̄ suggested for it, (5,)."""
+    """Returns the lesson's robot, its initial configuration (5,), and the M̄ suggested for it (5,)."""
     lesson = load_lesson("your-robot")
     scene = lesson.run_of(lesson.steps[0]).prepared()
     robot = scene.robot
@@ -31,7 +31,7 @@ def _lamp() -> tuple[Robot, np.ndarray, np.ndarray]:
 
 
 def _largest(q: np.ndarray) -> float:
-    """λ_max(M⁻¹M̄) of the lamp at q (5,)."""
+    """Returns λ_max(M⁻¹M̄) of the lamp at q (5,)."""
     robot, _, M_bar = _lamp()
     root = np.sqrt(M_bar)
     M = mass_matrix(robot.model, robot.model.createData(), q)
@@ -40,7 +40,8 @@ def _largest(q: np.ndarray) -> float:
 
 @cache
 def _worst() -> float:
-    """The largest that a search over all poses finds, from the four worst of 800 other ones."""
+    """Returns the largest λ_max(M⁻¹M̄) over all configurations: a local search from the four worst of 800
+    random ones."""
     lower, upper = finite_range(_lamp()[0].q_lower, _lamp()[0].q_upper)
     tried = np.random.default_rng(1).uniform(lower, upper, (800, len(lower)))
     starts = sorted(tried, key=_largest)[-4:]
@@ -53,7 +54,7 @@ def _worst() -> float:
 
 
 def _least_inertia(rng: np.random.Generator) -> tuple[float, float]:
-    """Torque over acceleration of joint 1, the other joints free."""
+    """The torque over the acceleration of joint 1 while the other joints are free, and 1/(M⁻¹)₁₁."""
     M = inertia(rng, 4)
     tau = np.array([1.0, 0, 0, 0])
     return 1.0 / float(np.linalg.solve(M, tau)[0]), 1.0 / float(np.linalg.inv(M)[0, 0])

@@ -1,1 +1,1 @@
-"""The pages that are made from what is there: one file per kind of page."""
+"""The generated pages of the documentation: one file per kind of page."""

@@ -1,4 +1,4 @@
-"""The reference: a page per package, with what its modules make public."""
+"""The reference: a page per package with its public modules."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ INSIDE = (
     "lessons.examples",
     "lessons.plots",
 )
-"""What nobody imports from outside."""
+"""Internal packages, which have no page."""
 
 
 def pages(root: Path) -> dict[str, str]:
-    """Name and Markdown of each, and of their list."""
+    """Returns the name and Markdown of each page and of their index."""
     found, names = {}, []
     for top, says in PACKAGES.items():
         by_package: dict[str, list[str]] = {}
@@ -45,13 +45,13 @@ def pages(root: Path) -> dict[str, str]:
 
 
 def documented(path: Path) -> bool:
-    """Whether a module defines anything public, or says something itself."""
+    """Whether a module defines a public class or function."""
     body = ast.parse(path.read_text(encoding="utf-8")).body
     kinds = (ast.ClassDef, ast.FunctionDef)
     return any(isinstance(node, kinds) and not node.name.startswith("_") for node in body)
 
 
 def one(module: str) -> str:
-    """A module's part of a page."""
+    """Returns a module's part of a page."""
     directive = f".. automodule:: {module}\n   :members:\n   :show-inheritance:"
     return f"## {module}\n\n```{{eval-rst}}\n{directive}\n```\n"

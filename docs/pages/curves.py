@@ -1,4 +1,4 @@
-"""Curves of a recorded step as SVG: they take the page's colours, light and dark, and its width."""
+"""Curves of a recorded step as SVG, with the page's colours (light and dark) and width."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import Any
 WIDTH, HEIGHT = 640, 180
 LEFT, RIGHT, TOP, BOTTOM = 58, 8, 8, 22
 _DECADES = 300.0
-"""Values of which most span more than this factor, all positive, are drawn on a logarithmic axis."""
+"""Nonnegative values are drawn on a logarithmic axis if most of them span more than this factor."""
 _MOST = 0.05
-"""So large a share of the values may lie below: an error, or a way, is zero when a run starts."""
+"""The share of the values that may lie below that span: an error or a distance is zero when a run starts."""
 FLOORS = {"m": 1e-6, "mm": 1e-3, "deg": 1e-3, "%": 1e-2, "m/s²": 1e-6, "N·m": 1e-4}
-"""By unit: where a logarithmic axis ends. What is smaller is drawn there: it is a computer's rounding."""
+"""The lower end of a logarithmic axis for each unit. Smaller values are rounding errors and are drawn at that
+end."""
 
 
 def figure(step: Mapping[str, Any], ghost: str | None) -> str:
-    """All plots of a step, below each other, and the legend if there is a ghost."""
+    """Returns all plots of a step, one below the other, and a legend if there is a ghost."""
     drawn = "".join(_plot(each) for each in step["plots"])
     words = "The recorded run." + (f" Dashed: the ghost, {escape(ghost)}." if ghost else "")
     floors = dict.fromkeys(_floor_words(each) for each in step["plots"])
@@ -64,7 +65,7 @@ def _plot(plot: Mapping[str, Any]) -> str:
 
 
 def label(tick: float, log: bool) -> str:
-    """Powers of ten where they are shorter."""
+    """Returns the text of a tick: a power of ten if that is shorter."""
     power = round(math.log10(tick)) if log else 0
     if -3 < power < 4:
         return f"{tick:.4g}".replace("-", "−")
@@ -90,7 +91,7 @@ def _values(plot: Mapping[str, Any]) -> list[float]:
 
 
 def _floor_words(plot: Mapping[str, Any]) -> str:
-    """What the axis leaves out; "" if nothing."""
+    """Returns a sentence about the values that are below the end of the axis; "" if there are none."""
     values, unit = _values(plot), plot["unit"]
     if not values:
         return ""
@@ -100,7 +101,7 @@ def _floor_words(plot: Mapping[str, Any]) -> str:
 
 
 def _range(values: Sequence[float], unit: str) -> tuple[float, float, bool]:
-    """Least, greatest, and whether logarithmic."""
+    """Returns the lower end, the upper end, and whether the axis is logarithmic."""
     low, high = min(values), max(values)
     floor = FLOORS.get(unit, 0.0)
     most = max(sorted(values)[math.floor(_MOST * len(values))], floor)
@@ -111,7 +112,7 @@ def _range(values: Sequence[float], unit: str) -> tuple[float, float, bool]:
 
 
 def ticks(low: float, high: float, about: int = 4) -> list[float]:
-    """Round numbers between two."""
+    """Returns round numbers between two values."""
     raw = (high - low) / about
     unit = 10.0 ** math.floor(math.log10(raw))
     step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= raw)

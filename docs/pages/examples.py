@@ -1,4 +1,4 @@
-"""A page per example: what it shows, and its program."""
+"""A page per example: its docstring and its program."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def pages(root: Path) -> dict[str, str]:
-    """Name and Markdown of each, and of their list."""
+    """Returns the name and Markdown of each page and of their index."""
     found: dict[str, str] = {}
     rows: list[str] = []
     for path in sorted((root / "examples").glob("*.py")):

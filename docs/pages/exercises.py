@@ -11,7 +11,7 @@ from lessons.exercises.exercise import Exercise
 
 
 def pages(_: Path) -> dict[str, str]:
-    """Name and Markdown."""
+    """Returns the name and Markdown of the page."""
     parts = [
         "# Exercises",
         "Write the missing lines of a controller in a file of your own. What you save runs on the page, and "
@@ -21,7 +21,7 @@ def pages(_: Path) -> dict[str, str]:
 
 
 def part(exercise: Exercise) -> str:
-    """One exercise: card, equation, commands, the file with the hole, checks, hints to unfold."""
+    """Returns one exercise: card, equation, commands, the file to complete, checks, hints to unfold."""
     card, commands = exercise.card, "\n".join(exercise.commands())
     lesson = load_lesson(exercise.lesson).card.title
     checks = ["| points | check | bound |", "|--:|---|---|"]

@@ -1,4 +1,5 @@
-"""A page per lesson, made from its file: idea, prediction, run, claims with what was measured, why."""
+"""A page per lesson, made from its file: idea, prediction, run, claims with their measured values,
+explanation."""
 
 from __future__ import annotations
 
@@ -19,16 +20,16 @@ from lessons.teaching.lesson import Lesson, Step
 from lessons.teaching.prediction import Choice
 
 MEASURED = "docs/site/measured.json"
-"""What `himpc-lab lessons --check --json docs/site/measured.json` found."""
+"""The results of `himpc-lab lessons --check --json docs/site/measured.json`."""
 
 RECORDED = FOLDER.relative_to(Path(__file__).parents[2])
-"""What `python -m docs.record` kept."""
+"""The folder of the runs that `python -m docs.record` stored."""
 
 Checks = dict[tuple[str, str], dict[str, Any]]
 
 
 def pages(root: Path) -> dict[str, str]:
-    """Name and Markdown of each, and of their list."""
+    """Returns the name and Markdown of each page and of their index."""
     known = measured(root / MEASURED)
     found, rows = {}, []
     for number, name in enumerate(COURSE, start=1):
@@ -50,7 +51,7 @@ def pages(root: Path) -> dict[str, str]:
 
 
 def measured(path: Path) -> dict[str, Checks]:
-    """By lesson, step and claim what was measured; nothing if nobody has."""
+    """Returns the measured results of each lesson, by step and claim; nothing if the file does not exist."""
     if not path.exists():
         return {}
     told = json.loads(path.read_text(encoding="utf-8"))
@@ -61,7 +62,7 @@ def measured(path: Path) -> dict[str, Checks]:
 
 
 def page(lesson: Lesson, checks: Checks, film: Mapping[str, Any], more: Further, picture: bool) -> str:
-    """One lesson."""
+    """Returns the page of one lesson."""
     card = lesson.card
     parts = [
         f"# {card.title}",
@@ -91,7 +92,8 @@ def page(lesson: Lesson, checks: Checks, film: Mapping[str, Any], more: Further,
 
 
 def watch(name: str, title: str, step: Step, up: str) -> str:
-    """The place of a film that is loaded on a click; up: from the page to the site's root."""
+    """Returns the HTML of a 3D recording that is loaded on a click; up: the path from the page to the site's
+    root."""
     ghost = f" Violet: the ghost, {escape(step.ghost.words)}." if step.ghost else ""
     return (
         f'<figure class="film"><button type="button" data-film="{up}films/player.html#{name}" '
@@ -102,13 +104,13 @@ def watch(name: str, title: str, step: Step, up: str) -> str:
 
 
 def derivation(more: Further) -> list[str]:
-    """Step by step, each equation on a line of its own."""
+    """Returns the derivation step by step, each equation on a line of its own."""
     told = "\n\n".join(f"{line.words}\n\n$$\n{line.equation}\n$$" for line in more.derivation)
     return ["## From the paper's equations", told]
 
 
 def questions(more: Further) -> list[str]:
-    """With answers to unfold."""
+    """Returns the questions with answers to unfold."""
     parts = ["## On paper"]
     for number, each in enumerate(more.questions, start=1):
         parts += [
@@ -121,7 +123,7 @@ def questions(more: Further) -> list[str]:
 
 
 def step_parts(step: Step, number: int, checks: Checks, film: Mapping[str, Any]) -> list[str]:
-    """One idea."""
+    """Returns the part of a page about one step of the lesson."""
     parts = [f"## {number}. {step.title}", unindented(step.text)]
     if step.prediction is not None:
         asked = [f"**What do you think?** {step.prediction.question}"]
@@ -136,7 +138,8 @@ def step_parts(step: Step, number: int, checks: Checks, film: Mapping[str, Any])
 
 
 def table(claims: Sequence[Claim], step: str, checks: Checks) -> str:
-    """Claims, their bounds, what was measured, and the setting under which each fails."""
+    """Returns a table of the claims, their bounds, their measured values, and the setting under which each
+    fails."""
     rows = ["| claim | bound | measured | fails with |", "|---|---|---|---|"]
     for claim in claims:
         check = next(
@@ -151,15 +154,15 @@ def table(claims: Sequence[Claim], step: str, checks: Checks) -> str:
 
 
 def number_of(value: float | None, unit: str) -> str:
-    """A number with three digits and its unit."""
+    """Returns a number with three digits and its unit."""
     return "–" if value is None else f"{value:.3g} {unit}".rstrip()
 
 
 def cell(text: str) -> str:
-    """A text that may stand in a table."""
+    """Returns a text in a form that is allowed in a cell of a table."""
     return " ".join(text.split()).replace("|", "\\|")
 
 
 def unindented(text: str) -> str:
-    """A lesson's text; formulas on a line of their own stay so."""
+    """Returns a lesson's text without the space around it; formulas keep their own lines."""
     return text.strip()

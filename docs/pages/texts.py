@@ -1,4 +1,4 @@
-"""Pages made of the project's own texts, their links turned to the site's pages."""
+"""Pages made from the project's own texts, with links to the site's pages."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ LINKS = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
 }
-"""Where the project's texts stand on the site; those of `docs/` also link each other by name alone."""
+"""The page of the site for each of the project's texts; texts in `docs/` also link to each other by name
+alone."""
 FROM_README = {
     "start": ("Start", "Start"),
     "own": ("Bring your own", "Bring your own"),
     "own-program": ("In your own program", "In your own program"),
     "limits": ("Limits", "Limits"),
 }
-"""Page: its title and the README's section."""
+"""For each page: its title and the README's section."""
 
 
 def pages(root: Path) -> dict[str, str]:
-    """Name and Markdown of each."""
+    """Returns the name and Markdown of each page."""
     readme = (root / "README.md").read_text(encoding="utf-8")
     found = {name: f"# {title}\n\n{section(readme, part)}" for name, (title, part) in FROM_README.items()}
     title, rest = found["start"].split("\n\n", 1)
@@ -47,12 +48,12 @@ def pages(root: Path) -> dict[str, str]:
 
 
 def set_up(readme: str) -> str:
-    """The line that sets everything up, as the README's first screen has it."""
+    """Returns the command that installs everything, from the README's first block of code."""
     return readme[readme.index("```sh") :].split("```\n", 1)[0] + "```\n"
 
 
 def section(text: str, title: str) -> str:
-    """What stands under a second-level heading. Raises ValueError if there is none of that title."""
+    """Returns the text below a second-level heading. Raises ValueError if no heading has that title."""
     found = re.search(rf"^## {re.escape(title)}\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
     if found is None:
         raise ValueError(f"no section '{title}' in the README")
@@ -60,7 +61,8 @@ def section(text: str, title: str) -> str:
 
 
 def relinked(text: str) -> str:
-    """Links to files of the repository lead to the site's pages; those to other files are plain words."""
+    """Replaces links to files of the repository by links to the site's pages; links to files without a page
+    become plain text."""
 
     def turn(link: re.Match[str]) -> str:
         words, goal = link[1], link[2]

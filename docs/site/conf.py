@@ -24,8 +24,8 @@ myst_all_links_external = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
-autodoc_use_type_comments = False  # there are none
+autodoc_use_type_comments = False  # the code has no type comments
 napoleon_use_ivar = True
 napoleon_use_rtype = False
-# A name in a signature, or of an attribute, that several classes have: no page depends on it.
+# Several classes have attributes or signatures with the same name; no page refers to such a name alone.
 suppress_warnings = ["ref.python"]

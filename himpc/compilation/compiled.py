@@ -1,4 +1,4 @@
-"""The door to Numba: decorators of what is compiled, and the types of its arguments."""
+"""The interface to Numba: decorators for compiled functions, and the types of their arguments."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ else:
 NUMBER, WHOLE, FLAG = float64, intp, boolean
 VECTOR, MATRIX, MATRICES = float64[::1], float64[:, ::1], float64[:, :, ::1]
 INDICES, TABLE, FLAGS = intp[::1], int64[:, ::1], boolean[:, ::1]
-"""Arrays of our own, contiguous."""
+"""Contiguous arrays that this package allocates."""
 FIXED, FIXED_VECTOR = types.Array(float64, 2, "C", readonly=True), types.Array(float64, 1, "C", readonly=True)
-"""The same, not to be written to."""
+"""Read-only contiguous arrays that this package allocates."""
 GIVEN_VECTOR = types.Array(float64, 1, "A", readonly=True)
 GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
-"""What others hand over: it may be a slice."""
+"""Arrays from callers, which may be slices."""
 
 inline_kernel = chain.inline_kernel
-"""Compiles a function as a part of every `kernel` that calls it, wherever that stands."""
+"""Compiles a function as a part of every `kernel` that calls it, in any module."""
 always_inline_kernel = chain.always_inline_kernel
-"""The same for a function of many arrays: LLVM, left to itself, would pass all of them through memory."""
+"""The same for a function with many array arguments, which is always inlined; otherwise LLVM would pass all
+arrays through memory."""
 kernel = chain.kernel
-"""(*argument types): compiles a function, with every `inline_kernel` that it calls, for arguments of these
-types, and for no others, when its module is first imported."""
+"""(*argument types): compiles a function, with every `inline_kernel` that it calls, when its module is first
+imported, for arguments of these types only."""
 on_compiled = chain.on_compiled
-"""(tell): while this context is open, `tell` hears the dotted names of functions that had to be compiled."""
+"""(tell): a context; while it is open, `tell` is called with the dotted name of each function that is
+compiled."""

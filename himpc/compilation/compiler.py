@@ -1,7 +1,8 @@
-"""A process of its own that compiles, so that everybody else runs the code that is on disk.
+"""Compiles functions in a process of its own, so that all other processes run the code that is on disk.
 
-What a compiler holds in memory differs in the last digit from what it writes down: pieces are linked once
-more on the way. Whoever loads runs the same code in every process; whoever compiled would not.
+The code that a compiling process holds in memory differs in the last digit from the code that it writes to
+disk, because the parts are linked once more in between. Processes that load the code from disk all run the
+same code; the process that compiled it would not.
 """
 
 from __future__ import annotations
@@ -14,22 +15,22 @@ from importlib import import_module
 
 from robots.processes.orphans import end_with
 
-_COMPILES = "HIMPC_LAB_COMPILES"  # in the environment of such a process
+_COMPILES = "HIMPC_LAB_COMPILES"  # set in the environment of a compiling process
 
 
 def compiles_here() -> bool:
-    """Whether this process is one of them."""
+    """Whether this process was started to compile."""
     return _COMPILES in os.environ
 
 
 def compile_apart(module: str, tell: Callable[[str], None]) -> None:
-    """Has a module's functions compiled, of this package all that there are. Returns when that process has
-    ended, whether it could or not; an exception raised here meanwhile, and whatever ends this process, ends
-    it too.
+    """Compiles the functions of a module in a new process; of this package, all functions. Returns after that
+    process has ended, whether it succeeded or not. If an exception is raised here meanwhile, or this process
+    ends, the new process ends too.
 
     Args:
         module: its dotted name.
-        tell: hears the dotted name of every function that was compiled.
+        tell: called with the dotted name of every function that was compiled.
     """
     code = (
         f"import sys; sys.path[:] = {sys.path!r}; "
@@ -37,11 +38,11 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
     )
     with subprocess.Popen(
         (sys.executable, "-c", code),
-        stdin=subprocess.PIPE,  # nothing is ever written to it: it tells that we are there
+        stdin=subprocess.PIPE,  # nothing is written to this pipe: the child ends when it closes
         stdout=subprocess.PIPE,
         env={**os.environ, _COMPILES: "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
         text=True,
-        process_group=0 if os.name == "posix" else -1,  # Ctrl-C is ours to answer
+        process_group=0 if os.name == "posix" else -1,  # the child ignores Ctrl-C, which this process handles
     ) as child:
         try:
             assert child.stdout is not None
@@ -52,9 +53,9 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
 
 
 def serve(module: str) -> None:
-    """The process itself."""
+    """Runs in the new process: imports the module and reports every compiled function on standard output."""
     end_with(0)
-    # Whatever a module prints is not part of what we tell.
+    # A module may print text, which must not be mixed with the reports.
     with os.fdopen(os.dup(1), "w", buffering=1) as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         from himpc.compilation.compiled import on_compiled

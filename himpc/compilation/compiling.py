@@ -1,4 +1,4 @@
-"""Everything that is compiled, in one place: so that somebody can be told how far it is."""
+"""Compiles all functions, and reports the progress."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _PACKAGE = Path(__file__).parents[1]
 
 
 def compile_all(tell: Callable[[int, int], None]) -> None:
-    """Loads every compiled function there is, and compiles those that are not on disk.
+    """Loads all compiled functions, and compiles those that are not on disk.
 
     Args:
-        tell: called with (functions ready, of how many) after each that had to be compiled; never if all
-            were on disk.
+        tell: called with (number of compiled functions, number of all) after each function that was compiled;
+            never called if all were on disk.
     """
     from himpc.compilation.compiled import on_compiled
 
@@ -36,8 +36,8 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
 
 
 def compiled_functions() -> dict[str, frozenset[str]]:
-    """Dotted names of the functions that a decorator of `himpc.compilation.compiled` compiles, by module.
-    Read from the sources: importing them is what takes long."""
+    """Returns the dotted names of the functions that a decorator of `himpc.compilation.compiled` compiles, by
+    module. They are read from the sources, because importing the modules takes long."""
     found = {}
     for path in sorted(_PACKAGE.rglob("*.py")):
         text = path.read_text()
@@ -50,7 +50,7 @@ def compiled_functions() -> dict[str, frozenset[str]]:
 
 
 def _decorated(tree: ast.Module) -> list[str]:
-    """Functions of a module with a decorator that comes from the door."""
+    """Returns the functions of a module whose decorator is imported from `himpc.compilation.compiled`."""
     imported = {
         alias.asname or alias.name
         for node in tree.body

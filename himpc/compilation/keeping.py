@@ -1,9 +1,9 @@
-"""Where compiled functions are kept: a file each, in a folder that is nobody else's to write.
+"""Stores compiled functions on disk: one file each, in a folder to which no other user can write.
 
-Numba's own cache trusts whatever lies in its folder: a file that is cut short or damaged ends every start,
-one that somebody else wrote is run, a full disk ends the program. Here a file begins with a digest of the
-rest, and with what it was compiled from and for; what is not whole, not ours or not of these sources is
-compiled anew and replaced, and what cannot be written is used from memory.
+Numba's own cache trusts every file in its folder: a truncated or damaged file ends every start, a file of
+another user is executed, and a full disk ends the program. Here a file begins with a digest of its content,
+and names its sources and its target. A file that is incomplete, belongs to another user or has other sources
+is compiled anew and replaced. Code that cannot be written is used from memory.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from numba.core.serialize import dumps
 
 _POSIX = os.name == "posix"
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-"""No link to elsewhere, and no line ends changed."""
+"""Symbolic links are not followed, and line ends are not converted."""
 _ROOM = 8 << 20
-"""Bytes that must fit beside what is kept already: more than all compiled code takes."""
+"""Bytes that must be free besides the stored code: more than all compiled code takes."""
 _FOLDER = "NUMBA_CACHE_DIR"
-"""In the environment: where to keep it instead."""
+"""An environment variable that names another folder."""
 
 
 class Kept:
-    """What Numba asks for one function's code; the folders in which it may be are tried in order.
+    """The cache interface that Numba uses for one function; several folders are tried in order.
 
     Args:
-        source: the file that the function stands in.
-        name: the function's.
-        digest: of all that its code depends on.
+        source: the file that contains the function.
+        name: the function's name.
+        digest: digest of all sources that its code depends on.
     """
 
     def __init__(self, source: Path, name: str, digest: bytes) -> None:
@@ -47,25 +47,26 @@ class Kept:
 
     @property
     def cache_path(self) -> str | None:
-        """The folder in which code is put; None if there is none."""
+        """The folder to which code is written; None if no folder is usable."""
         return next((str(folder) for folder in self._folders(make=True)), None)
 
     def has_room(self) -> bool:
-        """Whether code can be written here."""
+        """Whether there is space to write code."""
         return any(_written(folder / "room", bytes(_ROOM), keep=False) for folder in self._folders(make=True))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """The compiled function for these types; None if it is not there, whole, ours and up to date."""
+        """Returns the compiled function for these types; None if no complete and current file of this user
+        exists."""
         name, made_for = self._file(signature, context.codegen())
         for folder in self._folders(make=False):
             body = _read(folder / name)
             if body is not None and body.startswith(made_for):
-                with suppress(Exception):  # whatever a pickle of another build may raise
+                with suppress(Exception):  # a file of another build may raise any exception
                     return CompileResult._rebuild(context, *pickle.loads(body[len(made_for) :]))
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
-        """Keeps a compiled function in the first folder that takes it, if any does."""
+        """Writes a compiled function to the first folder that accepts it, if any does."""
         if result.library.has_dynamic_globals or any(not each.can_cache for each in result.lifted):
             return
         name, made_for = self._file(signature, result.codegen)
@@ -75,24 +76,26 @@ class Kept:
                 return
 
     def enable(self) -> None:
-        """It is."""
+        """Does nothing: the cache is always enabled."""
 
     def disable(self) -> None:
-        """Numba's word for not looking here; nobody here says it."""
+        """Does nothing: Numba's interface has this method, and this package never calls it."""
 
     def flush(self) -> None:
-        """Nothing waits to be written."""
+        """Does nothing: files are written at once."""
 
     def _file(self, signature: Any, codegen: Any) -> tuple[str, bytes]:
-        """The name of the file with the code for these types and this processor, and what it begins with."""
+        """Returns the name of the file with the code for these types and this processor, and its first
+        bytes."""
         target = repr((signature, codegen.magic_tuple())).encode()
         version = f"{numba.__version__} {sys.version}".encode()
         made_for = sha256(b"\0".join((self._digest, target, version))).digest()
         return f"{self._source.stem}.{self._name}-{sha256(target + version).hexdigest()[:16]}.code", made_for
 
     def _folders(self, make: bool) -> Iterator[Path]:
-        """Folders that may hold it and are nobody else's to write, the one to write to first: what the
-        environment names, else one beside the source, else the user's cache; else a temporary one."""
+        """Yields the folders that may contain the file and to which only this user can write, in the order in
+        which they are tried: the folder in the environment variable, or one beside the source and then the
+        user's cache; at last a temporary one."""
         own = f"{self._source.parent.name}-{sha256(bytes(self._source.parent)).hexdigest()[:16]}"
         named = os.environ.get(_FOLDER)
         if named:
@@ -110,7 +113,7 @@ class Kept:
                 yield chain[-1]
         if make and none and not named:
             with suppress(OSError):
-                # For children, too: they find there what this process puts there.
+                # Child processes inherit this variable and find the code in the same folder.
                 os.environ[_FOLDER] = tempfile.mkdtemp(prefix="himpc-lab-compiled-")
                 yield from self._folders(make)
 
@@ -124,7 +127,7 @@ def _users_cache() -> Path:
 
 
 def _make(folder: Path, above: bool) -> None:
-    """Makes a folder for this user alone, if it can; `above`: with whatever is missing above its parent."""
+    """Creates a folder for this user alone, if possible; `above`: also creates all missing parents."""
     missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
     with suppress(OSError):
         for each in reversed(missing if above else missing[:2]):
@@ -132,7 +135,7 @@ def _make(folder: Path, above: bool) -> None:
 
 
 def _ours(folder: Path) -> bool:
-    """Whether a folder is there, belongs to this user and can be written by nobody else."""
+    """Whether a folder exists, belongs to this user and cannot be written to by anybody else."""
     try:
         found = folder.lstat()
     except OSError:
@@ -145,7 +148,8 @@ def _safe(found: os.stat_result) -> bool:
 
 
 def _read(file: Path) -> bytes | None:
-    """What stands in a file after the digest; None if it is not there, not ours or not whole."""
+    """Returns the content of a file after its digest; None if the file is missing, incomplete or belongs to
+    another user."""
     try:
         with open(os.open(file, os.O_RDONLY | _PLAIN), "rb") as stream:
             found = os.fstat(stream.fileno())
@@ -157,7 +161,8 @@ def _read(file: Path) -> bytes | None:
 
 
 def _written(file: Path, data: bytes, keep: bool = True) -> bool:
-    """Whether a file could be written, whole or not at all; others may neither read nor write it."""
+    """Whether a file could be written. It is written completely or not at all; others may neither read nor
+    write it."""
     part = file.with_name(f".{file.name}.{uuid4().hex}")
     try:
         with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN, 0o600), "wb") as stream:

@@ -1,7 +1,8 @@
-"""How a compiled function comes from disk without the compiler.
+"""Loads a compiled function from disk without starting the compiler.
 
-Asked for a function, Numba first gets ready to compile it: it reads what each of NumPy's functions becomes,
-and imports SciPy. That is a third of a second in every process, for nothing where machine code lies on disk.
+When a function is requested, Numba first prepares to compile it: it reads its definitions of NumPy's
+functions, and imports SciPy. This takes a third of a second in every process, and is not needed if machine
+code is on disk.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from numba.core.runtime.nrt import rtsys
 
 
 def load(function: Any, arguments: tuple[Any, ...]) -> bool:
-    """Whether a function for arguments of these types was on disk. If so, it is now called for them."""
+    """Returns whether a function for arguments of these types was on disk; if so, calls with these types now
+    use it."""
     with global_compiler_lock:
-        rtsys.initialize(function.targetctx)  # what machine code calls
+        rtsys.initialize(function.targetctx)  # functions that the machine code calls
         found = function._cache.load_overload(arguments, function.targetctx)
         if found is None:
             return False

@@ -1,4 +1,4 @@
-"""How both tool chains have Numba translate arithmetic."""
+"""Numba's options for arithmetic, which both tool chains use."""
 
 from __future__ import annotations
 
@@ -8,4 +8,5 @@ from typing import Any
 Function = Callable[..., Any]
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}}
-"""Sums may be taken in any order; NaN and infinity keep their meaning; a division by zero raises nothing."""
+"""Sums may be computed in any order; NaN and infinity keep their meaning; a division by zero raises no
+exception."""

@@ -1,8 +1,8 @@
-"""How Numba compiles functions that only other compiled functions call: their code is linked into these, and
-becomes machine code there.
+"""Compiles functions that only other compiled functions call: their intermediate code is linked into the
+callers, and only the callers become machine code.
 
-Left to itself Numba optimises every function three times, makes machine code of it, and wraps it for callers
-in Python and in C; then it does so again, along with each caller, up to the top.
+By default Numba optimises every function three times, generates machine code for it, and wraps it for callers
+in Python and in C; then it does the same again for each caller, which contains the function.
 """
 
 from __future__ import annotations
@@ -15,22 +15,23 @@ from numba.core.compiler import Compiler
 
 
 class _Linking(JITCodeLibrary, ABC):
-    """Code that names the code of all pieces it calls, each of them once."""
+    """Code that refers to the code of every function that it calls, once each."""
 
     def add_linking_library(self, library: Any) -> None:
-        """A library whose functions this one calls."""
-        # Callers first: what nobody refers to yet would not be linked.
+        """Adds a library whose functions this library calls."""
+        # Callers are added first, because code that nothing refers to would not be linked.
         for each in (library, *library.called) if isinstance(library, _Loose) else (library,):
             if each not in self._linking_libraries:
                 super().add_linking_library(each)
 
 
 class _Linked(_Linking):
-    """Code together with that of its pieces."""
+    """Code together with that of all functions that it calls."""
 
 
 class _Loose(_Linking):
-    """Code of one piece, not optimised and without what it calls: nobody can run it as it is."""
+    """Code of one function, not optimised and without the functions that it calls, so that it cannot run
+    alone."""
 
     @property
     def called(self) -> list[Any]:
@@ -38,31 +39,32 @@ class _Loose(_Linking):
         return self._linking_libraries
 
     def finalize(self) -> None:
-        """Nothing is added any more."""
+        """Ends the addition of code."""
         self._raise_if_finalized()
         self._finalize_dynamic_globals()
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
-        """There is none."""
+        """Returns 0: this code cannot run alone and has no address."""
         return 0
 
     @property
     def codegen(self) -> Any:
-        """Who is told where the function's environment is: `Whole` tells it."""
+        """The object whose `set_env` is called for the function's environment: this library, which ignores
+        the call; `Whole` makes it later for all functions."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Nothing: what would look there is not yet."""
+        """Does nothing: the code that would read the environment does not exist yet."""
 
 
 class _Compiling(Compiler, ABC):
-    """Compiles into a library of our own."""
+    """Base class of compilers for the two libraries above; `library` is the class of the library."""
 
     library: type[_Linking]
 
     def compile_extra(self, func: Any) -> Any:
-        """Numba's entry point."""
+        """Overrides Numba's entry point: sets the library."""
         self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
         return super().compile_extra(func)
@@ -74,7 +76,7 @@ class Whole(_Compiling):
     library = _Linked
 
     def compile_extra(self, func: Any) -> Any:
-        """Numba's entry point."""
+        """Overrides Numba's entry point: sets the addresses of all environments."""
         found = super().compile_extra(func)
         for each in found._find_referenced_environments():
             found.library.codegen.set_env(each.env_name, each)
@@ -82,12 +84,12 @@ class Whole(_Compiling):
 
 
 class Piece(_Compiling):
-    """Compiles a function that only compiled functions call. Python must not: there is no code to run."""
+    """Compiles a function that only compiled functions call. A call from Python raises TypeError."""
 
     library = _Loose
 
     def compile_extra(self, func: Any) -> Any:
-        """Numba's entry point."""
+        """Overrides Numba's entry point: refuses a call from Python."""
         if not len(self.state.typingctx.callstack):
             raise TypeError(f"{func.__qualname__} is a piece of compiled functions: nobody else can call it")
         return super().compile_extra(func)

@@ -1,5 +1,5 @@
-"""Functions on disk, loaded when their module is first imported; what is not there is compiled first, by a
-process of its own, see `compiler`."""
+"""Loads compiled functions from disk when their module is first imported. Functions that are not on disk are
+compiled first, in a process of its own, see `compiler`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from himpc.compilation.sources import digest_of
 
 try:
     import fcntl
-except ImportError:  # a system without it: two processes may then compile the same
+except ImportError:  # on a system without fcntl, two processes may compile the same function
     fcntl = None
 
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
@@ -36,10 +36,10 @@ always_inline_kernel = njit(**_PIECE, forceinline=True)
 def kernel(*arguments: Any) -> Callable[[Function], Any]:
     """Compiles a function, with every `inline_kernel` that it calls, for arguments of these types only.
 
-    Left to the first call, each layout of an array that turns up would stop a running robot for the seconds
-    that its compilation takes.
+    If it were compiled at the first call, each new layout of an array would stop a running robot for the
+    seconds that compilation takes.
 
-    What is on disk is current as long as no file has changed that the function depends on, see `sources`.
+    A file on disk is valid until a source file changes that the function depends on, see `sources`.
     """
 
     def compile_now(function: Function) -> Any:
@@ -58,7 +58,7 @@ def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
         if not compiles_here() and module != "__main__" and fast._cache.has_room():
             _FIRST_WORD.say()
             with _one_at_a_time(place, "waiting"):
-                found = load(fast, arguments)  # somebody else may have compiled it meanwhile
+                found = load(fast, arguments)  # another process may have compiled it meanwhile
                 if not found:
                     compile_apart(module, lambda name: event.end_event(_APART, name))
                     found = load(fast, arguments)
@@ -74,7 +74,7 @@ def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
     """Processes that need the same code wait for the first one, and then find it on disk."""
     lock = None
     if fcntl is not None and folder is not None:
-        with suppress(OSError):  # a full disk, say
+        with suppress(OSError):  # for example a full disk
             lock = os.open(Path(folder, f"himpc-lab-{what}.lock"), os.O_WRONLY | os.O_CREAT, 0o600)
             fcntl.flock(lock, fcntl.LOCK_EX)
     try:
@@ -85,13 +85,14 @@ def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
 
 
 class _FirstWord(event.Listener):
-    """What takes so long, once: whoever looks at a terminal would think that nothing happens."""
+    """Writes one line to the log when compilation begins, so that a user at a terminal sees the reason for
+    the wait."""
 
     def __init__(self) -> None:
-        self._said = compiles_here()  # then somebody else did
+        self._said = compiles_here()  # a compiling process writes no line: its parent already did
 
     def say(self) -> None:
-        """Unless it was said."""
+        """Writes the line, unless it was already written."""
         if not self._said:
             self._said = True
             getLogger(__name__).warning(
@@ -102,7 +103,7 @@ class _FirstWord(event.Listener):
         self.say()
 
     def on_end(self, event: Any) -> None:
-        """Nothing: it was said."""
+        """Does nothing: the line is written at the start."""
 
 
 _FIRST_WORD = _FirstWord()
@@ -117,7 +118,7 @@ class _Compiled(event.Listener):
         self._tell = tell
 
     def on_start(self, event: Any) -> None:
-        """Nothing: only what is done counts."""
+        """Does nothing: a function is reported when it is compiled."""
 
     def on_end(self, event: Any) -> None:
         if event.kind == _APART:
@@ -129,7 +130,8 @@ class _Compiled(event.Listener):
 
 @contextmanager
 def on_compiled(tell: Callable[[str], None]) -> Iterator[None]:
-    """While it is open, `tell` hears the dotted name of every function that had to be compiled."""
+    """A context; while it is open, `tell` is called with the dotted name of every function that is
+    compiled."""
     heard = _Compiled(tell)
     with event.install_listener("numba:compile", heard), event.install_listener(_APART, heard):
         yield

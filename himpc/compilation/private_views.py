@@ -1,4 +1,4 @@
-"""The arrays of `views` without an owner: nobody counts who looks at them; slices of them cost nothing."""
+"""The arrays of `views` without reference counting: slices of them need no time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 Found = tuple[Any, Any]
-"""A signature, and what generates the code."""
+"""A signature, and the function that generates the code."""
 
 
 def _vector(_: Any, data: Any, start: Any, n: Any) -> Found:
@@ -26,7 +26,7 @@ def _matrices(_: Any, data: Any, start: Any, count: Any, rows: Any, columns: Any
 
 
 def _view(data: Any, dimensions: int) -> Found:
-    """An array (…) of the numbers from a place of `data` on."""
+    """Returns a view of `data` from an index on, as an array of this many dimensions."""
     array = types.Array(data.dtype, dimensions, "C")
 
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Compiling with what Numba documents and nothing else; see the package."""
+"""Compiles with Numba's documented interface alone; see the package."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def kernel(*arguments: Any) -> Callable[[Function], Any]:
     """See `compiled`."""
 
     def compile_now(function: Function) -> Any:
-        # Numba's cache knows the function's own file; the name of the folder stands for all the others.
+        # Numba's cache checks the function's own file only; the name of the folder contains the digest of all
+        # other files.
         given: str = config.CACHE_DIR
         kept = Path(given) if given else Path(function.__code__.co_filename).parent / "__pycache__" / "public"
         config.CACHE_DIR = str(kept / digest_of(function).hex()[:16])
@@ -37,7 +38,7 @@ def kernel(*arguments: Any) -> Callable[[Function], Any]:
 
 @contextmanager
 def on_compiled(tell: Callable[[str], None]) -> Iterator[None]:
-    """See `compiled`; here `tell` hears nothing."""
+    """See `compiled`; in this tool chain `tell` is never called."""
     yield
 
 

@@ -1,4 +1,5 @@
-"""The source files that a compiled function depends on: when one of them changes, it is compiled anew."""
+"""Finds the source files that a compiled function depends on; when one of them changes, it is compiled
+anew."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 _IMPORTS = re.compile(r"^from ([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
-"""Imports for types alone are indented, and change no code."""
+"""Indented imports are for type annotations and do not change the code."""
 _PACKAGE = __name__.partition(".")[0]
 
 
@@ -21,9 +22,9 @@ def digest_of(function: Callable[..., Any]) -> bytes:
 
 
 def sources_of(function: Callable[..., Any]) -> list[Path]:
-    """The file of a function, and the files that it imports from this package, from its own or from those of
-    the pieces that it calls, directly or through others: they define these pieces, and constants that are
-    compiled in. And the tool chain, which sets the compiler's options."""
+    """Returns the file of a function and all files that it imports, directly or through others, from this
+    package, from its own package and from the packages of the inline kernels that it calls: they define these
+    kernels and constants. The files of the tool chain, which sets the compiler's options, are included."""
     pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
     packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
     files = {Path(function.__code__.co_filename)}

@@ -1,4 +1,4 @@
-"""Arrays as the compiled functions see them: parts of a larger one, which the kernel's caller keeps."""
+"""Array views for the compiled functions: parts of a larger array that the kernel's caller owns."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ else:
     from himpc.compilation import private_views as chain
 
 vector: Any = chain.vector
-"""(data, start, n): n numbers from a place on."""
+"""(data, start, n): a view of n numbers, from index start on."""
 matrix: Any = chain.matrix
-"""(data, start, rows, columns): the same, row by row."""
+"""(data, start, rows, columns): the same as a matrix, row by row."""
 matrices: Any = chain.matrices
-"""(data, start, count, rows, columns): the same, matrix by matrix."""
+"""(data, start, count, rows, columns): the same as several matrices, one after the other."""
 borrowed: Any = chain.borrowed
-"""(array): the whole."""
+"""(array): a view of the whole array."""

@@ -1,29 +1,31 @@
 """Adaptation of M̄: the payload is estimated from the gravity torque, and M̄ is fitted to it.
 
-While the robot moves, the applied torque is on average what holds it: τ ≈ g(q) + m φ(q), with g the nominal
-model's gravity (`Settings.nominal`) and φ what one kilogram at the tip adds. The payload m is found by least
-squares over the last LAG seconds, each joint's torque counted in shares of its limit:
+While the robot moves, the applied torque is on average the torque that holds it: τ ≈ g(q) + m φ(q), with g
+the nominal model's gravity (`Settings.nominal`) and φ the additional gravity torque of one kilogram at the
+tip. The payload m is found by least squares over the last LAG seconds, with each joint's torque divided by
+its limit:
 
     m̂ = Σ φᵀ(τ − g) / (Σ φᵀφ + μ), at least 0.
 
-The inertia is linear in the payload, M̂ = M_n(q) + m̂ Φ(q). The M̄ that was set gives the shape, heavier where
-the payload makes a joint heavier; a factor on all of it makes the largest eigenvalue of M̂⁻¹M̄ one:
+The inertia is linear in the payload, M̂ = M_n(q) + m̂ Φ(q). The set value of M̄ gives the shape, which
+becomes larger for a joint for which the payload increases the inertia; a common factor sets the largest
+eigenvalue of M̂⁻¹M̄ to one:
 
     M̄ᵢ = σ M̄ᵢ⁰ M̂ᵢᵢ/M_nᵢᵢ, σ = 1/λ_max.
 
-It stays below LARGEST times what was set, rises by RISE a second at most and falls at once. Without the
-limits, time-delay estimation multiplies its error by 1 − M⁻¹M̄ from tick to tick (Remark 4), which asks for
-eigenvalues of M⁻¹M̄ between 0 and 2. By construction M̄ ⪯ M̂, so with M the robot's own inertia
+M̄ stays below LARGEST times the set value, rises at most by RISE per second and falls at once. While no
+bound is active, time-delay estimation multiplies its error by 1 − M⁻¹M̄ from tick to tick (Remark 4), which
+requires eigenvalues of M⁻¹M̄ between 0 and 2. By construction M̄ ⪯ M̂, so with M the robot's own inertia
 
-- where M ⪰ M̂, as with a payload that is thought too small, no eigenvalue exceeds 1;
-- none reaches 2 as long as M ≻ ½M̂; the bound is reached with links of half the mass, or just after a payload
-  was dropped that is still in the estimate.
+- where M ⪰ M̂, for example if the payload is underestimated, no eigenvalue exceeds 1;
+- no eigenvalue reaches 2 as long as M ≻ ½M̂; the bound is reached with links of half the mass, or just after a
+  payload was dropped that is still in the estimate.
 
 These statements hold for a constant M̄. Its change as the arm moves acts as a disturbance, like the change of
 M in Remark 4; `himpc-lab reproduce himpc-adaptation` shows its effect.
 
 The estimate uses no derivative, and a coarse encoder does not disturb it. It is disturbed by lasting friction
-in τ and by a wrong nominal model; a payload whose weight loads no joint is not seen (m̂ stays 0).
+in τ and by a wrong nominal model; a payload whose weight loads no joint is not detected (m̂ stays 0).
 """
 
 from __future__ import annotations
@@ -66,12 +68,12 @@ class LoadModel:
         self.tau_limit = robot.tau_limit
 
     def inertia(self, q: Array) -> tuple[Array, Array]:
-        """M_n and Φ, what a kilogram more adds, (n, n) kg·m² each."""
+        """M_n, and Φ, the additional inertia per kilogram of payload, (n, n) kg·m² each."""
         M = self._without.mass_matrix(q)
         return M, self._with.mass_matrix(q) - M
 
     def gravity(self, q: Array) -> tuple[Array, Array]:
-        """g and φ, what a kilogram more adds, (n,) N·m each."""
+        """g, and φ, the additional gravity torque per kilogram of payload, (n,) N·m each."""
         g = self._without.bias(q, self._still)
         return g, self._with.bias(q, self._still) - g
 
@@ -129,7 +131,7 @@ def wanted(M: Array, Phi: Array, payload_kg: float, M_bar: Array) -> Array:
     """Returns the M̄, (n,), with λ_max(M̂⁻¹M̄) = 1, below LARGEST times the value that was set.
 
     Args:
-        M, Phi: the nominal inertia and what a kilogram more adds, (n, n).
+        M, Phi: the nominal inertia, and the additional inertia per kilogram of payload, (n, n).
         payload_kg: m̂.
         M_bar: diagonal as it was set, (n,).
     """

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 class TorqueController(ABC):
     """Holds the robot, the settings in use, the acting torque and the bounds in force. After a reset the
-    bounds close in gradually from infinity."""
+    bounds are infinite at first and shrink gradually to the set limits."""
 
     def __init__(self, robot: Robot, settings: Settings) -> None:
         """Raises InputError if the settings name frames or joints that the robot does not have."""
@@ -32,7 +32,7 @@ class TorqueController(ABC):
         return self._settings
 
     def reset(self, tau_0: Array) -> None:
-        """Forgets everything; τ₀ (n,) N·m is the torque acting now."""
+        """Clears all memory; τ₀ (n,) N·m is the torque acting now."""
         self._tau_0 = np.array(tau_0, float)
         self._limits = in_force(self.robot, Limits(torque=False, velocity=False, position="off"))
 

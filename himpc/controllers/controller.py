@@ -25,7 +25,7 @@ class Controller(Protocol):
         ...
 
     def reset(self, tau_0: Array) -> None:
-        """Forgets its memory; τ₀ (n,) N·m is the torque acting now."""
+        """Clears its memory; τ₀ (n,) N·m is the torque acting now."""
         ...
 
     def configure(self, settings: Settings) -> None:

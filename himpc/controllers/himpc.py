@@ -30,16 +30,16 @@ Array = NDArray[np.float64]
 
 ENABLE_SECONDS = 0.5
 _FAINTEST = 1e-8
-"""A task switched on starts with this share of its Q and gains decades at a constant rate."""
+"""A task that is switched on starts with this share of its Q, which then grows exponentially to 1."""
 
 
 class HIMPC(TorqueController):
-    """HIMPC with time-delay estimation instead of a dynamic model: it reads geometry and limits of the robot,
+    """HIMPC with time-delay estimation instead of a dynamic model: it uses geometry and limits of the robot,
     but no masses. (Only with `M_bar_adapt` the nominal model determines M̄.)
 
-    One `step` per period T_s. What it remembers between steps is the torque that was applied (τ₀), the
-    previous velocities (for q̈ and ẍ by backward difference) and the previous plan (for the Jacobians
-    along the prediction). `configure` changes settings and keeps all of it.
+    Call `step` once per period T_s. Between steps the controller stores the torque that was applied (τ₀), the
+    previous velocities (for q̈ and ẍ by backward difference) and the previous plan (for the Jacobians along
+    the prediction). `configure` changes settings and keeps these data.
     """
 
     @property
@@ -51,7 +51,7 @@ class HIMPC(TorqueController):
         return self._asked if self.kernel is None else self.kernel.problems()
 
     def reset(self, tau_0: Array) -> None:
-        """Forgets plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
+        """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
         self._asked: list[LevelProblem] = []
@@ -85,7 +85,8 @@ class HIMPC(TorqueController):
         self._M_bar = self._M_bar_set
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
-        # No joint can give more torque. A larger reading is wrong and must not be the start of a bound.
+        # A joint's torque cannot exceed its limit. A larger reading is wrong and must not be the start of a
+        # bound.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings = settings
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
@@ -180,12 +181,12 @@ class HIMPC(TorqueController):
             self.kernel.take_M_bar(self._M_bar)
 
     def _search(self, tick: PeriodState) -> PeriodResult | None:
-        """The plan along the previous prediction (30); None if the state's consequences are not finite."""
+        """Returns the plan along the previous prediction (30); None if its problems are not finite."""
         state, settings = tick.state, self._settings
         return self._solve(tick, tick.memory.knots(state.q, state.v, settings.horizon, settings.T_s))
 
     def _solve(self, tick: PeriodState, knots: Array) -> PeriodResult | None:
-        """The cascade with the Jacobians taken at q_k and at `knots`, (N−1, n)."""
+        """Solves the cascade with the Jacobians at q_k and at `knots`, (N−1, n)."""
         state, memory, settings = tick.state, tick.memory, self._settings
         configuration = Configuration(self.robot, self._data, state.q, state.v, knots, tick.previews)
         problems, x_dot = self._problems(
@@ -216,7 +217,7 @@ class HIMPC(TorqueController):
         values: dict[str, Array],
         errors: dict[str, Array],
     ) -> tuple[list[LevelProblem] | None, Array]:
-        """The QP data of all levels of a form, None if they are not finite, and ẋ_k of all rows."""
+        """Returns the QP data of all levels of a form, None if they are not finite, and ẋ_k of all rows."""
         J = form.jacobian(configuration)
         x_dot = J[0] @ configuration.v
         before = memory.x_dot
@@ -234,8 +235,8 @@ class HIMPC(TorqueController):
         return problems, x_dot
 
     def _faded(self, level: LevelForm) -> float | Array:
-        """√ of the share of Q that a level has, one per row where its tasks differ; a task that was not there
-        or not on fades in over ENABLE_SECONDS."""
+        """Returns √ of the share of Q that is in effect for a level, one per row if its tasks differ. The
+        share of a task that is new or was just switched on grows to 1 over ENABLE_SECONDS."""
         tasks = level.level.tasks
         if all(self._weight.get(task.name, 1.0) >= 1.0 for task in tasks):
             return 1.0

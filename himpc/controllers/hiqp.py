@@ -22,7 +22,7 @@ _KNOTS = 1
 class HIQP(HIMPC):
     """HIMPC with N = 1; the horizon of the settings is ignored.
 
-    Δτ_k moves ẍ_{k+1} and ẋ_{k+1}, not x_{k+1}: it cannot influence the printed position rows (32d).
+    Δτ_k changes ẍ_{k+1} and ẋ_{k+1}, but not x_{k+1}: it cannot influence the printed position rows (32d).
     """
 
     def __init__(self, robot: Robot, settings: Settings) -> None:

@@ -46,9 +46,9 @@ class HQP(OneStepController):
     torque is bounded; velocity and position limits are not imposed.
 
     [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
-    singularity. Multiplied out, as here, no product of Jacobians is inverted, and R > 0 keeps every Hessian
-    positive definite. y counts from N_n, so that R does not pull an arm at rest down. With R on accelerations
-    it weighs M_n⁻¹ y: this law's M is the nominal one.
+    singularity. This form needs no inverse of a product of Jacobians, and R > 0 keeps every Hessian positive
+    definite. y counts from N_n, so that R does not pull an arm at rest down. With R on accelerations it
+    weighs M_n⁻¹ y: the inertia of this law is the nominal one.
     """
 
     clips = True

@@ -1,4 +1,4 @@
-"""A controller by its name."""
+"""Creates a controller by its name."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ _MAKERS: dict[str, Callable[[Robot, Settings], Controller]] = {
 
 
 def make_controller(name: str, robot: Robot, settings: Settings) -> Controller:
-    """A controller by its name. Raises InputError: unknown name, or settings that do not fit the robot."""
+    """Creates a controller by its name. Raises InputError: unknown name, or settings that do not fit the
+    robot."""
     if name not in _MAKERS:
         raise unknown_name("controller", name, CONTROLLERS)
     return _MAKERS[name](robot, settings)

@@ -19,14 +19,14 @@ MAX_ITERATIONS = 10
 
 
 class NHIMPC(HIMPC):
-    """J_i(q_{k+j|k}) in place of Ĵ_i^j, the simplification (29): a nonlinear problem, since q_{k+j|k} depends
-    on Δτ. It is the only difference to HIMPC.
+    """HIMPC with J_i(q_{k+j|k}) in place of Ĵ_i^j, the simplification (29). The problem is then nonlinear,
+    because q_{k+j|k} depends on Δτ.
 
-    Solved by sequential QPs: all levels under the Jacobians of the last prediction, a new prediction by (18)
-    from their increments, and again until the increments stay within `tolerance` or a level has no optimum.
-    The point this ends in satisfies (15), (33) and all bounds with the Jacobians of its own prediction. An
-    exact SQP would also have the derivative of the Jacobians in its gradient: over N periods that is of the
-    order of (N T_s)² times the rest.
+    It is solved by sequential QPs: each iteration solves all levels with the Jacobians of the last
+    prediction, and computes a new prediction by (18) from their increments. It ends when the increments
+    change by at most `tolerance` or a level has no optimum. The result satisfies (15), (33) and all bounds
+    with the Jacobians of its own prediction. The gradient of an exact SQP would also contain the derivative
+    of the Jacobians: over N periods this term is of the order of (N T_s)² relative to the others.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class NHIMPC(HIMPC):
         """Raises InputError if the settings name frames or joints that the robot does not have.
 
         Args:
-            robot: gives geometry and limits.
+            robot: its geometry and limits are used.
             settings: as for HIMPC.
             tolerance: N·m, see TOLERANCE.
             max_iterations: ≥ 1, see MAX_ITERATIONS; with 1 this is HIMPC.

@@ -1,4 +1,4 @@
-"""Prioritised torques by dynamically consistent null-space projection: the law that OSF and TDEOSF share."""
+"""Prioritised torques by dynamically consistent null-space projection: the common law of OSF and TDEOSF."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from himpc.controllers.one_step import Demand, Law, leak
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-10
-"""Singular values below this share of ‖J_i L⁻ᵀ‖, M = L Lᵀ, count as zero: rounding hides them."""
+"""Singular values below this share of ‖J_i L⁻ᵀ‖, M = L Lᵀ, are rounding errors and count as zero."""
 
 DAMPED = 0.2
-"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper OSF asks for 18 times the torque limit
-with 0.1, and level 1 is a quarter worse with 0.4; RT1 never comes that close to a singularity."""
+"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper OSF demands 18 times the torque limit
+with 0.1, and the error of level 1 is a quarter larger with 0.4; RT1 never comes that close to a
+singularity."""
 
 
 class Projected(NamedTuple):
-    """The torque of the levels down to one of them.
+    """The torque of all levels from the first down to this one.
 
     Attributes:
-        torque: sum of the levels' torques so far, bias left out, (n,) N·m.
-        lost: number of directions that are lost to a singularity: the level has rows for them and the levels
+        torque: sum of the levels' torques so far, without the bias, (n,) N·m.
+        lost: number of directions that are lost to a singularity: the level has rows for them, and the levels
             above leave them free.
     """
 
@@ -40,23 +41,24 @@ def prioritised_torques(
 ) -> list[Projected]:
     """Σ_p J_{p|prec}ᵀ Λ_{p|prec} (ẍ_p − J_p M⁻¹ Σ_{s<p} τ_s) for every level, highest priority first.
 
-    J_{p|prec} is J_p projected into what the levels above leave free and Λ_{p|prec} the inverse of
-    J_{p|prec} M⁻¹ J_{p|prec}ᵀ. With M = L Lᵀ (Cholesky), in the coordinates z = Lᵀ q̈, the dynamically
-    consistent inverse is the Moore–Penrose inverse of J_p L⁻ᵀ restricted to the free directions, and every
-    projector is orthogonal: no product of small numbers is inverted.
+    J_{p|prec} is J_p projected into the directions that the levels above leave free, and Λ_{p|prec} is the
+    inverse of J_{p|prec} M⁻¹ J_{p|prec}ᵀ. With M = L Lᵀ (Cholesky), in the coordinates z = Lᵀ q̈, the
+    dynamically consistent inverse is the Moore–Penrose inverse of J_p L⁻ᵀ restricted to the free directions,
+    and every projector is orthogonal: no product of small numbers is inverted.
 
-    Without damping nothing limits the torque near a singularity: it grows as 1/σ until rounding hides the
-    direction, which is then given up. With damping, 1/σ becomes σ/ε² below ε = damping · ‖J_p L⁻ᵀ‖, which is
-    damped least squares with λ² = ε² − σ² there; farther away nothing changes, and the priorities stay exact.
+    Without damping nothing limits the torque near a singularity: it grows as 1/σ until σ is a rounding error;
+    the direction is then dropped. With damping, 1/σ becomes σ/ε² below ε = damping · ‖J_p L⁻ᵀ‖, which is
+    damped least squares with λ² = ε² − σ² there; farther away from the singularity nothing changes, and the
+    priorities stay exact.
 
     Args:
         M: inertia matrix, (n, n) kg·m², positive definite.
         jacobians: J_p, (m_p, n).
-        accelerations: ẍ_p − J̇_p q̇ wanted, (m_p,).
-        damping: where damping begins, as a share of ‖J_p L⁻ᵀ‖; 0: nowhere.
+        accelerations: desired ẍ_p − J̇_p q̇, (m_p,).
+        damping: singular values below this share of ‖J_p L⁻ᵀ‖ are damped; 0: no damping.
 
     Raises:
-        numpy.linalg.LinAlgError: M is not positive definite, or something is not finite.
+        numpy.linalg.LinAlgError: M is not positive definite, or a value is not finite.
     """
     root = np.linalg.cholesky(M)
     free = np.eye(len(M))
@@ -109,14 +111,15 @@ def projected_law(M: Array, bias: Array, tau_0: Array, demands: list[Demand], da
 
 
 def split(A: Array, size: float) -> tuple[Array, Array, Array, Array]:
-    """A = left · diag(sigma) · rightᵀ without the singular values that are rounding, and the null space.
+    """Decomposes A = left · diag(sigma) · rightᵀ without singular values that are rounding errors, and
+    returns its null space.
 
     Args:
         A: (m, d).
-        size: the norm that rounding is measured against.
+        size: a norm; singular values are compared with it.
 
     Returns:
-        left (m, r), sigma (r,), right (d, r) and an orthonormal basis (d, d − r) of what A maps to zero.
+        left (m, r), sigma (r,), right (d, r) and an orthonormal basis (d, d − r) of the null space of A.
     """
     left, sigma, right = np.linalg.svd(A, full_matrices=True)
     rank = int((sigma > ROUNDING * size).sum())

@@ -52,7 +52,7 @@ class Demand(NamedTuple):
 
 
 class Law(NamedTuple):
-    """A controller's answer for one tick.
+    """The result of a controller's law at one tick.
 
     Attributes:
         bias: torque of q̈ = 0 in the controller's model, (n,) N·m.
@@ -64,10 +64,10 @@ class Law(NamedTuple):
 
 
 class OneStepController(TorqueController):
-    """State, settings and their bumpless change for OSF, TDEOSF and HQP; a subclass gives the law.
+    """State, settings and their bumpless change for OSF, TDEOSF and HQP; subclasses implement the law.
 
-    A change of settings is bumpless: the jump that it makes in the torque is subtracted, and this correction
-    fades out over BLEND_SECONDS. After `reset` there is no correction.
+    A change of settings is bumpless: the jump of the torque that would occur is subtracted, and this
+    correction fades out over BLEND_SECONDS. After `reset` there is no correction.
     """
 
     clips: bool = False
@@ -78,7 +78,7 @@ class OneStepController(TorqueController):
     """Whether the bias contains τ₀: the bias is then continuous, and only the rest of the torque can jump."""
 
     def reset(self, tau_0: Array) -> None:
-        """Forgets its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""
+        """Clears its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""
         super().reset(tau_0)
         self._before: tuple[Array, float] | None = None
         self._offset = np.zeros(self.robot.n)
@@ -171,7 +171,8 @@ class OneStepController(TorqueController):
         """The demands of a form's levels; x and x̃ of every task are written to `values` and `errors`."""
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
         here = Configuration(self.robot, self._data, q, v, previews=previews)
-        # The kernel sees how J changes with q; of one axis it also changes with a target that turns.
+        # The kernel includes the change of J with q. The Jacobian of an orientation about one axis also
+        # changes if its target rotates; the kernel does not include this.
         if self._kinematics is not None and not any(
             previews[name].velocity[0].any() for name in self._about_one_axis
         ):
@@ -213,8 +214,8 @@ class OneStepController(TorqueController):
         return tau, [level._replace(U=level.U + (base - self._tau_0)) for level in law.levels]
 
     def _hold(self, q: Array, status: str, started: int) -> Plan:
-        """Returns the plan for a tick without a usable state or model: the torque is held and the velocity is
-        forgotten."""
+        """Returns the plan for a tick without a usable state or model: the torque is held and the stored
+        velocity is cleared."""
         self._before = None
         if self.clips:
             self._tau_0 = np.clip(self._tau_0, self._limits.tau_lower, self._limits.tau_upper)

@@ -33,8 +33,8 @@ Calling = Callable[[Law, View], Any]
 """Calls the law. Raises OwnFault with one sentence if the call fails."""
 
 REST = 5.0
-"""1/s: rate at which a robot whose code failed comes to rest, τ = τ₀ − M̄ (q̈ + REST · q̇): the torque is held
-but for what still moves."""
+"""1/s: rate at which a robot whose code failed is brought to rest, τ = τ₀ − M̄ (q̈ + REST · q̇): the torque
+is held, and the remaining motion is damped."""
 OPENING_SECONDS = 0.3
 """s: time after a change of settings until the law's torque is applied in full."""
 _FIRST_SHARE = 0.02
@@ -46,25 +46,29 @@ class OwnController(TorqueController):
     """Runs a user's control law. It prepares the law's view, applies the bounds in force and collects the
     evidence.
 
-    The answer of the law is a torque (n,) N·m, or one row per level (r, n), the torque that the levels down
-    to each would apply: the last row acts, and the leak between levels (33) is then measured with M̄ too.
+    The law returns a torque (n,) N·m, or one row per level (r, n): row i is the torque that levels 1 to i
+    would apply. The last row acts, and the leak between levels (33) is then also measured, with M̄.
 
-    Once the law failed (it raised, gave a wrong shape or a number that is not finite) the torque is held and
-    damped until `reset`; `Plan.notice` of that tick says what happened.
+    After the law failed (it raised an exception, or returned a wrong shape or a number that is not finite),
+    the torque is held and damped until `reset`; `Plan.notice` of that tick names the failure.
     """
 
     def __init__(
         self, robot: Robot, settings: Settings, make: Callable[[], Law], call: Calling, where: str
     ) -> None:
-        """make: creates a new law without memory; where: file and line of the law. Raises InputError if the
-        settings do
-        not fit the robot."""
+        """Raises InputError if the settings do not fit the robot.
+
+        Args:
+            make: creates a new law without memory.
+            call: calls the law.
+            where: file and line of the law.
+        """
         self._elsewhere = robot.model.createData()
         self._make, self._call, self._where = make, call, where
         super().__init__(robot, settings)
 
     def reset(self, tau_0: Array) -> None:
-        """Forgets everything, a fault too; τ₀ (n,) N·m is the torque acting now."""
+        """Clears all memory, including a fault; τ₀ (n,) N·m is the torque acting now."""
         super().reset(tau_0)
         self._before: tuple[Array, Array, float] | None = None
         self._x_dot: Array | None = None
@@ -118,7 +122,7 @@ class OwnController(TorqueController):
         self._tau_0 = plan.tau
         return plan
 
-    # ---------------------------------------------------------------- what the law sees
+    # ---------------------------------------------------------------- the view that the law receives
 
     def _view(
         self,
@@ -202,7 +206,7 @@ class OwnController(TorqueController):
             approach=rate,
         )
 
-    # ---------------------------------------------------------------- what comes of its answer
+    # ---------------------------------------------------------------- the use of the law's torque
 
     def _opened(self, answers: Array) -> Array:
         """Blends the torque after a change of settings to the law's new torque."""

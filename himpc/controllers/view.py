@@ -56,14 +56,14 @@ class LevelView:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The bounds of this tick; infinite where nothing is imposed.
+    """The bounds of this tick; infinite for limits that are not imposed.
 
     Attributes:
         tau_lower, tau_upper: (n,) N·m.
-        v_lower, v_upper: on the next velocity, (n,) rad/s; where position limits are imposed by viability,
-            also the velocity from which a joint can still stop before its end.
+        v_lower, v_upper: on the next velocity, (n,) rad/s. With position limits by viability they include the
+            velocity from which a joint can still stop before its end.
         q_lower, q_upper: (n,) rad.
-        approach: 1/s, how fast a velocity bound may be approached, as a share of what is left; 0: at once.
+        approach: 1/s, largest rate at which the distance to a velocity bound may shrink; 0: no such limit.
     """
 
     tau_lower: Array

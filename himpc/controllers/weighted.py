@@ -25,20 +25,21 @@ from himpc.tick.tick import CompiledTick
 Array = NDArray[np.float64]
 
 DAMPING_SHARE = 1e-4
-"""Factor on the damping level's Q: it must damp the directions that no task uses without competing with the
-tasks."""
+"""Factor on the damping level's Q: the level must damp directions that no task uses, without competing with
+the tasks."""
 
 
 class Weighted(HIMPC):
     """HIMPC without priorities: min Σ_i V_i over one U, V_i the cost (32a) of level i, under the same rows.
 
-    Model, weights, bounds and hand-over are HIMPC's; only (33) is missing, so a level is as important as its
-    Q. The order of the levels does not matter. A level's own horizon (Remark 8) ends its residual, not its
-    effort: R of (31) adds up over all levels and the longest horizon.
+    Model, weights, bounds and hand-over are the same as in HIMPC, except that (33) is missing: the importance
+    of a level is its Q, and the order of the levels does not matter. A level's own horizon (Remark 8) ends
+    its residual, not its effort: R of (31) is the sum over all levels, up to the longest horizon.
 
-    Evidence: entry p of the plan is the same problem of levels 1 … p alone, the last one is applied. The leak
-    thus tells, as for HIMPC, how far the levels below p move level p from where it would be without them.
-    `cost` is V_p under the applied U. The r − 1 QPs needed for evidence only are left out of `step_us`.
+    Evidence: entry p of the plan is the solution of the same problem with levels 1 … p alone; the last one is
+    applied. Its leak is, as for HIMPC, the distance by which the levels below p move level p from its
+    solution without them. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs that
+    only the evidence needs.
     """
 
     _evidence_us = 0.0
@@ -46,7 +47,7 @@ class Weighted(HIMPC):
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period, see `HIMPC.step`."""
+        """Computes one control period, see `HIMPC.step`."""
         self._evidence_us = 0.0
         plan = super().step(q, v, previews, tau_applied)
         return replace(plan, step_us=plan.step_us - self._evidence_us) if self._evidence_us else plan

@@ -1,2 +1,2 @@
 """From settings to the optimisation problems of a control period: the settings, the levels prepared for them,
-and what is remembered from the period before. The printed route and the compiled one share it."""
+and the memory of the previous period. The printed route and the compiled one share this package."""

@@ -52,7 +52,8 @@ class LevelForm:
     sizes: tuple[int, ...]
 
     def problem(self, B: Array, free: Array, weighted_free: Array, share: float | Array) -> LevelProblem:
-        """The level's QP data; `share` of its √Q, one number or one per row, counts while it fades in."""
+        """Returns the level's QP data. share: factor on its √Q while it fades in, one number or one per
+        row."""
         rows, root_Q, weighted_C, weighted = (
             self.rows,
             self.root_Q,
@@ -95,18 +96,18 @@ class StackForm:
     root_Q: Array
 
     def jacobian(self, configuration: Configuration) -> Array:
-        """Ĵ of all rows at every knot, (N, m, n)."""
+        """Returns Ĵ of all rows at every knot, (N, m, n)."""
         blocks = [task.jacobian(configuration) for task in self.tasks]
         return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
 
     def drift(
         self, robot: Robot, data: pin.Data, q: Array, v: Array, previews: Mapping[str, Preview], h: float
     ) -> Array:
-        """J̇ q̇ of all rows, (m,): how J changes along the motion of the robot and of the targets.
+        """J̇ q̇ of all rows, (m,), from the change of J along the motion of the robot and of the targets.
 
         Args:
             robot, data, q, v, previews: as for a `Configuration`.
-            h: s, how far robot and targets are moved to both sides.
+            h: s, time by which robot and targets are moved forward and backward for the difference.
         """
         on, back = (
             self.jacobian(Configuration(robot, data, q + s * v, v, previews=Later(previews, s)))[0]
@@ -128,7 +129,7 @@ class StackForm:
     def free(
         self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int
     ) -> Array:
-        """e at knots 1 … N for Δτ = 0, (N, m), all rows."""
+        """Returns e at knots 1 … N for Δτ = 0, (N, m), all rows."""
         desired = np.empty((3, N, error.size))
         start = 0
         for task, rows in zip(self.tasks, self.sizes, strict=True):
@@ -148,7 +149,7 @@ def measure(
     values: dict[str, Array],
     errors: dict[str, Array],
 ) -> Array:
-    """x̃ of tasks, (m,); x and x̃ of each are written to `values` and `errors`."""
+    """Returns x̃ of tasks, (m,); x and x̃ of each are written to `values` and `errors`."""
     found = []
     for task in tasks:
         value = task.value(configuration)
@@ -215,7 +216,7 @@ class Prepared(NamedTuple):
     """The settings of a controller, applied to a robot.
 
     Attributes:
-        form: the levels to solve; the damping level where there are none.
+        form: the levels to solve; the damping level if no other level is to be solved.
         idle: whether no level is enabled and damping is off; the torque is then held.
         off: tasks of the levels that are not solved.
     """
@@ -226,7 +227,7 @@ class Prepared(NamedTuple):
 
 
 def prepare(robot: Robot, settings: Settings) -> Prepared:
-    """Prepares the levels that take part.
+    """Prepares the levels to solve.
 
     Raises:
         InputError: M̄ has the wrong length, a frame or joint is unknown, or a gain or weight does not fit.
@@ -234,7 +235,7 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
     if len(settings.M_bar) != robot.n:
         raise InputError(f"M_bar has {len(settings.M_bar)} entries: '{robot.name}' has {robot.n} joints")
     levels = active_levels(settings.stack, settings.damping, freedom_left(robot, settings.stack))
-    # Levels that are off are prepared too: a wrong gain must be refused now, not when it is switched on.
+    # Disabled levels are prepared too, so that a wrong gain is refused now and not when the level is enabled.
     stack_form(robot, (*settings.stack, DAMPING_LEVEL), settings)
     return Prepared(
         form=stack_form(robot, levels or (DAMPING_LEVEL,), settings),
@@ -244,8 +245,8 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
 
 
 def usable(x: Array) -> bool:
-    """Whether values are finite, and small enough that their squares and the differences of bounds are finite
-    too."""
+    """Whether values are finite, and small enough that their squares and the differences of bounds are also
+    finite."""
     return float(x @ x) < 1e18
 
 

@@ -37,11 +37,11 @@ class Memory(NamedTuple):
 
     @classmethod
     def start(cls, q: Array, v: Array, T_s: float) -> Memory:
-        """The memory of a robot that has moved with constant velocity so far: q̈ and ẍ are zero."""
+        """Returns the memory of a robot that has moved with constant velocity so far: q̈ and ẍ are zero."""
         return cls(q, v, T_s)
 
     def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:
-        """q*_{k+j|k−1}, j = 1 … N−1, re-rooted at the measured q: (N−1, n), see (30).
+        """q*_{k+j|k−1}, j = 1 … N−1, shifted to begin at the measured q: (N−1, n), see (30).
 
         If the last prediction is too short for the horizon, it is continued at constant velocity.
         """

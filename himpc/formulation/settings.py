@@ -19,23 +19,23 @@ Period = Annotated[float, Range(1e-4, 0.02)]
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything about a torque-level controller that may change while the robot moves.
+    """The settings of a torque-level controller; all of them may change while the robot moves.
 
     Attributes:
         stack: levels, highest priority first.
         horizon: N ≥ 1 knots; 1 is HIQP.
         T_s: control period, s.
         M_bar: diagonal of M̄, one per joint, kg·m².
-        M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they find from the applied
+        M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they estimate from the applied
             torques, see `himpc.controllers.adaptation`.
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
         solver: "daqp", "proxqp" or, with CasADi installed, "qpoases": solves the QPs of the explicit route
             and of hqp. Where it would change nothing, only "daqp" is accepted, see `check_solver`.
-        R_on: what R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration" M̄⁻¹Δτ (HQP:
-            with its model's M_n).
+        R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
+            M̄⁻¹Δτ (HQP: with its model's M_n).
         damping: add the damping level whenever the enabled levels leave freedom.
-        nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; nothing else reads it.
+        nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; others do not use it.
     """
 
     stack: Stack
@@ -60,7 +60,7 @@ class Settings:
 
 
 def check_solver(settings: Settings, used: bool) -> None:
-    """Raises InputError for a QP solver other than the default where none is used."""
+    """Raises InputError for a QP solver other than the default if the controller uses no QP solver."""
     if settings.solver != "daqp" and not used:
         raise InputError(
             f"solver={settings.solver} changes nothing here: only hqp uses a QP solver, and himpc, hiqp, "

@@ -1,10 +1,10 @@
 """A dual active-set method (Goldfarb and Idnani) for min ½xᵀHx + gᵀx under lower ≤ Ax ≤ upper, compiled.
 
-With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖² and a row a becomes n = ±L⁻¹a, nᵀz ≥ β. The method starts at
-the unconstrained optimum and takes in violated rows one by one, highest violation first, while no multiplier
-falls below zero; rows whose multiplier would do so leave. The rows held are kept as combinations of
-orthonormal ones, so that no row that depends on them can enter: it replaces one of them, or the rows
-contradict each other.
+With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖², and a row a becomes nᵀz ≥ β with n = ±L⁻¹a. The method starts
+at the unconstrained optimum and adds violated rows one by one, the most violated row first. Rows whose
+multiplier would become negative are removed. The active rows are stored as combinations of orthonormal ones.
+A row that depends on them does not enlarge this basis, so it replaces one of them, or the rows contradict
+each other.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from himpc.qp import QPSolution
 Array = NDArray[np.float64]
 
 CONTRADICTION = "contradiction"
-"""The status of a QP that no point satisfies."""
+"""The status of a QP without a feasible point."""
 _STATUS = ("optimal", CONTRADICTION, "limit")
 
 
 class ActiveSetSolver:
-    """One Hessian and the rows held at the last solution, from which the next QP begins."""
+    """One Hessian, and the active rows of the last solution, with which the next QP begins."""
 
     def __init__(self) -> None:
         self._room(0)
@@ -39,18 +39,19 @@ class ActiveSetSolver:
         self._count = 0
 
     def begin(self, H: Array) -> bool:
-        """Factors a Hessian (k, k) and forgets the rows held. False if it is not positive definite."""
+        """Factors a Hessian (k, k) and clears the active rows. Returns False if it is not positive
+        definite."""
         if len(H) != len(self._active):
             self._room(len(H))
         self._H, self._count = H, 0
         return factor(H, self._L)
 
     def solve(self, g: Array, rows: ConstraintRows, same: int) -> QPSolution:
-        """min ½xᵀHx + gᵀx under the rows; lower = upper is an equality.
+        """Solves min ½xᵀHx + gᵀx under the rows; lower = upper is an equality.
 
         Args:
             g: (k,). rows: of k columns.
-            same: how many of the first rows are those of the QP before.
+            same: number of the first rows that are the same as in the QP before.
         """
         started = perf_counter_ns()
         held = self._active[: self._count]

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 PENALTY = 1e3
 """Penalty per metre of violation of the margin at one knot: more than any tracking gain."""
 _LOOK = 0.35
-"""m beyond the margin: pairs that are farther apart get no row. It is larger than the change of a knot's
-position in one step."""
+"""m beyond the margin: pairs that are farther apart get no row. It exceeds the change of a knot's position in
+one step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +41,8 @@ class Avoidance:
     def rows(
         self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, place: int = 0
     ) -> ConstraintRows:
-        """The linearised constraint on the change d of the inputs, one row per pair and knot; from a place
-        in a table on."""
+        """Returns the linearised constraint on the change d of the inputs, one row per pair and knot, and
+        writes it to a table from row `place` on."""
         table = ConstraintTable(N * near.gradient.shape[1]) if table is None else table
         A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance
@@ -52,12 +52,12 @@ class Avoidance:
         )
 
     def depths(self, near: Clearances, N: int) -> Array:
-        """The largest violation of the margin at each knot, (N,) m, ≥ 0."""
+        """Returns the largest violation of the margin at each knot, (N,) m, ≥ 0."""
         depth = np.zeros(N)
         np.maximum.at(depth, near.knot, self.margin - near.distance)
         return depth
 
 
 def clearance(near: Clearances | None) -> float:
-    """The smallest distance, m; infinite if no pair is near."""
+    """Returns the smallest distance, m; infinite if no pair is near."""
     return np.inf if near is None else float(near.distance.min(initial=np.inf))

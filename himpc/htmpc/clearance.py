@@ -1,4 +1,4 @@
-"""Signed distances between a robot's spheres and the shapes that it must not touch, in closed form, with
+"""Signed distances between a robot's spheres and obstacles or the robot's base, in closed form, with
 gradients."""
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Clearances:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """(sphere's link, obstacle's name) of each."""
+        """The (sphere's link, obstacle's name) of each distance."""
         found = zip(self.sphere.tolist(), self.shape.tolist(), strict=True)
         return [(self.links[sphere], self.names[shape]) for sphere, shape in found]
 
@@ -53,7 +53,7 @@ class CollisionModel:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """Of the spheres."""
+        """Names of the links that carry the spheres."""
         return self._around.links
 
     @property
@@ -62,11 +62,12 @@ class CollisionModel:
         return not self._around.names
 
     def clearances(self, q: Array, within: float, gradients: bool = True) -> Clearances:
-        """All pairs nearer than `within`, m, at configurations q (K, n); without gradients they are empty."""
+        """Returns all pairs nearer than `within`, m, at configurations q (K, n); without gradients, that
+        array is empty."""
         return self.between(placed(self._tree, q), within, gradients)
 
     def between(self, where: Placed, within: float, gradients: bool = True) -> Clearances:
-        """Computes the same distances for joints whose placements are known."""
+        """Computes the same distances from known placements of the joints."""
         around, tree = self._around, self._tree
         K, S = len(where.at), len(around.radius)
         most = K * S * len(around.names)

@@ -15,10 +15,11 @@ Array = NDArray[np.float64]
 
 
 def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds) -> Array:
-    """Inputs (N, n) that bring every joint to rest as fast as its bounds allow, and back inside its range.
+    """Returns inputs (N, n) that bring every joint to rest as fast as its bounds allow, and back inside its
+    range.
 
-    A joint beyond a position bound is sent back at up to a fifth of its speed limit. When input and jerk
-    bounds exclude each other (a limit was tightened) the jerk bound holds.
+    A joint beyond a position bound moves back at up to a fifth of its speed limit. When input and jerk bounds
+    exclude each other (after a limit was tightened), the jerk bound holds.
     """
     U = np.empty((N, len(start.v)))
     brake(*start, dt, period, bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j, U)
@@ -26,11 +27,12 @@ def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds
 
 
 def shifted(before: Motion, s: float, N: int, dt: float, bounds: MotionBounds) -> Array:
-    """The inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N times dt.
+    """Returns the inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N
+    times dt.
 
     Each is the mean of the old input over the new interval, so the velocities at the new knots are the old
-    plan's at those times, whatever the control rate and even if N or dt has changed. Beyond its end the old
-    plan brakes: one that coasts makes hard limits infeasible for good.
+    plan's at those times, for every control rate and even if N or dt has changed. Beyond its end the old plan
+    brakes: constant velocity there would make hard limits infeasible for all later steps.
     """
     reach = s + N * dt
     length = len(before.U) * before.dt

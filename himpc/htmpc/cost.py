@@ -24,8 +24,8 @@ ZETA = 5e-3
 def gauss_newton(
     J: Array, Q: Array, e: Array, T_q: Array, effort: Array, share: float, ridge: float
 ) -> tuple[Array, Array]:
-    """Hessian (k, k) and gradient (k,) of ½Σ eᵀQe with respect to the inputs, with a share of the effort's
-    Hessian and a ridge: blocks Σ_k T_q[k, s] T_q[k, r] J_kᵀ Q_k J_k.
+    """Returns the Hessian (k, k) and gradient (k,) of ½Σ eᵀQe with respect to the inputs, with a share of the
+    effort's Hessian and a ridge: blocks Σ_k T_q[k, s] T_q[k, r] J_kᵀ Q_k J_k.
 
     Args:
         J: (N, m, n), ∂e_k/∂q_k. Q, e: (N, m). T_q: (N, N), ∂q_k/∂u_s. effort: (k, k).
@@ -51,14 +51,14 @@ class Effort:
 
     @cached_property
     def hessian(self) -> Array:
-        """(N·n, N·n), constant."""
+        """The Hessian of (10), (N·n, N·n), constant."""
         T_v, _, D, _ = integrator(self.N, self.dt)
         w = self.weights
         H = np.kron(T_v.T @ T_v, np.diag(w.S)) + np.kron(np.eye(self.N), np.diag(w.R))
         return H + np.kron(D.T @ D, np.diag(w.W))
 
     def absolute(self, start: Start, U: Array) -> tuple[float, Array]:
-        """Value and gradient (N·n,) of (10)."""
+        """Returns value and gradient (N·n,) of (10)."""
         T_v, _, D, _ = integrator(self.N, self.dt)
         w = self.weights
         V = start.v + T_v @ U
@@ -69,23 +69,24 @@ class Effort:
         return value, (T_v.T @ v + u + D.T @ d).ravel()
 
     def about(self, rest: tuple[float, Array], U: Array) -> tuple[float, Array]:
-        """Value and gradient of (10) from those at U = 0: it is quadratic."""
+        """Returns value and gradient of (10), which is quadratic, from its value and gradient at U = 0."""
         value, slope = rest
         u = U.ravel()
         change = self.hessian @ u
         return value + float(u @ (slope + 0.5 * change)), slope + change
 
     def relative(self, U: Array, plan: Array) -> tuple[float, Array]:
-        """Value and gradient of the same weights on the deviation from a plan (N, n): the proximal effort."""
+        """Returns value and gradient of the same weights on the deviation from a plan (N, n): the proximal
+        effort."""
         gap = (U - plan).ravel()
         slope = self.hessian @ gap
         return 0.5 * float(gap @ slope), slope
 
 
 def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
-    """The relaxed log barrier of all bounds: value, gradient (k,), Hessian (k, k) with respect to u.
+    """Returns the relaxed log barrier of all bounds: value, gradient (k,), Hessian (k, k) with respect to u.
 
-    B(h) = −μ ln h for h ≥ ζ, and the parabola that continues it twice differentiably below.
+    B(h) = −μ ln h for h ≥ ζ, and below ζ the parabola that continues it with two continuous derivatives.
     """
     value = rows.A @ u
     above = np.isfinite(rows.upper)

@@ -14,7 +14,7 @@ from himpc.htmpc.tracking import Tracking
 Array = NDArray[np.float64]
 
 _FELT = 1e-6
-"""Smaller multipliers are rounding."""
+"""Smaller multipliers are rounding errors."""
 
 
 def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:

@@ -19,7 +19,7 @@ Indices = NDArray[np.intp]
 
 _TASK = np.array([[POSITION, 0, 0, 3], [ORIENTATION, 0, 3, 3]])
 _PART = np.array([0, 1, 2, 0, 1, 2])
-"""Linear over angular rows of one frame, as tasks of the kernel."""
+"""Linear and then angular rows of one frame, as tasks of the kernel."""
 
 
 class Placed(NamedTuple):
@@ -61,7 +61,7 @@ def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
 
 @per_robot
 def _mounted(robot: Robot, name: str) -> tuple[Indices, Array, Array]:
-    """The joint that carries a frame, and the frame's axes and origin in the joint's."""
+    """Returns the joint that carries a frame, and the frame's axes and origin in the joint's frame."""
     frame = robot.model.frames[robot.frame_id(name or robot.tip)]
     place = frame.placement
     joint, origin = np.array([frame.parentJoint], np.intp), np.array([place.translation])

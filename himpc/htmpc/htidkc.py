@@ -31,12 +31,13 @@ class _Box(NamedTuple):
 
 
 class HTIDKC:
-    """One velocity per period from a cascade of regularised QPs. Of its settings it reads the stack, `gains`,
-    `rho`, the limits (jerk is not among them, section V-C), the solver and the rate; the authors' is 50 Hz.
+    """Computes one velocity per period by a cascade of regularised QPs. It uses these settings: the stack,
+    `gains`, `rho`, the limits (without the jerk limit, section V-C), the solver and the rate; the authors use
+    50 Hz.
 
-    Level 0 minimises the violation of the bounds; they are a box per joint, so its solution is the nearest
-    point of the box that the accelerations allow. Level l then solves
-    min ½‖J_l q̇ − ẋ_l‖² + ½ρ‖q̇‖² inside what level 0 left, with J_i q̇ = J_i q̇*_i for the levels i above.
+    Level 0 minimises the violation of the bounds. They form a box, one interval per joint, so its solution is
+    the nearest point of the box that the accelerations allow. Level l then solves min ½‖J_l q̇ − ẋ_l‖² +
+    ½ρ‖q̇‖² inside the intervals of level 0, with J_i q̇ = J_i q̇*_i for the levels i above.
     """
 
     def __init__(self, robot: Robot, settings: HTMPCSettings) -> None:
@@ -52,7 +53,7 @@ class HTIDKC:
         return self._settings
 
     def reset(self) -> None:
-        """Forgets the last command."""
+        """Clears the last command."""
         self._last: Array | None = None
 
     def configure(self, settings: HTMPCSettings) -> None:
@@ -167,8 +168,8 @@ class HTIDKC:
 
 
 def _approach(room: Array, limits: MotionBounds, T: float) -> Array:
-    """The velocity from which a joint can still stop within `room`, decided every T seconds; past a bound
-    a return at up to a fifth of the speed limit."""
+    """Returns the velocity from which a joint can still stop within `room`, decided every T seconds; beyond a
+    bound, a velocity back of up to a fifth of the speed limit."""
     braking = np.where(np.isfinite(limits.a), limits.a, 1e9)
     inside = braking * (np.sqrt(T * T + 2.0 * np.maximum(room, 0.0) / braking) - T)
     return np.where(room >= 0.0, inside, np.maximum(room, -0.2 * limits.v))

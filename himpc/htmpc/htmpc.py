@@ -38,8 +38,8 @@ _MEMORY = 200
 class HTMPC:
     """Plans velocities by Algorithm 2: one STMPC (9) per level, from the highest priority down.
 
-    It reads geometry and limits of the robot. One `step` per control period; its only memory is the last
-    plan. `configure` changes settings and keeps that plan, so the commanded motion goes on without a jump.
+    It uses geometry and limits of the robot. Call `step` once per control period; the only memory is the last
+    plan. `configure` changes settings and keeps that plan, so the commanded motion continues without a jump.
     """
 
     def __init__(self, robot: Robot, settings: HTMPCSettings) -> None:
@@ -56,8 +56,7 @@ class HTMPC:
         return self._settings
 
     def reset(self) -> None:
-        """Forgets the plan; the robot is assumed to continue at the measured velocity without
-        acceleration."""
+        """Clears the plan; the robot is assumed to continue at the measured velocity without acceleration."""
         self._past: deque[Motion] = deque(maxlen=_MEMORY)
         self._since = self._settings.period
 
@@ -69,7 +68,8 @@ class HTMPC:
         tasks = tuple(task for level in settings.stack for task in level.tasks)
         for task in tasks:
             task.jacobian(home)
-        # Levels that are off are prepared too: a wrong weight must be refused now, not once it is on.
+        # Disabled levels are prepared too, so that a wrong weight is refused now and not when the level is
+        # enabled.
         every = [(level, tracking(robot, level, settings)) for level in settings.stack]
         active = self._chosen(tuple(level for level in settings.stack if level.enabled))
         check_dimensions(robot, active)
@@ -89,7 +89,7 @@ class HTMPC:
         return enabled
 
     def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:
-        """Columns of the joints that stay at rest."""
+        """Returns the columns of the joints that stay at rest."""
         return np.array(joint_indices(self.robot, settings.hold) if settings.hold else [], np.int64)
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
@@ -119,7 +119,8 @@ class HTMPC:
 
     def _start(self, q: Array, v: Array) -> Start:
         """Returns the state from which to plan, predicted forward by the delay, and the input before it."""
-        # The control rate may have changed: the last plan was commanded for the period in force at its time.
+        # The control rate may have changed: the last plan was commanded for the period that was set at its
+        # time.
         period, past, still = self._since, self._past, np.zeros(self.robot.n)
         usable = plausible(self.robot, q, v)
         if not past and not usable:
@@ -133,7 +134,7 @@ class HTMPC:
         delay = self._settings.delay_s
         if delay == 0.0:
             return Start(np.array(q, float), commandable(v, last, self._bounds), acted)
-        # Commands that have been given but have not acted yet cannot be changed any more.
+        # Commands that were sent but have not acted yet cannot be changed any more.
         return Start(q + underway(past, period, delay), last, acted)
 
     def _tick(self, start: Start, previews: Mapping[str, Preview]) -> SharedStep:
@@ -164,7 +165,7 @@ class HTMPC:
         )
 
     def _solve(self, tick: SharedStep) -> list[Solved]:
-        """Algorithm 2."""
+        """Solves all levels by Algorithm 2."""
         at = tick.iterate(tick.plan)
         solved: list[Solved] = []
         guards: list[Guard] = []

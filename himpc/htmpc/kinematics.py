@@ -17,7 +17,7 @@ from robots import Robot
 
 Array = NDArray[np.float64]
 Desired = list[Array] | Array
-"""r of (6), knot by knot."""
+"""r of (6) for each knot."""
 
 
 class Knots:
@@ -34,20 +34,20 @@ class Knots:
         return placed(geometry(self._robot), self._q)
 
     def errors(self, task: Task, desired: Desired) -> Array:
-        """e = x − r of (6) at every knot, (K, m)."""
+        """Returns e = x − r of (6) at every knot, (K, m)."""
         if isinstance(task, FramePosition):
             return self._frame(task.frame).p[:, task.components] - np.asarray(desired)
         pairs = zip(self._knots, desired, strict=True)
         return np.array([task.error(task.value(knot), goal) for knot, goal in pairs])
 
     def value(self, task: Task) -> Array:
-        """x at the first knot."""
+        """Returns x at the first knot."""
         if isinstance(task, FramePosition):
             return self._frame(task.frame).p[0, task.components]
         return task.value(self._knots[0])
 
     def jacobian(self, task: Task, desired: Desired) -> Array:
-        """J of a task at every knot, (K, m, n), where r is `desired`."""
+        """Returns J of a task at every knot, (K, m, n), for the reference r = `desired`."""
         if isinstance(task, FramePosition):
             return self._frame(task.frame).J[:, :3][:, task.components]
         if isinstance(task, OrientationTask) and len(task.axes) == 1:
@@ -63,13 +63,13 @@ class Knots:
 
     @cached_property
     def _path(self) -> Configuration:
-        """All knots as one `Configuration`, which is used for Jacobians only."""
+        """All knots as one `Configuration`, used for Jacobians only."""
         robot, data, q = self._robot, self._data, self._q
         return Configuration(robot, data, q[0], q[0], q[1:], jacobians=lambda frame: self._frame(frame).J)
 
     @cached_property
     def _knots(self) -> list[Configuration]:
-        """One `Configuration` per knot, which are used for positions only."""
+        """One `Configuration` per knot, used for positions only."""
         every = enumerate(self._q)
         return [
             Configuration(self._robot, self._data, q, q, placed=partial(self._placement, k)) for k, q in every
@@ -81,10 +81,10 @@ class Knots:
 
 
 def desired_values(task: Task, preview: Preview, N: int) -> Desired:
-    """r of (6) at knots 0 … N.
+    """Returns r of (6) at knots 0 … N.
 
     Raises:
-        ValueError: the preview has not N + 1 knots.
+        ValueError: the preview does not have N + 1 knots.
     """
     if len(preview.displacement) != N + 1:
         raise ValueError(

@@ -60,7 +60,7 @@ class LevelEvidence(NamedTuple):
     felt: Felt
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
-        """The active constraints in words."""
+        """Returns the active constraints with the names of joints and kinds."""
         found: list[Binding] = []
         kinds, knots, parts, values = self.felt
         each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), strict=True)
@@ -101,12 +101,12 @@ class VelocityPlan(NamedTuple):
     step_us: float
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
-        """All constraints that bind, level by level."""
+        """Returns all active constraints, level by level."""
         return [each for level in self.levels for each in level.binding(joint_names)]
 
     @property
     def unsolved(self) -> int:
-        """How many QPs had no verified point at the first attempt."""
+        """Number of QPs without a verified point at the first attempt."""
         return sum(level.unsolved for level in self.levels)
 
     @property

@@ -35,7 +35,7 @@ class Integrator(NamedTuple):
 
 @lru_cache(maxsize=32)
 def integrator(N: int, dt: float) -> Integrator:
-    """The condensed double integrator of N steps of dt seconds."""
+    """Returns the condensed double integrator of N steps of dt seconds."""
     k, s = np.arange(1, N + 1)[:, None], np.arange(N)[None, :]
     before = s < k
     T_v = np.where(before, dt, 0.0)
@@ -57,22 +57,22 @@ class Start(NamedTuple):
 
 
 def velocities(start: Start, U: Array, dt: float) -> Array:
-    """v at knots 1 … N, (N, n), for inputs U (N, n)."""
+    """Returns v at knots 1 … N, (N, n), for inputs U (N, n)."""
     return start.v + integrator(len(U), dt).T_v @ U
 
 
 def positions(start: Start, U: Array, dt: float) -> Array:
-    """q at knots 1 … N, (N, n), for inputs U (N, n)."""
+    """Returns q at knots 1 … N, (N, n), for inputs U (N, n)."""
     return coasting(start, len(U), dt) + integrator(len(U), dt).T_q @ U
 
 
 def coasting(start: Start, N: int, dt: float) -> Array:
-    """q at knots 1 … N without inputs, (N, n)."""
+    """Returns q at knots 1 … N without inputs, (N, n)."""
     return start.q + integrator(N, dt).t[:, None] * start.v
 
 
 class Motion(NamedTuple):
-    """A plan as a function of time: velocities linear between knots that lie dt apart.
+    """A plan as a function of time: velocities are linear between knots, which are dt apart.
 
     Attributes:
         start: its first knot.
@@ -85,13 +85,13 @@ class Motion(NamedTuple):
     dt: float
 
     def velocity(self, s: float) -> Array:
-        """v at s ≥ 0 seconds after the start, (n,); beyond the last knot it stays."""
+        """Returns v at s ≥ 0 seconds after the start, (n,); it is constant after the last knot."""
         k = min(math.floor(s / self.dt + 1e-9), len(self.U))
         v = self.start.v + self.dt * self.U[:k].sum(axis=0)
         return v + (s - k * self.dt) * self.U[k] if k < len(self.U) else v
 
     def position(self, s: float) -> Array:
-        """q at 0 ≤ s ≤ N·dt seconds after the start, (n,)."""
+        """Returns q at 0 ≤ s ≤ N·dt seconds after the start, (n,)."""
         whole = min(math.floor(s / self.dt + 1e-9), len(self.U))
         rest = s - whole * self.dt
         q = self.start.q + whole * self.dt * self.start.v
@@ -104,9 +104,9 @@ class Motion(NamedTuple):
 
 
 def underway(past: Sequence[Motion], period: float, delay: float) -> Array:
-    """∫ v ds over the last `delay` seconds of commands, (n,); each plan was followed for one period.
+    """Returns ∫ v ds over the last `delay` seconds of commands, (n,); each plan was followed for one period.
 
-    Before the first remembered plan the robot is taken to have moved as that plan began.
+    Before the first stored plan the robot is assumed to have moved with that plan's initial velocity.
     """
     total = np.zeros_like(past[-1].start.q)
     left = delay

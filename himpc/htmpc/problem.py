@@ -26,8 +26,9 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 PROXIMAL = 0.03
-"""Share of the effort weights that the proximal form has. It only damps: with the full weights a level keeps
-errors of centimetres late in its horizon, which (12) then grants to the levels below."""
+"""Factor on the effort weights in the proximal form, which is used for damping only. With the full weights a
+level would keep errors of centimetres late in its horizon, and (12) would then allow them to the levels
+below."""
 _RIDGE = 1e-8
 """Keeps the Hessian positive definite when effort weights are set to zero."""
 
@@ -46,8 +47,8 @@ class SharedStep:
         bounds: in force.
         plan: the shifted previous plan, (N, n).
         avoidance: (7c), None without obstacles.
-        method: solves the QPs; it remembers the last one of a level.
-        table: has room for all rows; `rows` are its first.
+        method: solves the QPs; it stores the active rows of a level's last QP.
+        table: has space for all rows; `rows` are its first.
     """
 
     robot: Robot
@@ -85,12 +86,12 @@ class SharedStep:
         return integrator(self.settings.horizon, self.settings.dt).T_q
 
     def iterate(self, U: Array) -> Iterate:
-        """Inputs (N, n) with what follows from them."""
+        """Returns inputs (N, n) together with their kinematics and costs."""
         return Iterate(self, U)
 
 
 class Iterate:
-    """Inputs with the kinematics and distances that follow, each computed once and only when needed."""
+    """Inputs with their kinematics and distances, each computed once and only when needed."""
 
     def __init__(self, tick: SharedStep, U: Array) -> None:
         self.tick = tick
@@ -102,20 +103,20 @@ class Iterate:
         self._efforts: dict[bool, tuple[float, Array]] = {}
 
     def errors(self, level: Tracking) -> Array:
-        """e at knots 1 … N, (N, m)."""
+        """Returns e at knots 1 … N, (N, m)."""
         found = self._errors.get(level.name)
         if found is None:
             found = self._errors[level.name] = level.errors(self.knots, self.tick.desired)
         return found
 
     def jacobian(self, level: Tracking) -> Array:
-        """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
+        """Returns ∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
         if level.name not in self._jacobians:
             self._jacobians[level.name] = level.jacobian(self.knots, self.tick.desired)
         return self._jacobians[level.name]
 
     def effort(self, absolute: bool) -> tuple[float, Array]:
-        """Value and gradient (N·n,) of J_eff: (10) itself, or its proximal form."""
+        """Returns value and gradient (N·n,) of J_eff: (10) itself, or its proximal form."""
         found = self._efforts.get(absolute)
         if found is None:
             tick = self.tick
@@ -135,7 +136,7 @@ class Iterate:
 
     @cached_property
     def distances(self) -> Clearances | None:
-        """Distances; gradients only if they are known already. None without obstacles."""
+        """Distances; with gradients only if these have been computed. None without obstacles."""
         avoidance = self.tick.avoidance
         if avoidance is None or "near" in self.__dict__:
             return self.near
@@ -173,16 +174,16 @@ class Problem:
 
     @property
     def forced(self) -> bool:
-        """Whether slacks are unknowns of the QP: only on the first level."""
+        """Whether slacks are variables of the QP: only on the first level."""
         return not self.guards and not self.softened
 
     @property
     def corrects(self) -> bool:
-        """Whether a step that (13) refuses gets a second-order correction first (not in the paper)."""
+        """Whether a step that violates (13) first gets a second-order correction (not in the paper)."""
         return bool(self.guards) and not self.softened
 
     def merit(self, at: Iterate) -> float:
-        """J_l + J_eff, with barriers or penalties for (7c) and (7d)."""
+        """Returns J_l + J_eff, with barriers or penalties for (7c) and (7d)."""
         tick = self.tick
         value = self.level.cost(at.errors(self.level)) + at.effort(self.absolute)[0]
         if self.softened:
@@ -190,7 +191,8 @@ class Problem:
         return value + PENALTY * float(at.depths.sum()) if tick.avoidance is not None else value
 
     def model(self, at: Iterate) -> tuple[Array, Array]:
-        """Hessian (k, k), Gauss-Newton for the errors, and gradient (k,) with respect to the inputs."""
+        """Returns the Hessian (k, k), Gauss-Newton for the errors, and the gradient (k,) with respect to the
+        inputs."""
         tick = self.tick
         H, g = gauss_newton(
             *(at.jacobian(self.level), self.level.Q, at.errors(self.level), tick.T_q),
@@ -203,10 +205,12 @@ class Problem:
         return H, g
 
     def rows(self, at: Iterate, slopes: Iterate | None = None) -> ConstraintRows:
-        """The QP's rows for the change d of the inputs, without those that are softened, or may be by slacks.
+        """Returns the QP's rows for the change d of the inputs, without rows that are softened by barriers or
+        slacks.
 
-        With `slopes` they lead back: the guards' rows are strict, and have the Jacobians of that iterate.
-        They lie in the tick's table; the next call fills it anew behind the rows of (7d).
+        With `slopes`, the rows correct a step that violated the guards: the guards' rows are strict, and have
+        the Jacobians of that iterate. The rows are in the step's table; the next call overwrites those behind
+        (7d).
         """
         tick, table = self.tick, self.tick.table
         first = place = len(tick.rows.A)
@@ -216,13 +220,13 @@ class Problem:
         for above in self.guards:
             place = self._guarded(above, place, at, slopes)
         if self.guards and not self.softened and at.near is not None and len(at.near.knot):
-            # Below the first level the depth reached is kept: the rows contain d = 0.
+            # Below the first level the present depth is allowed: the rows contain d = 0.
             rows = self._avoidance_rows(at, place)
             place = table.put(place, rows.widened(np.zeros(at.U.size)))
         return table.changes(first, place)
 
     def _guarded(self, above: Guard, place: int, at: Iterate, slopes: Iterate | None) -> int:
-        """Writes (12) or (11) for a level above into the table; returns where its rows end."""
+        """Writes (12) or (11) for a level above into the table; returns the index after its rows."""
         tick, table, strict = self.tick, self.tick.table, slopes is not None
         e, J = at.errors(above.tracking), (slopes or at).jacobian(above.tracking)
         if tick.settings.lexicographic == "per_coordinate":
@@ -237,8 +241,8 @@ class Problem:
         return place + 1
 
     def with_slack(self, at: Iterate, rows: ConstraintRows) -> tuple[ConstraintRows, int]:
-        """`rows` of an iterate, followed by (7c) where slacks may buy it: on the first level; and how many
-        rows that are."""
+        """Returns `rows` of an iterate, followed on the first level by the rows of (7c), which slacks may
+        relax; and the number of these rows."""
         if not self.forced or at.near is None or not len(at.near.knot):
             return rows, 0
         slack, place = self._avoidance_rows(at, len(rows.A)), len(rows.A)
@@ -246,14 +250,14 @@ class Problem:
 
     @property
     def unchanging(self) -> int:
-        """How many of the first `rows` are the same, but for their bounds, when a step is led back."""
+        """How many of the first `rows` stay the same, except for their bounds, when a step is corrected."""
         guarded = 0
         if self.tick.settings.lexicographic == "per_coordinate":
             guarded = sum(guard.best.size for guard in self.guards)
         return guarded + (0 if self.softened else len(self.tick.rows.A))
 
     def allowed(self, at: Iterate, share: float = 1.0) -> bool:
-        """(13): whether no level above has got worse by more than (a share of) its tolerance."""
+        """(13): whether the error of every level above has grown by at most (a share of) its tolerance."""
         settings = self.tick.settings
         per_coordinate = settings.lexicographic == "per_coordinate"
         delta = share * settings.delta_m
@@ -268,7 +272,7 @@ class Problem:
         return avoidance.rows(at.near, len(at.U), tick.settings.dt, tick.table, place)
 
     def _soft_rows(self, at: Iterate) -> ConstraintRows:
-        """(7d) and (7c) on the inputs."""
+        """Returns (7d) and (7c) on the inputs."""
         hard = self.tick.rows
         if at.near is None or not len(at.near.knot):
             return hard

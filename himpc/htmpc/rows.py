@@ -1,8 +1,8 @@
 """The linear rows of (7d): velocity, position, input and jerk bounds on the condensed inputs.
 
-All rows read lower ≤ A u ≤ upper with u the inputs, knot by knot, (N·n,). Two groups see past the horizon, so
-that the next step's problem has a solution too: "ramp" rows leave room to take the input back to zero within
-the jerk bound, "stop" rows room to stop before a position bound.
+All rows have the form lower ≤ A u ≤ upper with u the inputs, knot by knot, (N·n,). Two groups of rows are
+about the time beyond the horizon, so that the next step's problem is feasible too: "ramp" rows make it
+possible to return the input to zero within the jerk bound, "stop" rows to stop before a position bound.
 """
 
 from __future__ import annotations
@@ -98,14 +98,16 @@ class ConstraintTable:
         return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
 
     def put(self, place: int, rows: ConstraintRows) -> int:
-        """Bounds and labels of rows on d whose A is there already; returns where they end."""
+        """Writes bounds and labels of rows on d whose A is already in the table; returns the index after
+        them."""
         end = place + len(rows.A)
         self.room[:, place:end] = rows.lower, rows.upper
         self.labels[:, place:end] = rows.kind, rows.knot, rows.part
         return end
 
     def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
-        """From a place on, the rows whose values at knots (r,) have slopes (r, n) in q; returns them."""
+        """Writes the rows from index `place` on whose values at knots (r,) have slopes (r, n) in q; returns
+        them."""
         self.reserve(place + len(knot))
         spread(self.A, place, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)
         return self.A[place : place + len(knot)]
@@ -114,9 +116,9 @@ class ConstraintTable:
 def limit_rows(
     start: Start, N: int, dt: float, period: float, bounds: MotionBounds, table: ConstraintTable | None = None
 ) -> ConstraintRows:
-    """All rows that bounds of this tick can make binding, in a table, from its beginning on.
+    """Writes all rows that the bounds of this tick can make active to a table, from its beginning on.
 
-    A row is left out when no inputs inside the input bounds can reach its bound.
+    A row is left out if no inputs inside the input bounds can reach its bound.
     """
     n = len(start.v)
     table = ConstraintTable(N * n) if table is None else table

@@ -29,13 +29,14 @@ def plausible(robot: Robot, q: Array, v: Array) -> bool:
         q, v: measured joint positions and velocities, (n,).
     """
     lower, upper, fastest = _believable(robot)
-    # A comparison with NaN is false: what is not finite is not plausible either.
+    # A comparison with NaN is false, so that a value that is not finite is not plausible either.
     return bool(((q >= lower) & (q <= upper) & (np.abs(v) <= fastest)).all())
 
 
 @per_robot
 def _believable(robot: Robot) -> tuple[Array, Array, Array]:
-    """Least and greatest positions and greatest speeds that a measurement may show, (n,) each."""
+    """Returns the least and greatest positions and the greatest speeds that a valid measurement may have,
+    (n,) each."""
     lower = np.where(np.isfinite(robot.q_lower), robot.q_lower - _OUTSIDE, -_FARTHEST)
     upper = np.where(np.isfinite(robot.q_upper), robot.q_upper + _OUTSIDE, _FARTHEST)
     return lower, upper, np.where(np.isfinite(robot.v_limit), _FASTEST * robot.v_limit, _FARTHEST)
@@ -61,8 +62,8 @@ def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Ar
     """Returns the inputs (N, n) with the first one changed such that the commands of this period keep their
     bounds.
 
-    They do already when the QP's rows were hard and could be met. From a speed above its bound (which was
-    tightened) the robot may brake as slowly as its jerk bound asks, but gets no faster.
+    They already keep them if the QP's rows were hard and feasible. From a speed above its bound (which was
+    tightened) the robot may brake as slowly as its jerk bound requires, but it does not become faster.
 
     Args:
         start: where the plan begins.
@@ -72,7 +73,7 @@ def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Ar
     """
     fastest = np.maximum(bounds.v, np.abs(start.v))
     first = np.minimum(np.maximum(U[0], (-fastest - start.v) / period), (fastest - start.v) / period)
-    # An acceleration bound tightened below the present input is reached within the jerk bound.
+    # An acceleration bound below the present input (it was tightened) is reached within the jerk bound.
     most = np.maximum(bounds.a, np.abs(start.u) - bounds.j * period)
     U = U.copy()
     U[0] = np.minimum(np.maximum(first, -most), most)

@@ -1,4 +1,4 @@
-"""Everything about a hierarchical-task MPC that may change while the robot moves."""
+"""The settings of hierarchical-task MPC; all of them may change while the robot moves."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class MotionLimits:
 
 @dataclass(frozen=True)
 class HTMPCSettings:
-    """Settings of HTMPC and of its single-task and no-preview relatives.
+    """Settings of HTMPC and of its variants with a single task or without preview.
 
     Attributes:
         stack: levels, highest priority first; a level's Q weighs its stage costs in (8). Its R and horizon,
@@ -58,11 +58,12 @@ class HTMPCSettings:
         dt: Δt between knots, s.
         rate_hz: control rate, 1/s; the plan is shifted by one control period at every step.
         terminal: P = terminal · Q in (8).
-        velocity_effort: S of (10) on the velocities (positions cost nothing).
+        velocity_effort: S of (10) on the velocities (positions have no weight).
         input_effort: R of (10); None: 0.1 for the base's joints, 0.02 for all others.
         change_effort: W of (10) on Δu; None: 0.1 for the base's joints, 0 for all others.
-        formulation: "proximal" (upper levels pay for leaving the shifted previous plan, hard rows) or "paper"
-            (every level pays the absolute effort (10), states and inputs softened by relaxed log barriers).
+        formulation: "proximal" (the effort of upper levels is their deviation from the shifted previous plan;
+            hard rows) or "paper" (every level has the absolute effort (10), states and inputs softened by
+            relaxed log barriers).
         lexicographic: constraint (12), "per_coordinate", or (11), "cost".
         delta_m: δ of (13), by how much a level's error may exceed its best at a knot, m (or rad); for (11) it
             becomes the cost of that error at every knot.
@@ -75,10 +76,10 @@ class HTMPCSettings:
             sampled later by the same time.
         hold: joints that stay at rest, by name.
         base: how the base moves; see `kinematics.G`.
-        gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last one serves all
+        gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last gain applies to all
             further levels.
         rho: of HTIDKC only, ρ: weight of ‖q̇‖² in every level.
-        solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its relatives solve
+        solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its variants solve
             by a compiled method, and by "daqp" where that finds no solution; another solver replaces both.
     """
 
@@ -132,7 +133,7 @@ class Efforts:
 
 @dataclass(frozen=True, eq=False)
 class MotionBounds:
-    """The bounds in force, (n,) each; infinite where nothing is imposed."""
+    """The bounds in force, (n,) each; infinite for bounds that are not imposed."""
 
     q_lower: Array
     q_upper: Array
@@ -142,7 +143,8 @@ class MotionBounds:
 
 
 def efforts(robot: Robot, settings: HTMPCSettings) -> Efforts:
-    """Effort weights per joint. Raises InputError for a list of the wrong length or negative entries."""
+    """Returns the effort weights per joint. Raises InputError for a list of the wrong length or negative
+    entries."""
     base = base_joints(robot)
     return Efforts(
         _weights(robot, "velocity_effort", settings.velocity_effort, base, 0.0, 0.0),
@@ -152,7 +154,8 @@ def efforts(robot: Robot, settings: HTMPCSettings) -> Efforts:
 
 
 def bounds(robot: Robot, limits: MotionLimits) -> MotionBounds:
-    """The robot's limits with switches and scales applied. Raises InputError for a wrong jerk list."""
+    """Returns the robot's limits with switches and scales applied. Raises InputError for a wrong jerk
+    list."""
     free = np.full(robot.n, np.inf)
     jerk = _weights(robot, "limits.jerk_limit", limits.jerk_limit, base_joints(robot), 10.0, 80.0)
     return MotionBounds(

@@ -19,12 +19,12 @@ Array = NDArray[np.float64]
 SHRINK = 0.5
 """β of the backtracking line search (the HTMPC authors' value)."""
 DECREASE = 0.05
-"""Share of the promised decrease that a step must bring (the authors' value)."""
+"""The decrease of the merit must be at least this share of the predicted decrease (the authors' value)."""
 BACKTRACKS = 10
 UNCORRECTED = 0.2
 """Share of δ by which a step may worsen the levels above without a second-order correction."""
 CORRECTIONS = 4
-"""So many of the longest steps are led back before they are shortened; see `_led_back`."""
+"""This many of the longest steps are first corrected before they are shortened; see `_led_back`."""
 
 _STILL = 1e-9
 _FEASIBLE = 1e-7
@@ -125,7 +125,8 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
 
 
 def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: int, own: bool) -> QPSolution:
-    """min ½dᵀHd + gᵀd under the rows, plus the price of one slack per knot that may move the last ones out.
+    """Solves min ½dᵀHd + gᵀd under the rows, plus a penalty on one slack per knot that may relax the last
+    rows.
 
     Args:
         problem, H, g, rows: problem, Hessian, gradient and rows of the level.
@@ -141,7 +142,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
                 return solution
         return solve_qp(H, g, rows.A, rows.lower, rows.upper, solver)
     if own:
-        # No slack is bought where the rows can be met and cost less than its price.
+        # The slacks are zero if the rows are feasible and their multipliers are below the penalty.
         solution = problem.tick.method.solve(g, rows, 0)
         if solution.solved and _price(solution, rows, bought) <= PENALTY:
             return solution
@@ -166,10 +167,11 @@ def _price(solution: QPSolution, rows: ConstraintRows, bought: int) -> float:
 
 
 def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[float, Iterate]:
-    """The largest step 1, β, β², … that (13) allows and that lowers the merit enough; 0 if none does."""
+    """Returns the largest step 1, β, β², … that satisfies (13) and lowers the merit enough, and its iterate;
+    step 0 if none does."""
     tick = problem.tick
     merit = problem.merit(at)
-    # Outside the bounds the first level must return to them, at any cost.
+    # Outside its bounds the first level must return to them, whatever the merit is.
     returning = problem.forced and tick.table.outside(len(tick.rows.A)) > _FEASIBLE
     alpha = 1.0
     for attempt in range(BACKTRACKS + 1):
@@ -188,10 +190,11 @@ def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[floa
 
 
 def _led_back(problem: Problem, at: Iterate, found: _Direction, trial: Iterate) -> Iterate:
-    """The smallest change (in the Hessian's norm) that undoes what a step took from the levels above.
+    """Returns the iterate after the smallest correction (in the Hessian's norm) that removes the errors which
+    a step has added to the levels above.
 
-    The levels' errors are curved: a step along their linear rows leaves (13) by the square of its length, and
-    without this second-order correction only short steps are accepted.
+    The levels' errors are nonlinear: a step along their linear rows violates (13) by an amount that grows
+    with the square of its length, and without this second-order correction only short steps are accepted.
     """
     solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), 0, found.own)
     return problem.tick.iterate(trial.U + solution.x.reshape(trial.U.shape)) if solution.solved else trial

@@ -24,7 +24,8 @@ class Tracking:
     Attributes:
         name: name of the level.
         tasks: tasks of the level.
-        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured: it costs a constant.
+        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured: its cost is
+            constant.
     """
 
     name: str
@@ -32,17 +33,17 @@ class Tracking:
     Q: Array
 
     def errors(self, knots: Knots, desired: dict[str, Desired]) -> Array:
-        """e of (6) at knots 1 … N, (N, m)."""
+        """Returns e of (6) at knots 1 … N, (N, m)."""
         parts = [knots.errors(task, desired[task.name][1:]) for task in self.tasks]
         return parts[0] if len(parts) == 1 else np.hstack(parts)
 
     def jacobian(self, knots: Knots, desired: dict[str, Desired]) -> Array:
-        """∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
+        """Returns ∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
         parts = [knots.jacobian(task, desired[task.name][1:]) for task in self.tasks]
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def cost(self, e: Array) -> float:
-        """J of (8) without its constant first term."""
+        """Returns J of (8) without its constant first term."""
         return 0.5 * float(np.vdot(self.Q * e, e))
 
 
@@ -60,10 +61,10 @@ def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
 
 
 def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:
-    """The rule of section III: the tasks' dimensions sum to less than the degrees of freedom.
+    """Checks the rule of section III: the sum of the tasks' dimensions is less than the degrees of freedom.
 
     Raises:
-        InputError: they do not, so that no freedom is left for the last level.
+        InputError: the sum is not less, so that no freedom is left for the last level.
     """
     sizes = {level.name: sum(len(task.coordinates(robot)) for task in level.tasks) for level in levels}
     total = sum(sizes.values())
@@ -77,7 +78,7 @@ def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Guard:
-    """What a level above has reached: the constraint (9c) for the levels below.
+    """The errors that a level above has reached: the constraint (9c) for the levels below.
 
     Attributes:
         tracking: that level.
@@ -93,7 +94,7 @@ class Guard:
         return np.abs(self.best)
 
     def excess(self, e: Array, per_coordinate: bool, delta: float) -> float:
-        """The largest h_i − δ_i of (13); ≤ 0 where a step is allowed.
+        """Returns the largest h_i − δ_i of (13), which is ≤ 0 if a step is allowed.
 
         (12): h = |e| − |e*| in every coordinate and knot. (11): h = J − J*, with δ_J = ½ Σ w δ².
         """
@@ -103,6 +104,7 @@ class Guard:
         return cost(e) - cost(self.best) - 0.5 * float(self.tracking.Q.sum()) * delta**2
 
     def gap(self, e: Array, strict: bool = False) -> float:
-        """By how much (11) lets the cost grow from that of e; at least zero unless `strict`."""
+        """Returns the amount by which (11) allows the cost to grow from that of e; at least zero unless
+        `strict`."""
         gap = self.tracking.cost(self.best) - self.tracking.cost(e)
         return gap if strict else max(gap, 0.0)

@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 class Configuration:
     """Frames and Jacobians at the measured q_k and at the knots q*_{k+j|k−1}, j = 1 … N−1.
 
-    Jacobians are taken once per frame and tick, whatever the number of tasks on it. Only geometry
-    is read, no inertia or gravity, so the controller stays free of a dynamic model; a task of the centre of
-    mass alone reads masses.
+    Jacobians are computed once per frame and tick, for any number of tasks on that frame. Only geometry is
+    used, no inertia or gravity, so the controller needs no dynamic model; the only exception is a task of the
+    centre of mass, which uses masses.
 
     Args:
         robot: gives geometry and names.
@@ -63,7 +63,7 @@ class Configuration:
         self._placements: dict[str, list[pin.SE3]] = {}
 
     def frame_jacobians(self, frame: str = "") -> Array:
-        """(N, 6, n) frame Jacobians, linear over angular, world axes, at the frame's origin."""
+        """Returns (N, 6, n) frame Jacobians, linear over angular, world axes, at the frame's origin."""
         if self._known is not None:
             return self._known(frame)
         found = self._jacobians.get(frame)
@@ -82,21 +82,22 @@ class Configuration:
         return found
 
     def placement(self, frame: str = "") -> pin.SE3:
-        """Placement of a frame in the world at the measured state."""
+        """Returns the placement of a frame in the world at the measured state."""
         return self.placements(frame)[0] if self._placed is None else self._placed(frame)
 
     def placements(self, frame: str = "") -> list[pin.SE3]:
-        """Placements of a frame in the world at every knot; the first is the measured state's."""
+        """Returns the placements of a frame in the world at every knot; the first is the measured state's."""
         if frame not in self._placements:
             self.frame_jacobians(frame)
         return self._placements[frame]
 
     def relative_placement(self, frame: str, root: str) -> pin.SE3:
-        """Placement of a frame as another one sees it, at the measured state."""
+        """Returns the placement of a frame relative to the frame `root`, at the measured state."""
         return self.placement(root).actInv(self.placement(frame))
 
     def relative_jacobians(self, frame: str, root: str) -> Array:
-        """(N, 6, n) Jacobians of a frame as another one sees it, linear over angular, axes of the root.
+        """Returns (N, 6, n) Jacobians of a frame relative to the frame `root`, linear over angular, axes of
+        the root.
 
         With R of the root and d = p − p_root: Rᵀ(J_p − J_p,root + [d]× J_ω,root) and Rᵀ(J_ω − J_ω,root).
         """
@@ -115,27 +116,28 @@ class Configuration:
         return found
 
     def centre_of_mass(self) -> Array:
-        """Centre of all moving masses at the measured state by the robot's own description, (3,) m, world."""
+        """Returns the centre of all moving masses at the measured state, (3,) m, world, from the robot's
+        description."""
         return np.array(pin.centerOfMass(self.robot.model, self._data, self.q))
 
     def centre_of_mass_jacobians(self) -> Array:
-        """(N, 3, n) of the centre of mass, world axes."""
+        """Returns (N, 3, n) Jacobians of the centre of mass, world axes."""
         model, data, n = self.robot.model, self._data, self.q.size
         knots = (self.q, *self.knots)
         return np.array([pin.jacobianCenterOfMass(model, data, q).reshape(3, n) for q in knots])
 
     def joint_indices(self, joints: tuple[str, ...]) -> list[int]:
-        """Columns of the named joints; all of them for an empty tuple."""
+        """Returns the columns of the named joints; all of them for an empty tuple."""
         return joint_indices(self.robot, joints)
 
     def joint_jacobians(self, joints: tuple[str, ...]) -> Array:
-        """(N, m, n) selection of the named joints, the same at every knot."""
+        """Returns the (N, m, n) selection of the named joints, the same at every knot."""
         return _joint_selection(self.robot, joints, self.horizon)
 
 
 @per_robot
 def joint_indices(robot: Robot, joints: tuple[str, ...]) -> list[int]:
-    """Columns of the named joints; all of them for an empty tuple.
+    """Returns the columns of the named joints; all of them for an empty tuple.
 
     Raises:
         InputError: a name is not a joint of the robot.

@@ -36,10 +36,10 @@ class Geometry(NamedTuple):
 
 @per_robot
 def geometry(robot: Robot) -> Geometry:
-    """The tables of a robot."""
+    """Returns the tables of a robot."""
     model, n = robot.model, robot.n
     data = model.createData()
-    # One radian or metre from zero shows the axis of any kind of joint.
+    # The motion from q = 0 to q = 1 rad or m shows the axis of every kind of joint.
     pin.forwardKinematics(model, data, np.ones(n))
     axis, is_revolute, moves = np.zeros((n + 1, 3)), np.zeros(n + 1, np.intp), np.zeros((n + 1, n))
     for joint in range(1, n + 1):

@@ -1,4 +1,4 @@
-"""Task sequences for hierarchical-task control: missions as data, and the manager that walks through them."""
+"""Task sequences for hierarchical-task control: missions as data, and the task manager."""
 
 from himpc.missions.manager import Active, Progress, advanced, insert, move, release, remove, reorder
 from himpc.missions.mission import Follow, Go, Mission, MissionTask

@@ -1,9 +1,10 @@
-"""The task manager of the HTMPC paper's section IV: it decides which tasks the controller receives, by pure
-functions.
+"""The task manager of the HTMPC paper's section IV: pure functions that decide which tasks the controller
+receives.
 
-At any time the controller sees the window [𝒯_{l₀}, …, 𝒯_{l₀+L−1}]; when 𝒯_{l₀} is completed l₀ grows by
-one. A task is planned at the moment it enters the window, from where its point is then; a task that is moved
-is planned again at the next call of `advanced`, one that is inserted when the window reaches it.
+At any time the controller receives the window [𝒯_{l₀}, …, 𝒯_{l₀+L−1}]; when 𝒯_{l₀} is completed, l₀ grows by
+one. A task is planned at the moment it enters the window, from the position of its point at that time. A task
+that is moved is planned again at the next call of `advanced`; an inserted task is planned when it enters the
+window.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from robots import InputError
 Array = NDArray[np.float64]
 
 _CLOCK = 1e-9
-"""s: rounding that a sum of control periods may carry."""
+"""s: rounding error that a sum of control periods may have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,8 +32,9 @@ class Active:
     Attributes:
         task: the task.
         reference: its planned motion.
-        counts_from: when its goal begins to count, s.
-        reached: since when it has been at its goal as the first task, s; None: it is not there.
+        counts_from: time from which its goal counts, s.
+        reached: time at which its point reached its goal while the task was first in the window, s;
+            None: it is not at its goal.
     """
 
     task: MissionTask
@@ -71,9 +73,9 @@ class Progress:
 def advanced(
     progress: Progress, L: int, t: float, points: Mapping[str, Array], speeds: Mapping[str, float]
 ) -> Progress:
-    """The progress at time t: completed tasks leave the window, later ones enter it and are planned.
+    """Returns the progress at time t: completed tasks leave the window, later ones enter it and are planned.
 
-    When the mission is done its last window stays: the robot stays where it ended.
+    When the mission is done, its last window is kept: the robot stays where it ended.
 
     Args:
         progress: progress up to now.
@@ -143,8 +145,8 @@ def release(progress: Progress, name: str) -> Progress:
 
 
 def move(progress: Progress, name: str, goal: Point) -> Progress:
-    """Puts a task's goal elsewhere: m, or x y z w where an orientation is held; points on the way are
-    dropped, law and speed stay.
+    """Changes a task's goal: m, or x y z w for an orientation task. Points on the way are dropped; law and
+    speed stay.
 
     Raises:
         InputError: no such task, it is completed, it follows a given trajectory, or the goal does not fit.
@@ -167,7 +169,7 @@ def _elsewhere(task: MissionTask, goal: Point) -> Go | Follow:
 
 
 def insert(progress: Progress, task: MissionTask, before: str | None = None) -> Progress:
-    """Puts a new task before another one, or at the end.
+    """Inserts a new task before another one, or at the end.
 
     Raises:
         InputError: the other task is unknown or completed, or the name is taken.
@@ -177,10 +179,10 @@ def insert(progress: Progress, task: MissionTask, before: str | None = None) -> 
 
 
 def reorder(progress: Progress, name: str, to: int) -> Progress:
-    """Puts a task at another place among those that are not completed, 0 being the first; plans are kept.
+    """Moves a task to another index among those that are not completed, 0 being the first; plans are kept.
 
     Raises:
-        InputError: no such task, it is completed, or there is no such place.
+        InputError: no such task, it is completed, or there is no such index.
     """
     place = _ahead(progress, name)
     left = len(progress.mission) - progress.place
@@ -192,7 +194,7 @@ def reorder(progress: Progress, name: str, to: int) -> Progress:
 
 
 def remove(progress: Progress, name: str) -> Progress:
-    """Takes a task out.
+    """Removes a task.
 
     Raises:
         InputError: no such task, it is completed, or it is the only one.

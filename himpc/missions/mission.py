@@ -1,4 +1,5 @@
-"""A mission: the ordered tasks 𝒯₁, 𝒯₂, … that the HTMPC paper's motion planner hands to its task manager."""
+"""A mission: the ordered tasks 𝒯₁, 𝒯₂, … that the motion planner of the HTMPC paper passes to its task
+manager."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ class Go:
             raise InputError("points on the way need a cruise speed: give one, e.g. 0.5 m/s")
 
     def planned(self, start: Array, t: float) -> tuple[Reference, float]:
-        """The reference from a start (m,) at time t (s), and the time from which the goal counts, s."""
+        """Returns the reference from a start (m,) at time t (s), and the time from which the goal counts,
+        s."""
         if self.cruise is None:
             return Hold(np.array(self.goal)), t
         path = Path(np.array([start, *self.via, self.goal], float), self.cruise, self.law, t)
@@ -55,7 +57,7 @@ class Follow:
 
     Attributes:
         reference: its own time begins when the task enters the window.
-        duration: s after which its last point counts as the goal; infinite: it never ends.
+        duration: time after which its last point counts as the goal, s; infinite: it never ends.
     """
 
     reference: Reference
@@ -63,19 +65,20 @@ class Follow:
 
     @property
     def rotation(self) -> Array | None:
-        """The orientation (3, 3) that is held all the time; None: it moves, or is a point."""
+        """The orientation (3, 3) if it is constant; None: the reference moves, or is a point."""
         reference = self.reference
         return reference.value if isinstance(reference, Hold) and reference.value.ndim == 2 else None
 
     def turned(self, xyzw: Point) -> Follow:
-        """The same with another orientation held. Raises InputError for what is no quaternion x y z w."""
+        """Returns the same trajectory with another constant orientation. Raises InputError if `xyzw` is no
+        quaternion x y z w."""
         if len(xyzw) != 4 or not all(math.isfinite(x) for x in xyzw) or not any(xyzw):
             raise InputError(f"an orientation is a quaternion x y z w, not {list(xyzw)}")
         assert isinstance(self.reference, Hold)
         return replace(self, reference=replace(self.reference, value=from_quaternion(np.array(xyzw))))
 
     def planned(self, start: Array, t: float) -> tuple[Reference, float]:
-        """The reference from time t (s) on, and the time at which it ends, s."""
+        """Returns the reference from time t (s) on, and the time at which it ends, s."""
         return Started(self.reference, t), t + self.duration
 
 
@@ -91,8 +94,8 @@ class MissionTask:
         role: which point of the robot it moves, e.g. "ee" or "base".
         motion: motion to the goal, or a given trajectory.
         tolerance: m.
-        hold: s; None: for as long as it takes until the task is released by an event.
-        rest: m/s; infinite: it may be passed at any speed.
+        hold: s; None: until an event releases the task.
+        rest: m/s; infinite: the goal may be passed at any speed.
     """
 
     name: str

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def where(at: Configuration, roles: Mapping[str, Task]) -> tuple[dict[str, Array], dict[str, float]]:
-    """`points` and `speeds` of `advanced`, by role.
+    """Returns the arguments `points` and `speeds` of `advanced`, by role.
 
     Args:
         at: the measured state.

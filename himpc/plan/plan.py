@@ -64,11 +64,12 @@ class Plan:
         tau_0: torque that was applied last, (n,) N·m.
         limits: the bounds in force.
         step_us: wall time from state to torque, microseconds, kinematics included.
-        unsolved: how many QPs had no verified point at the first attempt.
+        unsolved: number of QPs without a verified point at the first attempt.
         find_evidence: collects the other results when they are read for the first time. Raises RuntimeError
             if the controller has computed another tick in between.
-        iterations: how many times the cascade was solved; 1 but for NHIMPC.
-        notice: a sentence for the user, given once: the user's own code failed at this tick.
+        iterations: how many times the cascade was solved; always 1 except for NHIMPC.
+        notice: a sentence for the user if the user's own code failed at this tick; only the first failure has
+            one.
         fill: writes all known fields, references included, into a row of telemetry in one operation; returns
             False if it cannot. None: fields are written one by one.
         at_once: increments of the levels at this tick without further computation; None: see `levels`.
@@ -119,7 +120,7 @@ class Plan:
 
     @property
     def rows(self) -> Rows:
-        """The bounds the last level was solved under."""
+        """The bounds of the last level's problem."""
         return self.evidence.rows
 
     @property
@@ -133,7 +134,7 @@ class Plan:
         return max((level.kkt_residual for level in self.levels), default=0.0)
 
     def binding(self, joint_names: tuple[str, ...]) -> list[Binding]:
-        """Every active constraint in words, level by level."""
+        """Returns every active constraint, level by level, with names instead of indices."""
         return [
             Binding(
                 level.name,

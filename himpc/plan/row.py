@@ -44,7 +44,8 @@ def _write_references(row: Array, layout: Layout, ahead: Mapping[str, Preview]) 
 
 
 def on_axes(coordinates: Sequence[str], preview: Preview, motion: Array) -> Array:
-    """ẋ_d or ẍ_d now; of a rotation, which turns about all axes, along those of the task."""
+    """Returns ẋ_d or ẍ_d now; for a rotation, whose motion has components along all axes, those along the
+    task's axes."""
     now = motion[0]
     if preview.value.ndim == 1 or now.size == len(coordinates):
         return now
@@ -57,7 +58,7 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
     row[fields["priority_leak"]] = math.nan if leak is None else leak
     row[fields["delta_tau"]] = plan.tau - plan.tau_0
     row[fields["tau_0"]] = plan.tau_0
-    # Six fields of n numbers each that stand side by side in the order of the layout.
+    # Six fields of n numbers each, which are adjacent in the order of the layout.
     limits = plan.limits
     block = row[fields["tau_demand"].start : fields["q_upper"].stop].reshape(6, -1)
     block[0], block[1], block[2] = plan.tau, limits.tau_lower, limits.tau_upper
@@ -67,7 +68,7 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
         if where is not None:
             row[where] = quaternion(value) if value.ndim == 2 else value
             row[fields[f"error/{name}"]] = plan.errors[name]
-    # The per-level fields stand side by side, level by level, in the order of PER_LEVEL.
+    # The per-level fields are adjacent, level by level, in the order of PER_LEVEL.
     base = fields[f"cost/{layout.levels[0]}"].start
     evidence = [math.nan] * (len(PER_LEVEL) * len(layout.levels))
     marks = [0] * len(layout.joints)

@@ -19,11 +19,11 @@ class JointState(NamedTuple):
     a: Array
 
     def gained_velocity(self, N: int, T_s: float) -> Array:
-        """q̇ at knots 1 … N minus q̇_k, for Δτ = 0, (N, n): (18) then keeps q̈ constant."""
+        """Returns q̇ at knots 1 … N minus q̇_k, for Δτ = 0, (N, n): (18) then keeps q̈ constant."""
         return _steps(N, T_s) * self.a
 
     def free_position(self, N: int, T_s: float) -> Array:
-        """q at knots 1 … N for Δτ = 0, (N, n): explicit Euler, as printed."""
+        """Returns q at knots 1 … N for Δτ = 0, (N, n): explicit Euler, as printed."""
         return self.q + _euler(N, T_s) @ np.array((self.v, self.a))
 
 
@@ -47,10 +47,10 @@ def _lags(N: int, T_s: float) -> Array:
 
 
 def predict_positions(state: JointState, U: Array, M_bar: Array, T_s: float) -> Array:
-    """q at knots 0 … N under the increments, (N+1, n), by (18).
+    """Returns q at knots 0 … N under the increments, (N+1, n), by (18).
 
-    (17) is read with M̄⁻¹ (printed without the inverse): q̈_{j+1} = q̈_j + M̄⁻¹Δτ_j, q̇_{j+1} = q̇_j + T_s q̈_{j+1},
-    q_{j+1} = q_j + T_s q̇_j.
+    (17) is used with M̄⁻¹ (the paper prints it without the inverse): q̈_{j+1} = q̈_j + M̄⁻¹Δτ_j, q̇_{j+1} =
+    q̇_j + T_s q̈_{j+1}, q_{j+1} = q_j + T_s q̇_j.
 
     Args:
         state: measured state.

@@ -1,4 +1,5 @@
-"""The incremental task-space system (15): how increments and the free motion reach the residual (28)."""
+"""The incremental task-space system (15): the effect of increments and of the free motion on the residual
+(28)."""
 
 from __future__ import annotations
 
@@ -39,7 +40,7 @@ class ResidualModel:
         velocity_d: Array,
         acceleration_d: Array,
     ) -> Array:
-        """e at knots 1 … N for Δτ = 0, (N, m).
+        """Returns e at knots 1 … N for Δτ = 0, (N, m).
 
         Args:
             error: x̃_k, (m,).
@@ -53,7 +54,7 @@ class ResidualModel:
 
 
 def residual_model(K_p: Array, K_v: Array, N: int, T_s: float) -> ResidualModel:
-    """The coefficients for gains K_p, K_v (m,), N knots and period T_s (s)."""
+    """Returns the coefficients for gains K_p, K_v (m,), N knots and period T_s (s)."""
     lag = np.subtract.outer(np.arange(N), np.arange(N))[:, None, :].astype(float)
     kp, kv = K_p[None, :, None], K_v[None, :, None]
     C = 1.0 + kv * T_s * (lag + 1.0) + kp * T_s**2 * lag * (lag + 1.0) / 2.0

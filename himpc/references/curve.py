@@ -1,4 +1,4 @@
-"""References that a few coefficients describe; the compiled kernel evaluates them without Python."""
+"""References that are described by a few coefficients; the compiled kernel evaluates them without Python."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Curve(NamedTuple):
     """x_d = c + a cos φ + b sin φ + d sin 2φ.
 
     Attributes:
-        centre: c, (m,); or a rotation matrix that is held.
+        centre: c, (m,); or a constant rotation matrix.
         swing: a, b and d, each (m,) or 0.
-        phase: time law φ(t); None: it stays at `centre`.
+        phase: time law φ(t); None: x_d is constant at `centre`.
     """
 
     centre: Array

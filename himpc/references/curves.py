@@ -1,4 +1,4 @@
-"""Closed curves through a phase: ellipses (a circle is one) and the figure-eight."""
+"""Closed curves as functions of a phase: ellipses (circles included) and the figure-eight."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class Circle:
 
     @cached_property
     def _axes(self) -> tuple[Array, Array]:
-        """What (cos φ, sin φ) is multiplied by for the position and for its derivative by φ."""
+        """The matrices that are multiplied by (cos φ, sin φ) for the position and for its derivative with
+        respect to φ."""
         return np.array((self.u, self.w)), np.array((self.w, -self.u))
 
 

@@ -12,14 +12,14 @@ from himpc.rotation import exp3, log3
 
 
 def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: Array) -> None:
-    """Rolls the filter forward with the raw target frozen, and gathers its preview.
+    """Computes future states of the filter with the raw target constant, and writes them as a preview.
 
     Args:
-        samples: (…, w + 3m + 1) value, velocity, acceleration, way from the sample before, and whether it
-            rests at the raw target; a value has w = 9 numbers for a rotation, else m.
+        samples: (…, w + 3m + 1) value, velocity, acceleration, displacement from the sample before, and
+            whether it rests at the raw target; a value has w = 9 numbers for a rotation, otherwise m.
         known: number of samples that exist; further ones are computed up to the length of `out`.
         raw: the raw target, (w,).
-        caps: largest speed, acceleration and jerk are its first entries.
+        caps: its first entries are the largest speed, acceleration and jerk.
         T_s: s.
         out: (3, N+1, m) displacement, velocity and acceleration at t … t + N·T_s.
     """
@@ -34,7 +34,7 @@ def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: A
 
 
 def _following(now: Array, raw: Array, caps: list[float], T_s: float, m: int) -> Array:
-    """The sample after this one: one period under one acceleration within the caps."""
+    """Returns the sample after this one: one period of constant acceleration within the caps."""
     most_speed, most_acceleration, _ = caps
     w = raw.size
     value, velocity, acceleration = now[:w], now[w : w + m], now[w + m : w + 2 * m]
@@ -43,7 +43,8 @@ def _following(now: Array, raw: Array, caps: list[float], T_s: float, m: int) ->
     distance, speed = _norm(away), _norm(velocity)
     if rests or (distance < STILL and speed < 10.0 * STILL):
         return np.concatenate([raw, np.zeros(2 * m), np.zeros(m) if rests else away, [1.0]])
-    # Never faster than a stop with half the acceleration cap allows; linear close to the goal.
+    # The speed never exceeds the one from which half the acceleration cap can stop; near the goal it is
+    # proportional to the distance.
     wanted = min(most_speed, APPROACH_RATE * distance, math.sqrt(most_acceleration * distance))
     goal = away * (wanted / distance) if distance > 0.0 else np.zeros(m)
     wish = _shortened(VELOCITY_RATE * (goal - velocity), most_acceleration)
@@ -55,11 +56,11 @@ def _following(now: Array, raw: Array, caps: list[float], T_s: float, m: int) ->
 
 
 def _jerked(velocity: Array, acceleration: Array, wish: Array, caps: list[float], T_s: float) -> Array:
-    """How the acceleration changes in one period towards the one wished for, within the jerk cap.
+    """Returns the change of the acceleration in one period towards the desired one, within the jerk cap.
 
-    Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
-    half of what a straight line would allow: in a curve speed also grows by itself. If it is above
-    already, coming down has the first claim on the jerk.
+    The speed must not exceed its cap: along the motion the acceleration stays below √(jerk · speed left).
+    Motion along a straight line would allow twice that, but in a curve the speed also grows by itself. If the
+    acceleration is above this limit already, the jerk is used for its decrease first.
     """
     most_speed, _, most_jerk = caps
     budget, speed = most_jerk * T_s, _norm(velocity)

@@ -1,4 +1,4 @@
-"""References that are extrapolated by a short time."""
+"""References extrapolated by a short time."""
 
 from __future__ import annotations
 

@@ -17,18 +17,19 @@ Law = Literal["straight", "quintic"]
 LAWS: tuple[Law, ...] = get_args(Law)
 
 _PEAK = 1.875
-"""Largest rate of 10σ³ − 15σ⁴ + 6σ⁵: a quintic segment's mean speed is its peak over this."""
+"""Largest rate of 10σ³ − 15σ⁴ + 6σ⁵: the mean speed of a quintic segment is its peak speed divided by this
+number."""
 _SAME = 1e-9
 """m: points closer than this are one point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """x_d runs along the straight lines between points, at most at the cruise speed.
+    """x_d follows the straight lines between points, at most at the cruise speed.
 
     `straight` moves at the cruise speed all the way, corners included: the velocity jumps at the start, at
     corners and at the end. `quintic` is at rest at every point, reaches the cruise speed in the middle of
-    each line, and has a continuous acceleration. Before `start` and after the end x_d stands still.
+    each line, and has a continuous acceleration. Before `start` and after the end x_d is constant.
 
     Attributes:
         points: (P, m) m, P ≥ 1; the first one is where it starts.
@@ -81,5 +82,5 @@ class Path:
 
 
 def segment(start: Array, goal: Array, cruise: float, law: Law = "quintic", at: float = 0.0) -> Path:
-    """The path from one point to another; `at`: when it starts, s."""
+    """Returns the path from one point to another; `at`: its start time, s."""
     return Path(np.array([start, goal], float), cruise, law, at)

@@ -27,7 +27,7 @@ class Phase:
     offset: float = 0.0
 
     def at(self, t: Array) -> tuple[Array, Array | float, Array | float]:
-        """(φ, φ̇, φ̈) at times t in seconds; rates that do not change are plain numbers."""
+        """Returns (φ, φ̇, φ̈) at times t in seconds; constant rates are plain numbers."""
         w, wt = self.omega, self.omega * t
         if self.law == "uniform":
             return wt + self.offset, w, 0.0
@@ -35,5 +35,6 @@ class Phase:
 
 
 def column(rate: Array | float) -> Array | float:
-    """A rate per sample as a column, to be multiplied with rows of coordinates; a plain number stays one."""
+    """Returns a rate per sample as a column, to be multiplied by rows of coordinates; a plain number stays
+    one."""
     return rate[:, None] if isinstance(rate, np.ndarray) else rate

@@ -19,7 +19,7 @@ class Preview(NamedTuple):
     Attributes:
         value: x_d at k: (m,) or a rotation matrix (3, 3).
         displacement: x_d(k+j) ⊖ x_d(k), j = 0 … N, (N+1, m); for rotations the vector log₃(R_d(k+j) R_d(k)ᵀ),
-            (N+1, 3), or its components on the axes of a task that has fewer: the others then count as zero.
+            (N+1, 3), or for a task on fewer axes only its components on these axes; the others are then zero.
         velocity: ẋ_d at k+j, (N+1, m); ω_d for rotations.
         acceleration: ẍ_d at k+j, (N+1, m).
     """
@@ -34,7 +34,7 @@ class Reference(Protocol):
     """A desired motion in time."""
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
-        """The desired motion at t, t + T_s, …, t + N·T_s (seconds)."""
+        """Returns the desired motion at t, t + T_s, …, t + N·T_s (seconds)."""
         ...
 
 
@@ -45,12 +45,12 @@ def previews(references: Mapping[str, Reference], t: float, T_s: float, N: int) 
 
 
 def sampled(position: Array, velocity: Array, acceleration: Array) -> Preview:
-    """Preview of a vector-valued motion from its samples, each (N+1, m)."""
+    """Returns the preview of a vector-valued motion from its samples, each (N+1, m)."""
     return Preview(position[0], position - position[0], velocity, acceleration)
 
 
 def times(t: float, T_s: float, N: int) -> Array:
-    """t + T_s·(0 … N), seconds."""
+    """Returns t + T_s·(0 … N), seconds."""
     return t + _offsets(T_s, N)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from himpc.references.preview import Array, Preview, sampled, times
 
 _EARLY = 1e-9
-"""s: a switch counts as reached this much early, so that adding up periods cannot miss it by a rounding."""
+"""s: a switch counts as reached this much earlier, so that the rounding error of a sum of periods cannot
+delay it by a sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +20,7 @@ class SquareWave:
     Attributes:
         peak, valley: (m,) m.
         half_period: s.
-        waves: after this many periods x_d stays in the valley; None: it goes on for ever.
+        waves: after this many periods x_d stays in the valley; None: the wave never ends.
     """
 
     peak: Array

@@ -1,4 +1,4 @@
-"""A target that a hand drags: filtered so that x_d, ẋ_d and ẍ_d fit together and stay within caps."""
+"""A dragged target: filtered so that x_d, ẋ_d and ẍ_d are consistent and stay within caps."""
 
 from __future__ import annotations
 
@@ -25,19 +25,20 @@ ROTATION_CAPS = Caps(speed=1.2, acceleration=6.0, jerk=120.0)
 JOINT_CAPS = Caps(speed=1.0, acceleration=5.0, jerk=100.0)
 
 _ROOM = 200
-"""Periods after which the samples that are left move to the front of a new array."""
+"""Number of periods after which the remaining samples are moved to the front of a new array."""
 
 
 Roll = Callable[[Array, int, Array, Array, float, Array], None]
-"""As `himpc.references.filter.roll`."""
+"""A function with the arguments of `himpc.references.filter.roll`."""
 
 
 class Target:
     """The filtered target and its preview.
 
-    The filter runs at the control period. Each step holds one acceleration a, so x_d moves by
-    T_s ẋ_d + T_s² a/2 and ẋ_d by T_s a exactly. The preview rolls the same filter forward with the raw
-    target frozen; those states are kept and become the next ticks' reference if the raw target stays.
+    The filter runs at the control period. The acceleration a is constant in each step, so x_d moves by T_s
+    ẋ_d + T_s² a/2 and ẋ_d by T_s a exactly. The preview computes future states of the same filter with the
+    raw target constant; these states are stored and become the reference of the next ticks if the raw target
+    does not change.
 
     Attributes:
         raw: the raw target, before the filter: (m,) coordinates, or a rotation matrix (3, 3).
@@ -54,7 +55,8 @@ class Target:
         self._filter = roll
         self._m = 3 if self._rotation else value.size
         self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
-        # See `references.filter.roll`; the first `_known` samples exist, and sample 0 is the present.
+        # See `references.filter.roll`; the first `_known` samples are computed, and sample 0 is the present
+        # one.
         self._samples = np.zeros((2, value.size + 3 * self._m + 1))
         self._samples[0, : value.size], self._samples[0, -1], self._known = value.ravel(), 1.0, 1
         self._time: float | None = None
@@ -80,7 +82,7 @@ class Target:
         self._known, self._rest = 1, None
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
-        """The filtered motion at t … t + N·T_s; each later t advances the filter by one period."""
+        """Returns the filtered motion at t … t + N·T_s; each later t advances the filter by one period."""
         if self._rests_at(t, T_s):
             if self._rest is None or self._rest[0] != N:
                 self._rest = N, self._gathered(np.zeros((3, N + 1, self._m)))
@@ -90,7 +92,7 @@ class Target:
         return self._gathered(motion)
 
     def stays(self, t: float, seen: object) -> bool:
-        """Whether the preview at t equals the one before: the target rests."""
+        """Whether the target is at rest, and its preview at t equals `seen`, the previous one."""
         if self._rest is None or self._rest[1] is not seen:
             return False
         self._time = t
@@ -126,7 +128,7 @@ class Target:
         return self._rests
 
     def _roll(self, motion: Array) -> None:
-        """Displacement, velocity and acceleration at knots 0 … N into (3, N+1, m) numbers."""
+        """Writes displacement, velocity and acceleration at knots 0 … N to (3, N+1, m) numbers."""
         count = motion.shape[1]
         if len(self._samples) < count + 1:
             samples = np.zeros((count + 1 + _ROOM, self._samples.shape[1]))

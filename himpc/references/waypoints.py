@@ -11,12 +11,12 @@ from himpc.references.preview import Array, Preview, sampled, times
 
 @dataclass(frozen=True, eq=False)
 class Waypoints:
-    """x_d runs through points, at rest at each one, with s(σ) = 10σ³ − 15σ⁴ + 6σ⁵ on every segment.
+    """x_d moves through points, at rest at each one, with s(σ) = 10σ³ − 15σ⁴ + 6σ⁵ on every segment.
 
     Attributes:
         points: (P, m) waypoints, P ≥ 1.
         arrivals: (P,) increasing times in seconds at which each point is reached; before the first and
-            after the last the reference stands still.
+            after the last the reference is constant.
     """
 
     points: Array

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CentreOfMass(OnAxes):
-    """x = centre of mass of what the joints move, along the chosen world axes, m (Pink and Mink: ComTask).
+    """x = centre of mass of all moving links, along the chosen world axes, m (Pink and Mink: ComTask).
 
-    Links that are fixed to the world do not count, as Baxter's torso and head of 36.3 kg: with m_fixed there
-    and m that moves, the centre of mass of all goes only m/(m + m_fixed) as far. No other task reads masses.
-    The masses are those of the robot's description, without a payload.
+    Links that are fixed to the world do not count, such as Baxter's torso and head of 36.3 kg: with a fixed
+    mass m_fixed and a moving mass m, the centre of all masses moves only m/(m + m_fixed) as far. No other
+    task uses masses. The masses are those of the robot's description, without a payload.
 
     Attributes:
         axes: world axes that are controlled, any non-empty subset of "xyz".

@@ -59,10 +59,11 @@ class Posture(OnJoints):
 @final
 @dataclass(frozen=True, kw_only=True)
 class Damping(OnJoints):
-    """All joints, K_p = 0: the residual of (4) is q̈ + K_v q̇, so what nothing else controls comes to rest.
+    """All joints, K_p = 0: the residual of (4) is q̈ + K_v q̇; motions that no other task controls come to
+    rest.
 
-    R in (31) weighs Δτ only: the torque of an untasked direction is frozen, not damped, and a push
-    accelerates that direction for ever. This task, as the last level, damps such motions.
+    R in (31) weighs Δτ only: in a direction without a task the torque is constant, motion is not damped, and
+    a push accelerates the robot for ever. This task, as the last level, damps such motions.
     """
 
     K_p: Gain = 0.0

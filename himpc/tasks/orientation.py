@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration
 
 _UPRIGHT = 1e-12
-"""Sine of the angle below which a direction counts as the desired one, or as its opposite."""
+"""Sine of an angle: a direction within this angle of the desired one counts as equal to it, or as its
+opposite."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,14 +28,15 @@ class OrientationTask(OnAxes):
     """The value is a rotation matrix R (3, 3), x̃ in rad along the chosen axes; with E = R R_dᵀ:
 
     - three axes: x̃ = log₃ E, ẋ = ω;
-    - two axes: the free axis f, taken along by the frame, is E f; x̃ = φ (f × E f)/‖f × E f‖ turns it back,
-      ẋ = ω on the two axes (reduced attitude: a rotation about f, however large, is no error);
+    - two axes: the free axis f, fixed to the frame, moves to E f; x̃ = φ (f × E f)/‖f × E f‖ is the rotation
+      between the two, ẋ = ω on the two axes (reduced attitude: a rotation about f of any angle is no error);
     - one axis a: x̃ = aᵀ log₃ E, ẋ = aᵀ J_l⁻¹(log₃ E) ω with the inverse of SO(3)'s left Jacobian.
 
-    On one axis ẋ is the derivative of x̃. On two or three it is so along x̃ and to first order in x̃: always
-    d/dt ½‖x̃‖² = x̃ᵀ(ẋ − ẋ_d), so that (4) takes ½‖ẋ − ẋ_d‖² + ½ K_p‖x̃‖² down at the rate K_v‖ẋ − ẋ_d‖² at
-    every angle below 180°. (Components of log₃ E with ẋ = ω on their axes alone would not: with the free
-    rotation θ they give s² + K_v s + K_p (θ/2)(cot θ/2 ± i), unstable where K_v² cot θ/2 < K_p θ/2.)
+    On one axis ẋ is the derivative of x̃. On two or three axes ẋ is the derivative along x̃ and to first
+    order in x̃: always d/dt ½‖x̃‖² = x̃ᵀ(ẋ − ẋ_d), so that (4) decreases ½‖ẋ − ẋ_d‖² + ½ K_p‖x̃‖² at the rate
+    K_v‖ẋ − ẋ_d‖² at every angle below 180°. (Components of log₃ E with ẋ = ω on their axes alone do not have
+    this property: with the free rotation θ they give s² + K_v s + K_p (θ/2)(cot θ/2 ± i), unstable where K_v²
+    cot θ/2 < K_p θ/2.)
     """
 
     K_p: Gain = 50.0
@@ -42,11 +44,11 @@ class OrientationTask(OnAxes):
 
     @abstractmethod
     def rotations(self, configuration: Configuration) -> list[Array]:
-        """R at every knot, N of (3, 3)."""
+        """Returns R at every knot, N of (3, 3)."""
 
     @abstractmethod
     def angular_jacobian(self, configuration: Configuration) -> Array:
-        """Jacobian of ω at every knot, (N, 3, n)."""
+        """Returns the Jacobian of ω at every knot, (N, 3, n)."""
 
     def error(self, value: Array, desired: Array) -> Array:
         return turned_away(value @ desired.T, self.axes)
@@ -58,12 +60,12 @@ class OrientationTask(OnAxes):
         return self.slopes(self.rotations(configuration), [preview.value] * len(rows)) @ rows
 
     def slopes(self, rotations: list[Array], desired: list[Array]) -> Array:
-        """∂ẋ/∂ω at R and R_d of every knot, (N, m, 3)."""
+        """Returns ∂ẋ/∂ω at R and R_d of every knot, (N, m, 3)."""
         return np.array([slope(R @ R_d.T, self.axes) for R, R_d in zip(rotations, desired, strict=True)])
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """On fewer than three axes: a reference that turns with ω_d changes x̃ by −slope(E) E ω_d, also where
-        the free rotation has made other axes of its own; that much is asked for."""
+        """Returns the desired motion of x̃'s coordinates. On fewer than three axes, a reference that rotates
+        with ω_d changes x̃ by −slope(E) E ω_d, which also holds after a rotation about the free axis."""
         if len(self.axes) == len(AXES):
             return preview
         if rests(preview):
@@ -83,7 +85,7 @@ class OrientationTask(OnAxes):
         return slope(E, self.axes) @ E
 
     def spread(self, motion: Array) -> Array:
-        """(N+1, 3) of a motion that is given along all axes, or along the chosen ones only."""
+        """Returns (N+1, 3) of a motion that is given along all axes, or along the chosen ones only."""
         if motion.shape[1] == len(AXES):
             return motion
         found = np.zeros((len(motion), len(AXES)))
@@ -111,13 +113,13 @@ def turned_away(E: Array, axes: str) -> Array:
 
 
 def slope(E: Array, axes: str) -> Array:
-    """∂ẋ/∂ω, (m, 3); see `OrientationTask`."""
+    """Returns ∂ẋ/∂ω, (m, 3); see `OrientationTask`."""
     rows = np.eye(3)[[AXES.index(axis) for axis in axes]]
     return rows @ left_inverse(log3(E)) if len(axes) == 1 else rows
 
 
 def left_inverse(w: Array) -> Array:
-    """J_l⁻¹(w) of SO(3), (3, 3): d/dt log₃ E = J_l⁻¹(log₃ E) ω for Ė = [ω]× E, ‖w‖ ≤ π."""
+    """Returns J_l⁻¹(w) of SO(3), (3, 3): d/dt log₃ E = J_l⁻¹(log₃ E) ω for Ė = [ω]× E, ‖w‖ ≤ π."""
     angle = math.sqrt(float(w @ w))
     even = 0.5 * angle / math.tan(0.5 * angle) if angle > 1e-4 else 1.0 - angle * angle / 12.0
     bent = (1.0 - even) / (angle * angle) if angle > 1e-4 else 1.0 / 12.0

@@ -21,7 +21,7 @@ class PlaneDistance(Task):
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
-        normal: direction of n in the world, of any length but zero.
+        normal: direction of n in the world, of any length except zero.
         offset: d, m from the world's origin along n.
     """
 

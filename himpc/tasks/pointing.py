@@ -22,21 +22,22 @@ DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 AHEAD = 0.5
 """m from the frame's origin at which a target starts, on the axis."""
 _NEAREST = 0.02
-"""m: smallest distance that is used for a nearer point; the direction to it could otherwise turn arbitrarily
-fast."""
+"""m: a nearer point is treated as if it had this distance; the direction to it could otherwise change
+arbitrarily fast."""
 _ASIDE = 1e-2
-"""Sine of the angle to the opposite direction below which ‖J‖ grows no further (0.6°)."""
+"""Sine of the angle to the opposite direction below which ‖J‖ is constant (0.6°)."""
 _STRAIGHT = 1e-9
 """Sine of the angle below which the axis counts as pointing at the point."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pointing(Task):
-    """x = φ ŝ⊥, rad: by what angle φ, and to which side, the axis a of the frame misses a point c.
+    """x = φ ŝ⊥, rad: the angle φ between the axis a of the frame and the direction to a point c, and its
+    side.
 
-    s = Rᵀ(c − p) is the point as the frame sees it, ŝ⊥ the direction of its part across a. x̃ = x, since the
-    coordinates count from the target: x_d is the point c, (3,) m in the world. φ = π is singular: exactly
-    there ŝ⊥ is the first of the two axes across.
+    s = Rᵀ(c − p) is the point in the frame's coordinates, ŝ⊥ the direction of its component perpendicular to
+    a. x̃ = x, because the coordinates count from the target: x_d is the point c, (3,) m in the world. φ = π
+    is singular: exactly there ŝ⊥ is the first of the two axes perpendicular to a.
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
@@ -136,5 +137,6 @@ class Pointing(Task):
         return seen(preview, (moved, c_dot, preview.acceleration), G, change)
 
     def _back(self, R: Array, away: Array) -> Array:
-        """−∂x/∂c, (2, 3), of a frame turned by R; the point is at `away` from its origin, world axes."""
+        """Returns −∂x/∂c, (2, 3), for a frame with orientation R; the point is at `away` from its origin,
+        world axes."""
         return self._seen(R.T @ away)[1] @ -R.T

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeTask(OnAxes):
-    """A task on some axes of a root frame, which moves itself (Pink and Mink: RelativeFrameTask).
+    """A task on some axes of a root frame, which may move (Pink and Mink: RelativeFrameTask).
 
     Attributes:
         frame: name of the controlled frame; empty means the robot's tip.

@@ -12,18 +12,19 @@ NUDGE = 1e-4
 
 
 def rests(preview: Preview) -> bool:
-    """Whether the target stands still over the horizon."""
+    """Whether the target is at rest over the horizon."""
     return not (preview.displacement.any() or preview.velocity.any() or preview.acceleration.any())
 
 
 def at_rest(preview: Preview, m: int) -> Preview:
-    """The preview of a target that stands still, in m coordinates."""
+    """Returns the preview of a target at rest, in m coordinates."""
     zero = np.zeros((len(preview.displacement), m))
     return Preview(preview.value, zero, zero, zero)
 
 
 def seen(preview: Preview, motion: tuple[Array, Array, Array], G: Array, change: Array) -> Preview:
-    """ẋ_d = G ẏ_d and ẍ_d = G ÿ_d + Ġ ẏ_d of a target y_d, and by the trapezoidal rule x_d(k+j) − x_d(k).
+    """Returns ẋ_d = G ẏ_d and ẍ_d = G ÿ_d + Ġ ẏ_d of a target y_d, and x_d(k+j) − x_d(k) by the trapezoidal
+    rule.
 
     Args:
         preview: preview of the target.

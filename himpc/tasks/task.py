@@ -41,19 +41,19 @@ class Task(ABC):
 
     @abstractmethod
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
-        """Names of the m coordinates, in the order of the error's components."""
+        """Returns the names of the m coordinates, in the order of the error's components."""
 
     @abstractmethod
     def value(self, configuration: Configuration) -> Array:
-        """x_i of (2) at the measured state: (m,) coordinates, or a rotation matrix (3, 3)."""
+        """Returns x_i of (2) at the measured state: (m,) coordinates, or a rotation matrix (3, 3)."""
 
     @abstractmethod
     def error(self, value: Array, desired: Array) -> Array:
-        """x̃ = x − x_d, shape (m,), in the task's unit."""
+        """Returns x̃ = x − x_d, shape (m,), in the task's unit."""
 
     @abstractmethod
     def jacobian(self, configuration: Configuration) -> Array:
-        """J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
+        """Returns J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
 
     def target(self, configuration: Configuration) -> Array:
         """Returns the x_d for which the error is zero now: the start of a draggable target."""
@@ -65,7 +65,7 @@ class Task(ABC):
         return preview
 
     def gains(self, m: int) -> tuple[Array, Array]:
-        """K_p and K_v as (m,) arrays."""
+        """Returns K_p and K_v as (m,) arrays."""
         return np.broadcast_to(np.asarray(self.K_p, float), (m,)), np.broadcast_to(
             np.asarray(self.K_v, float), (m,)
         )

@@ -1,1 +1,2 @@
-"""The compiled tick: one control period from measured state to torque, without an object in between."""
+"""The compiled tick: computes one control period, from measured state to torque, without creating Python
+objects."""

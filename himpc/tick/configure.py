@@ -25,7 +25,7 @@ from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
 from robots import Robot
 
 Span = tuple[int, Task, slice]
-"""The place of a task among all, the task, and its rows."""
+"""The index of a task, the task, and its rows."""
 
 _BUILT_IN = (FramePosition, FrameOrientation, Joints, Posture, Damping)
 
@@ -38,13 +38,13 @@ def is_built_in(task: Task) -> bool:
 def arena_for(
     robot: Robot, settings: Settings, form: StackForm, off: Sequence[Task], levels: Sequence[LevelTable]
 ) -> tuple[Arena, list[Span]]:
-    """An arena with the tables of a robot and its settings, and where the rows of each task are.
+    """Returns an arena with the tables of a robot and its settings, and the rows of each task.
 
     Args:
         robot, settings: as for a controller.
         form: the levels that are solved.
         off: tasks that are measured only.
-        levels: what each level is to the kernel.
+        levels: the kernel's data of each level.
     """
     tasks = (*form.tasks, *off)
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
@@ -78,15 +78,15 @@ def write_tasks(
     levels: int = 0,
     bounds: int = 0,
 ) -> tuple[Arena, list[Span]]:
-    """An arena with the geometry of a robot and its tasks, and where the rows of each task are.
+    """Returns an arena with the geometry of a robot and its tasks, and the rows of each task.
 
     Args:
         robot: gives the geometry.
-        tasks: one below the other.
-        counts: rows of each.
+        tasks: in the order of their rows.
+        counts: number of rows of each.
         N: knots.
-        solved: rows of the tasks that are solved for; they come first.
-        levels, bounds: how many.
+        solved: number of rows of the tasks that are solved for; they come first.
+        levels, bounds: number of levels and of rows of bounds.
     """
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
     given = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
@@ -136,8 +136,8 @@ def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach
 
 
 def write_motion(arena: Arena, span: slice, preview: Preview, reach: int) -> None:
-    """Writes the motion of a reference relative to its present value at `reach` knots; a single knot is used
-    for all."""
+    """Writes the motion of a reference relative to its present value at `reach` knots. If the motion has a
+    single knot, it is written to all knots."""
     motion = arena.f["motion"]
     motion[0, :, span] = preview.displacement[:reach]
     motion[1, :, span] = preview.velocity[:reach]

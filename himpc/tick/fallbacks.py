@@ -27,7 +27,7 @@ _ITERATIONS = 100
 """Largest number of iterations of DAQP in each of at most two attempts, which take milliseconds together."""
 
 _LEAK = 1e-7
-"""m/s²: largest change of the levels above by a point."""
+"""m/s²: largest change that a point may cause at the levels above."""
 
 
 @dataclass
@@ -49,13 +49,13 @@ def solve_levels(
     that gave its U ("solve" if none was needed) and its time, microseconds.
 
     The fallbacks are those of `solve_cascade` and one more, "feasible": if the kernel ran out of budget, the
-    level moves towards the point it had reached as far as the rows allow. All levels share the budget of the
-    arena, which bounds the time of a tick: the part that one level uses is not available to the next ones,
-    which then need further fallbacks.
+    level moves towards the last point of the kernel as far as the rows allow. All levels share the budget of
+    the arena, which bounds the time of a tick: the part that one level uses is not available to the next
+    ones, which then need further fallbacks.
 
     Args:
-        arena: filled by `linearize`. The rows may be wider afterwards: levels below keep what a fallback
-            needed.
+        arena: filled by `linearize`. The rows may be wider afterwards: levels below also use rows that a
+            fallback has widened.
         kinds: kinds of the rows.
         budget: the budget of this tick, from which every printed QP is deducted.
     """
@@ -64,7 +64,7 @@ def solve_levels(
         started = perf_counter_ns()
         arena.f["U"][place, 0, 0] = (
             np.nan
-        )  # where the kernel gets nowhere, what it found before is no way to go
+        )  # if the kernel fails at once, the point of an earlier tick must not be used as a direction
         solved = solve_level(*arena.arguments, place, 0.0)
         fallback = "solve" if solved else _climb_down(arena, place, kinds, budget)
         time_us = (perf_counter_ns() - started) / 1e3
@@ -128,7 +128,7 @@ def _on_the_way(
 
 
 def _coming_to_rest(arena: Arena) -> Array:
-    """`Rows.rest` of the state that the arena was given."""
+    """Returns `Rows.rest` of the state in the arena."""
     f = arena.f
     state = JointState(f["q"], f["v"], (f["v"] - f["v_was"]) / f["scalars"][PERIOD])
     return coming_to_rest(state, f["M_bar"], len(f["L"][0]), float(f["scalars"][T_S]))

@@ -18,17 +18,17 @@ field."""
 
 
 def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> Whole | None:
-    """Returns for every field that a plan and its references fill its index in `arena.data`; NaN for all
-    other fields.
+    """Returns for every field that a plan and its references fill its index in `arena.data`, and the index of
+    a NaN for all other fields.
 
     Args:
         arena: of a controller.
         layout: of the row.
-        spans: place, task and rows of every task.
-        levels: names of those that are solved.
+        spans: index, task and rows of every task.
+        levels: names of the levels that are solved.
 
     Returns:
-        (size,), or None if the row has a task that the arena knows no reference of.
+        (size,), or None if the row has a task whose reference is not in the arena.
     """
     found = np.full(layout.size, arena.where[AT.nothing])
     n, fields, knots = len(layout.joints), layout.fields, arena.f["motion"][0].size

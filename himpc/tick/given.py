@@ -19,10 +19,11 @@ from robots import Robot
 
 
 class GivenRows:
-    """The tasks that `is_built_in` does not name. Their rows are in the arena before `linearize` reads them.
+    """The tasks for which `is_built_in` is false. Their rows are written to the arena before `linearize`
+    reads them.
 
     Attributes:
-        spans: the other tasks, whose rows the kernel finds itself.
+        spans: the built-in tasks, whose rows the kernel computes itself.
         turning: names of the tasks whose value is a rotation matrix.
     """
 
@@ -51,11 +52,12 @@ class GivenRows:
         return at_rest(preview, len(task.axes))
 
     def write(self, previews: Mapping[str, Preview]) -> None:
-        """J at the knots of the last prediction (30), value, error and reference of each task; and the motion
-        of references that turn, of orientations on fewer than three axes.
+        """Writes J at the knots of the last prediction (30), value, error and reference of each task. For
+        orientations on fewer than three axes with a rotating reference, also writes the motion of the
+        reference.
 
         Args:
-            previews: of every task. The arena holds the measured state and what is remembered.
+            previews: of every task. The arena must hold the measured state and the memory.
         """
         if not self._given and True not in self._turned.values():
             return

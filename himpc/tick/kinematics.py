@@ -16,7 +16,7 @@ from himpc.tick.kernel.linearize import linearize
 from robots import Robot
 
 _NUDGES = 3
-"""The state itself, and one to each side of it."""
+"""Number of states: the state itself, and one to each side of it."""
 
 
 class Seen(NamedTuple):
@@ -31,7 +31,7 @@ class Seen(NamedTuple):
 
 
 class Kinematics:
-    """The kinematics of a stack's tasks, all of which the kernel knows.
+    """The kinematics of a stack's tasks, all of which are built into the kernel.
 
     Args:
         robot: gives the geometry.
@@ -46,15 +46,15 @@ class Kinematics:
         self._arena.f["M_bar"][:], self._arena.f["scalars"][:], self._arena.i["known"][0] = 1.0, 1.0, 1
 
     def at(self, q: Array, v: Array, h: float, previews: Mapping[str, Preview]) -> Seen:
-        """The tasks at a state.
+        """Returns the kinematics of the tasks at a state.
 
         Args:
             q, v: (n,).
-            h: s, how far along v the joints are moved to both sides to see J change.
-            previews: of every task; only where it is now counts.
+            h: s, time by which the joints are moved along v to both sides for the change of J.
+            previews: of every task; only the present value is used.
 
         Raises:
-            numpy.linalg.LinAlgError: something is not finite.
+            numpy.linalg.LinAlgError: a result is not finite.
         """
         f = self._arena.f
         f["q"][:], f["v"][:], f["path"][1] = q, v, q

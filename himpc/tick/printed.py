@@ -10,7 +10,7 @@ from himpc.tick.kernel.cascade import FIRST, KNOTS, LAST
 
 
 def printed_problem(arena: Arena, place: int) -> LevelProblem:
-    """Problem i, (32) or (34), of an arena that `linearize` has filled."""
+    """Returns Problem i, (32) or (34), of an arena that `linearize` has filled."""
     f, i = arena.f, arena.i
     first, last, knots = (int(i["level"][place, column]) for column in (FIRST, LAST, KNOTS))
     rows, N = slice(first, last), f["free"].shape[0]

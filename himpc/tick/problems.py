@@ -1,4 +1,4 @@
-"""The compiled cascade for level problems that stand by themselves."""
+"""The compiled cascade for given level problems, without a controller."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def solve_problems(
     rows: Rows,
     previous: Mapping[str, LevelSolution],
 ) -> list[LevelSolution]:
-    """`himpc.cascade.cascade.solve_cascade` by the kernel; arguments as there."""
+    """Computes `himpc.cascade.cascade.solve_cascade` by the kernel; the arguments are the same."""
     arena = arena_of(problems, rows, previous)
     fallbacks = solve_levels(arena, rows.kinds, FallbackBudget())
     finish_tick(*arena.arguments, False)
@@ -53,7 +53,7 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
 
 
 def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
-    """The optimum of one level alone, (N, n); None if there is none."""
+    """Returns the optimum of one level alone, (N, n); None if the kernel finds none."""
     arena = arena_of([problem], rows, {})
     return arena.f["U"][0] if solve_level(*arena.arguments, 0, 0.0) else None
 
@@ -61,7 +61,7 @@ def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
 def solutions(
     names: Sequence[str], found: Snapshot, fallbacks: Sequence[tuple[Fallback, float]]
 ) -> list[LevelSolution]:
-    """The evidence of all levels, from what a tick found."""
+    """Returns the evidence of all levels from the results of a tick."""
     U, cost, kkt, leak, left = (found(name) for name in ("U", "cost", "kkt", "leak", "left"))
     return [
         LevelSolution(
@@ -81,7 +81,7 @@ def solutions(
 
 
 def press(arena: Arena, place: int, active: ActiveRows) -> None:
-    """The rows that a level starts from."""
+    """Writes the active rows with which a level starts."""
     fits = active.row < len(arena.f["lower"])
     k = min(int(fits.sum()), arena.f["warm_multiplier"].shape[1])
     arena.i["warm_count"][place] = k
@@ -93,7 +93,7 @@ def press(arena: Arena, place: int, active: ActiveRows) -> None:
 
 
 def active_rows(found: Snapshot, place: int) -> ActiveRows:
-    """The rows that hold a level's point."""
+    """Returns the active rows of a level's solution."""
     k = int(found("active_count")[place])
     if not k:
         return NO_ROWS

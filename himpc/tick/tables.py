@@ -1,4 +1,4 @@
-"""The levels of a cascade as numbers: rows, weights, and how increments reach the residual."""
+"""The levels of a cascade as arrays: rows, weights, and the effect of increments on the residual."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm
 
 BUDGET = 42e6
-"""Multiplications that the changes of active rows may cost in one tick: some ten milliseconds, less than
-twenty on a slower core. A count, not a clock: the same seed gives the same run."""
+"""Largest number of multiplications for changes of active rows in one tick: about ten milliseconds, less than
+twenty on a slower core. The limit is a count and not a time, so that the same seed gives the same run."""
 _ROUNDS = 12_000
-"""Changes of active rows in a tick; the longest run is some milliseconds."""
+"""Largest number of changes of active rows in a tick; the longest run takes some milliseconds."""
 _ACCURACY = 1e-8
-"""N·m: how far a point may be from the optimum, since H ≥ ρ."""
+"""N·m: largest distance of a point from the optimum, since H ≥ ρ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class LevelTable:
 
     Attributes:
         rows: its rows among all.
-        knots: how many knots it counts, K.
+        knots: number of knots K of its residual.
         R: (n,) weight of the increments.
         own_rows, own_knots, own_R: rows, knots and R for the level's evidence; they differ from the others
             only without priorities.
@@ -47,19 +47,19 @@ class LevelTable:
 
     @classmethod
     def of(cls, level: LevelForm) -> LevelTable:
-        """A level of a strict hierarchy."""
+        """Returns the table of a level of a strict hierarchy."""
         return cls(level.rows, level.knots, level.R, level.rows, level.knots, level.R)
 
 
 def budget_of(arena: Arena) -> float:
-    """Multiplications that a tick may spend on changes of active rows: BUDGET, but no more than _ROUNDS need,
-    since a round takes its time however small the problem is."""
+    """Returns the number of multiplications that a tick may use for changes of active rows: BUDGET, but at
+    most the number for _ROUNDS changes, because each change has a fixed cost even in a small problem."""
     N, n = arena.f["U"].shape[1:]
     return min(BUDGET, _ROUNDS * (N * n * n + 4.0 * arena.f["lower"].size))
 
 
 def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
-    """The table of levels."""
+    """Writes the table of levels."""
     f = arena.f
     for place, level in enumerate(levels):
         rho = float(level.R.min())
@@ -79,11 +79,11 @@ def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
 
 
 def write_effects(arena: Arena, rows: slice, root_Q: Array, weighted_C: Array) -> None:
-    """√Q and the effect coefficients √Q c_l of some rows; (m,) and (K, m, K) of `LevelForm`."""
+    """Writes √Q and the effect coefficients √Q c_l of some rows; (m,) and (K, m, K) of `LevelForm`."""
     f, K = arena.f, len(weighted_C)
     f["root_Q"][rows] = root_Q
     f["C"][rows, :K] = weighted_C[:, :, 0].T
-    # A row that is padded with zeros counts fewer knots: its own effect on the next knot is never zero.
+    # A row that is padded with zeros has fewer knots; its own effect on the next knot is never zero.
     arena.i["row_knots"][rows] = (np.diagonal(weighted_C, axis1=0, axis2=2) > 0.0).sum(axis=1)
     by_row = weighted_C.transpose(1, 0, 2)
     f["S"][rows, :K, :K] = by_row.transpose(0, 2, 1) @ by_row
@@ -100,13 +100,13 @@ def sizes(
     frames: int = 1,
     given: int = 1,
 ) -> Arena:
-    """An arena for n joints and N knots.
+    """Returns an arena for n joints and N knots.
 
     Args:
-        n, N: see there.
-        rows, solved: rows of all tasks, and how many of them, the first, are solved for.
-        levels, bounds, tasks, frames: how many.
-        given: rows of tasks that the kernel does not know, at least 1.
+        n, N: number of joints and of knots.
+        rows, solved: number of rows of all tasks, and of those that are solved for, which come first.
+        levels, bounds, tasks, frames: number of each.
+        given: number of rows of tasks that are not built into the kernel, at least 1.
     """
     arena = Arena(
         n=n,

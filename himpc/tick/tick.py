@@ -33,14 +33,15 @@ from robots import Robot
 
 
 class CompiledTick:
-    """The numbers of one controller with one set of settings; `budget` is what one of its ticks may spend.
+    """The arena of one controller with one set of settings. `budget`: largest number of multiplications of
+    one tick for changes of active rows.
 
     Args:
         robot: gives the geometry.
         settings: as for the controller.
         form: the levels that are solved.
         off: tasks of the levels that are not solved; only their errors are computed.
-        levels: what each level is to the kernel; none are solved if there are none.
+        levels: the kernel's data of each level; none are solved if this is empty.
         tolerance: N·m; all levels are solved again, along their own prediction, until no increment changes by
             more, see `NHIMPC`.
         most: largest number of these iterations.
@@ -98,7 +99,7 @@ class CompiledTick:
 
     @property
     def memory(self) -> Memory | None:
-        """The memory, for a successor."""
+        """The memory, with which another controller can continue."""
         if not self._started:
             return None
         f, i = self.arena.f, self.arena.i
@@ -128,7 +129,7 @@ class CompiledTick:
         self.arena.f["M_bar"][:] = M_bar
 
     def problems(self) -> list[LevelProblem]:
-        """The data of every level at the last tick, copied; none before the first one."""
+        """Returns a copy of the data of every level at the last tick; none before the first one."""
         if not self._looked:
             return []
         f, form = self.arena.f, self._form
@@ -148,7 +149,7 @@ class CompiledTick:
         limits: LimitsInForce,
         started: int,
     ) -> Plan | None:
-        """One control period; None if the state's consequences are not finite.
+        """Computes one control period; returns None if the problems of this state are not finite.
 
         Args:
             q, v: measured state, (n,).
@@ -164,7 +165,7 @@ class CompiledTick:
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
-                # J_i(q_{k+j|k}): the knots of this tick's own prediction take the place of the last one's.
+                # J_i(q_{k+j|k}): the knots of this tick's own prediction replace those of the last tick's.
                 arena.f["path"][1:] = arena.f["predicted"][:-1]
                 before = arena.f["U"].copy()
             else:
@@ -181,7 +182,7 @@ class CompiledTick:
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
             if not budget.spared or any(fallback != "solve" for fallback, _ in fallbacks):
-                break  # a repeat needs optima at all levels and budget left
+                break  # another iteration needs optima at all levels and some budget
         if self._most > 1:
             finish_tick(*arena.arguments, True)
         return self._plan(fallbacks, tau_0, limits, iterations, started)
@@ -245,7 +246,7 @@ class CompiledTick:
         for fallback, time_us in fallbacks:
             unsolved += fallback != "solve"
             idle_us += time_us
-        # Levels that stand alone are evidence but for the last one, which is applied.
+        # Levels that are solved alone are evidence, except for the last one, which is applied.
         idle_us = idle_us - fallbacks[-1][1] if fallbacks and self._levels[0].alone else 0.0
 
         def evidence() -> Evidence:
@@ -287,7 +288,7 @@ class CompiledTick:
         return AtOnce(f["U"][:count, 0].copy(), [J[level.own_rows] for level in self._levels[:-1]])
 
     def _fill(self, row: Array, layout: Layout) -> bool:
-        """A row of telemetry in one gather, see `Plan.fill`."""
+        """Writes a row of telemetry in one gather operation, see `Plan.fill`."""
         if self._gathered is None or self._gathered[0] is not layout:
             levels = [level.name for level in self._form.levels] if self._levels else []
             self._gathered = layout, gathered(self.arena, layout, self._spans, levels)

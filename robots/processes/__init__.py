@@ -1,1 +1,1 @@
-"""Child processes: their limits of time and memory, and how they and their descendants are ended."""
+"""Child processes: limits on their time and memory, and how they and their descendants are ended."""

@@ -92,7 +92,7 @@ def _alive(group: int) -> list[psutil.Process]:
 
 
 def _end_marked(mark: tuple[str, str] | None) -> bool:
-    """Ends the processes that have an environment variable with this value until there are none left."""
+    """Ends the processes that have an environment variable with this value until none is left."""
     any_found = False
     for _ in range(100 if mark else 0):
         found = []

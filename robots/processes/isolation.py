@@ -96,7 +96,7 @@ def isolated(
         finally:
             child.kill()
             with suppress(OSError):
-                os.killpg(child.pid, signal.SIGKILL)  # what it started and left
+                os.killpg(child.pid, signal.SIGKILL)  # processes that the child started and did not end
     if child.returncode != 0 or not answer:
         raise Fault(within.end(child.returncode))
     result, fault, refusal = pickle.loads(answer)
@@ -197,7 +197,7 @@ def _let_go(out: int) -> None:
 
 
 def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, seconds: float) -> bytes:
-    """Returns what the process prints. Raises TimeoutExpired after the seconds that `Allowance` grants."""
+    """Returns the output of the process. Raises TimeoutExpired after the seconds that `Allowance` grants."""
     began, longest, more = time.monotonic(), PATIENCE * seconds, seconds
     while True:
         try:
@@ -256,7 +256,7 @@ def _answer(request: bytes, within: Allowance) -> bytes:
 
 
 def _restrict(within: Allowance, parent: int) -> None:
-    """Makes this process end with its parent, at the deadline and at the limit of memory, where the system
+    """Makes this process end with its parent, at the deadline and at the limit of memory, if the system
     supports this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
@@ -265,7 +265,7 @@ def _restrict(within: Allowance, parent: int) -> None:
         ctypes.CDLL(None).prctl(_PARENT_DIES, signal.SIGKILL)
         if os.getppid() != parent:
             os._exit(1)
-    os.setsid()  # its children can then be ended with it
+    os.setsid()  # a new session, so that its children can be ended together with it
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     most = within.memory if hard == resource.RLIM_INFINITY else min(within.memory, hard)

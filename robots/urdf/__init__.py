@@ -1,4 +1,4 @@
-"""URDF import: it reads, checks and repairs a description and reports what it did."""
+"""URDF import: reads, checks and repairs a description and reports all changes."""
 
 from robots.urdf.canonical import Canonical, canonicalise
 from robots.urdf.joints import UNBOUNDED

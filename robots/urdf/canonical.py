@@ -93,7 +93,8 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
 
 
 def _model(root: Element) -> pin.Model:
-    """The Pinocchio model of a repaired tree. Raises Refusal for a tree that Pinocchio cannot build."""
+    """Returns the Pinocchio model of a repaired tree. Raises Refusal for a tree that Pinocchio cannot
+    build."""
     try:
         model = pin.buildModelFromXML(without_shapes(root))
     except (ValueError, RuntimeError) as error:
@@ -103,7 +104,8 @@ def _model(root: Element) -> pin.Model:
         raise Refusal("robot", "a joint has more than one coordinate; only one-axis joints are supported")
     for joint in range(1, model.njoints):
         moments = np.linalg.eigvalsh(model.inertias[joint].inertia)
-        # MuJoCo's own smallest moment is 1e-15, and A + B < C by rounding is fatal to it as well.
+        # MuJoCo requires a moment of at least 1e-15, and rejects inertias with A + B < C even by a rounding
+        # error.
         if not (moments[0] > max(1e-14, 1e-12 * moments[2]) and moments[0] + moments[1] > moments[2]):
             text = "the body it moves has an inertia no simulator can use; check masses and origins there"
             raise Refusal(f"joint '{model.names[joint]}'", text)

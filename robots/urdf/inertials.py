@@ -13,10 +13,10 @@ from robots.report import Finding
 from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
 from robots.urdf.structure import body_of, movable_joints
 
-_DENSITY = 1000.0  # kg/m³: the solid sphere that stands in for a missing inertia
+_DENSITY = 1000.0  # kg/m³: density of the solid sphere that replaces a missing inertia
 _LEAST_MASS = 1e-6  # kg
 _FILL_MASS = 0.1  # kg: mass for a moving body without one
-_MARGIN = 1e-9  # of the trace: how far inside the physical region an inertia is kept
+_MARGIN = 1e-9  # share of the trace: distance of a repaired inertia from the boundary of the physical region
 _KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -45,12 +45,13 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
 
 
 def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
-    """(I', violation): the inertia about the centre of mass made that of some mass distribution, kg·m².
+    """Returns (I', violation): I' is the inertia about the centre of mass, changed to that of some mass
+    distribution, kg·m².
 
     A body's inertia is I = tr(Σ)·1 − Σ with Σ = ∫ρ r rᵀ ⪰ 0, so Σ = ½ tr(I)·1 − I must be positive
     semidefinite; that is A + B ≥ C for the principal moments, and it implies I ⪰ 0 (Wensing, Kim, Slotine,
     IEEE RA-L 2018). Σ's eigenvalues are raised to a small positive value and I is rebuilt. The violation is
-    the most negative eigenvalue over the trace, ≥ 0, and 0 for a physical inertia.
+    the most negative eigenvalue divided by the trace, without its sign; it is 0 for a physical inertia.
     """
     trace = float(np.trace(inertia))
     eigenvalues, axes = np.linalg.eigh(0.5 * trace * np.eye(3) - inertia)

@@ -23,7 +23,7 @@ _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" 
 
 
 def normalise_joints(root: Element) -> Iterator[Finding]:
-    """Rewrites every joint so that Pinocchio gives it exactly one coordinate; yields what was changed."""
+    """Rewrites every joint so that Pinocchio gives it exactly one coordinate; yields the changes."""
     try:
         frozen = _to_freeze(root)
     except Refusal as refusal:
@@ -47,7 +47,8 @@ def normalise_joints(root: Element) -> Iterator[Finding]:
 
 
 def freeze(joint: Element, value: float, reason: str) -> Finding:
-    """Makes a joint fixed at `value` (rad or m), moved inside its limits, by folding it into the origin."""
+    """Makes a joint fixed at `value` (rad or m), clipped to its limits, and adds this motion to its
+    origin."""
     limit = joint.find("limit")
     if limit is not None:
         value = float(np.clip(value, float(limit.get("lower", "0")), float(limit.get("upper", "0"))))
@@ -97,7 +98,7 @@ def _same_chain(carriers: dict[str, Element], one: Element, other: Element) -> b
 
 
 def _ancestors(carriers: dict[str, Element], link: str) -> Iterator[Element]:
-    """The joints from a link down to the root, nearest first."""
+    """Yields the joints from a link down to the root, nearest first."""
     while link in carriers:
         yield carriers[link]
         link = end_of(carriers[link], "parent")

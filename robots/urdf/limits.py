@@ -16,7 +16,7 @@ from robots.urdf.read import Refusal, label, numbers
 from robots.urdf.structure import movable_joints
 
 _SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast but safe for an unknown arm
-_LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, and no motion would be possible with it
+_LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, because it would allow no motion
 _LEVER = 3.0  # effort limit divided by the largest gravity load
 _ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition
 

@@ -31,9 +31,9 @@ class Refusal(Exception):
 
 
 def parse(data: bytes, source: str) -> Element:
-    """The root element `robot` of a URDF document, comments and foreign sections removed.
+    """Returns the root element `robot` of a URDF document without comments and foreign sections.
 
-    No entity is resolved, no DTD is loaded and nothing is fetched. Raises Refusal for a document that is
+    No entity is resolved, no DTD is loaded and nothing is downloaded. Raises Refusal for a document that is
     too large, is not XML, declares a DTD, is a xacro template, or has another root element.
     """
     if len(data) > MAX_BYTES:
@@ -62,9 +62,9 @@ def parse(data: bytes, source: str) -> Element:
 
 
 def load_bytes(path: Path) -> bytes:
-    """The content of a URDF file, at most one byte more than the parser accepts.
+    """Returns the content of a URDF file, at most one byte more than the parser accepts.
 
-    Raises InputError when it cannot be read, or is no plain file: a pipe could keep its reader waiting.
+    Raises InputError if the path cannot be read or is no regular file: reading a pipe could block for ever.
     """
     try:
         if path.is_dir():
@@ -114,7 +114,7 @@ def numbers(
 
 
 def placement(element: Element) -> pin.SE3:
-    """The `origin` of an element. Raises Refusal like `numbers`."""
+    """Returns the `origin` of an element. Raises Refusal like `numbers`."""
     origin = element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
@@ -135,12 +135,12 @@ def without_shapes(root: Element) -> str:
 
 
 def named(root: Element, tag: str) -> dict[str, Element]:
-    """The direct children with this tag, by name, in the file's order."""
+    """Returns the direct children with this tag, by name, in the file's order."""
     return {element.get("name", ""): element for element in root.findall(tag)}
 
 
 def end_of(joint: Element, side: str) -> str:
-    """The link a joint names as its `parent` or `child` ('' when it does not)."""
+    """Returns the link that a joint names as its `parent` or `child` ('' if it names none)."""
     element = joint.find(side)
     return "" if element is None else element.get("link", "")
 

@@ -24,7 +24,8 @@ _GUESSES = 5
 
 
 def check_structure(root: Element, source: str) -> Iterator[Finding]:
-    """Yields a `refused` finding for everything that keeps the description from being one tree of links."""
+    """Yields a `refused` finding for every fault that prevents the description from being one tree of
+    links."""
     for checks in ((_sizes,), (_names,), (_joint_ends, _types), (_single_tree,)):
         faults = [fault for check in checks for fault in check(root, source)]
         yield from faults
@@ -142,7 +143,7 @@ def _single_tree(root: Element, source: str) -> Iterator[Finding]:
 
 
 def _depths(root: Element, start: str) -> dict[str, int]:
-    """The number of joints between the root link and each link that hangs on it."""
+    """Returns the number of joints between the root link and each of its descendants."""
     children: dict[str, list[str]] = {}
     for joint in root.findall("joint"):
         children.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))

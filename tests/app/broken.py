@@ -1,4 +1,4 @@
-"""A worker whose fork server cannot be had: it never gets ready. Its children are as they should be."""
+"""A worker whose fork server fails to start. Its own children work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tests about a page's simulations ask of them."""
+"""Functions by which tests check the processes of simulations."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Learners and what they hold, and one fork server for pages of which something else is tested: each takes a
-second of a core to get ready."""
+"""Fixtures that start simulations, and one fork server that all tests of other things share, because its
+start takes a second of a core."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lessons.scenes.run_spec import RunSpec
 
 @pytest.fixture(scope="session")
 def fork_server() -> Iterator[ForkServer | None]:
-    """None where processes cannot be forked."""
+    """The fork server; None on systems that cannot fork."""
     try:
         made = ForkServer(WORKER)
     except OSError:
@@ -31,7 +31,7 @@ def fork_server() -> Iterator[ForkServer | None]:
 
 @pytest.fixture(scope="module")
 def one_fork_server(fork_server: ForkServer | None) -> Iterator[None]:
-    """Servers of pages that are made meanwhile fork their simulations from the one of all tests."""
+    """Page servers that are created in these tests fork their simulations from the shared fork server."""
     with pytest.MonkeyPatch.context() as patch:
         for place in ("sessions", "classroom"):
             patch.setattr(f"app.server.{place}.Spares", partial(Spares, lent=fork_server))
@@ -40,13 +40,13 @@ def one_fork_server(fork_server: ForkServer | None) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def lent(fork_server: ForkServer | None) -> dict[str, ForkServer | None]:
-    """By worker, the fork servers of tests that leave them as they are."""
+    """The fork servers that tests may use but must not change, by worker."""
     return {WORKER: fork_server}
 
 
 @pytest.fixture
 def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
-    """Learners of one worker, and what it holds."""
+    """Returns a function that starts simulations of one worker; all are closed at the end."""
     made: list[Spares] = []
     started: list[SimulationClient] = []
 

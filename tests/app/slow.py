@@ -1,4 +1,4 @@
-"""A fork server that takes long to get ready, and says what it does."""
+"""A fork server that takes long to become ready, and reports its progress."""
 
 from __future__ import annotations
 

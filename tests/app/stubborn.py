@@ -1,4 +1,4 @@
-"""A simulation process that does not do what it should: which way, says the name of the scene."""
+"""A simulation process that misbehaves; the name of the scene selects how."""
 
 from __future__ import annotations
 

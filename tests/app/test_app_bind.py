@@ -1,4 +1,4 @@
-"""Controls and settings: no edit is lost, whatever else happens at that moment."""
+"""Controls and settings: no edit is lost when other changes happen at the same moment."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def settings() -> TorqueSettings:
 
 
 class Panel:
-    """One slider of N with its bindings, and a browser that changes it through viser's own handler."""
+    """A slider of N with its bindings, and functions that act as a browser through viser's own handler."""
 
     def __init__(self, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> None:
         self.posted: list[Event] = []
@@ -49,7 +49,8 @@ class Panel:
         self.bindings.bind(self.slider, lambda s: s.horizon, lambda value: Set("horizon", int(value)))
 
     def browser_sets(self, value: int, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """`meanwhile` runs in another thread between the value's arrival and the control's callback."""
+        """Sets the slider. `meanwhile` runs in another thread between the arrival of the value and the
+        control's callback."""
 
         def run(*_: Any) -> None:
             thread = threading.Thread(target=meanwhile)
@@ -61,7 +62,7 @@ class Panel:
         asyncio.run_coroutine_threadsafe(self.gui._handle_gui_updates(0, message), self.loop).result(10)  # pyright: ignore
 
     def refresh(self, settings: TorqueSettings) -> None:
-        """A refresh, and what it left on the loop."""
+        """Refreshes the bindings and waits until the event loop has run their tasks."""
         self.bindings.refresh(settings)
         done: Future[None] = Future()
         self.loop.call_soon_threadsafe(done.set_result, None)
@@ -74,11 +75,11 @@ def panel(viser_server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> P
 
 
 def test_an_edit_is_not_lost_to_a_refresh_at_the_same_moment(panel: Panel, settings: TorqueSettings) -> None:
-    """The page shows the settings of before while the new value has just arrived: the new value is posted."""
+    """A new value arrives while the page shows the earlier settings: the new value is posted."""
     panel.browser_sets(12, meanwhile=lambda: panel.bindings.refresh(settings))
     assert panel.posted == [Set("horizon", 12)]
     panel.refresh(settings)
-    assert panel.slider.value == 12  # the answer is on its way
+    assert panel.slider.value == 12  # the confirmation has not arrived yet
 
 
 @pytest.mark.parametrize(("typed", "posted"), [(1_000_000, 30), (-4, 1), (30, 30)])
@@ -101,12 +102,14 @@ def test_what_changes_elsewhere_is_shown_and_a_refused_edit_taken_back(
 def test_controls_are_reminded_of_what_the_session_has(
     panel: Panel, settings: TorqueSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A change that the browser never sent must not stay on the screen: unchanged values are sent again."""
+    """Unchanged values are sent again from time to time, so that a change in the browser which was never
+    received does not stay on the screen."""
     sent: list[Any] = []
     monkeypatch.setattr(panel.gui._websock_interface, "queue_message", sent.append)
     panel.refresh(replace(settings, horizon=5))
     panel.refresh(replace(settings, horizon=5))
-    assert [message.updates for message in sent] == [{"value": 5}]  # not more often than every REMIND s
+    # not sent again before REMIND s have passed
+    assert [message.updates for message in sent] == [{"value": 5}]
     monkeypatch.setattr(bind, "REMIND", 0.0)
     panel.refresh(replace(settings, horizon=5))
     assert len(sent) == 2
@@ -116,7 +119,8 @@ def test_controls_are_reminded_of_what_the_session_has(
 
 
 def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two quick presses of a toggle end where they began."""
+    """Two quick presses of a toggle restore its initial state, because an unconfirmed edit counts until HOLD
+    s have passed."""
     wish: PendingEdit[bool] = PendingEdit()
     assert wish.now(True) is True
     assert wish.ask(not wish.now(True)) is False
@@ -127,7 +131,7 @@ def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
-    """Viser then knows the window's containers no more; the next press opens it."""
+    """Opening fails because viser has removed the window's containers; the next press opens the window."""
     filled: list[bool] = []
 
     def fill() -> None:
@@ -141,14 +145,15 @@ def test_a_window_whose_page_is_built_anew_meanwhile_is_given_up() -> None:
     window.open()
     window.open()
     assert len(filled) == gui.add_modal.call_count == 2
-    window.open()  # it is open
+    window.open()  # the window is open already
     assert len(filled) == 2
     window.close()
     gui.add_modal.return_value.close.assert_called_once()
 
 
 def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> None:
-    """A script, a lesson or a code may set what is beyond a slider's usual ends."""
+    """The controls can be created with values beyond the usual range of a slider, which a script, a lesson or
+    a code may set."""
     scene = torque_scene("planar3-hold")
     far = scene.settings
     for path, value in (
@@ -171,8 +176,9 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
 def test_menus_offer_every_word_a_setting_may_hold(
     viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A code may bring any of them: a menu that does not know its own value is no page."""
-    monkeypatch.setattr("himpc.formulation.settings.is_installed", lambda _: True)  # CasADi is an extra
+    """A state code may set any of these values, and a menu without its present value cannot be created."""
+    # CasADi is an optional package
+    monkeypatch.setattr("himpc.formulation.settings.is_installed", lambda _: True)
     scene, bindings = torque_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
     words = scene.settings.place(path).form.words
     assert len(words) > 1

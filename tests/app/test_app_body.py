@@ -1,4 +1,4 @@
-"""The simulation behind a page, driven by hand: no process, no clock."""
+"""The simulation of a page, called directly: without a process and without real time."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_reports_survive_the_pipe(body: SimulationRunner) -> None:
     body.tick(3)
     status = pickle.loads(pickle.dumps(body.status()))
     assert status.settings is not None and status.path.shape == (6, 3)
-    assert body.status().settings is None  # sent once, then only after a change
+    assert body.status().settings is None  # settings are sent once, then only after a change
 
 
 def test_settings_and_wrong_settings(body: SimulationRunner) -> None:
@@ -64,19 +64,20 @@ def test_pause_step_speed(body: SimulationRunner) -> None:
     body.handle(StepTicks())
     assert not body.running and body.take_steps() == 1 and body.take_steps() == 0
     body.handle(Post(Reset()))
-    assert body.take_steps() == 1  # a reset shows while paused
+    assert body.take_steps() == 1  # the page shows a reset while paused
     body.handle(Play(True))
     body.handle(Post(Reset()))
     body.handle(StepTicks())
-    assert body.take_steps() == 1  # one press, one tick
+    assert body.take_steps() == 1  # one press is one tick
     body.handle(Speed(0.5))
     assert body.status().speed == 0.5
 
 
 def test_paused_edits_take_effect_though_no_time_passes(body: SimulationRunner) -> None:
-    """Settings, order, gauge and refusals are those of after the edits; the clock and the robot stand."""
+    """While paused, status reports the settings, the order, the gauge and the refusals after the edits; time
+    and robot do not change."""
     body.tick(3)
-    assert body.status().gauge is None  # the rows tell it
+    assert body.status().gauge is None  # while the simulation runs, the rows contain the gauge
     body.handle(Play(False))
     before = body.status()
     for event in (Set("M_bar_scale", 3.0), MoveLevel("posture", 0), Set("horizon", 0)):
@@ -144,7 +145,8 @@ def test_history_keeps_spikes_and_counts_bounds(body: SimulationRunner) -> None:
         if k == 42:
             row[layout.fields["step_us"]] = 7.0
             row[layout.fields["at_bound"]][2] = 5.0
-            row[layout.fields["at_bound"]][3] = 2.0  # what binds is told by who found it, whatever the speed
+            # the controller determines which limit binds, so the speed does not matter
+            row[layout.fields["at_bound"]][3] = 2.0
             row[layout.fields["v_limit"]] = 1.0
         body.block.write(row)
         if k % 7 == 0:
@@ -186,7 +188,7 @@ def test_pacer_owes_simulated_time_but_never_piles_it_up() -> None:
 
 
 def test_a_choice_may_bring_settings_and_a_seed() -> None:
-    """What a state code says is the scene as it was first loaded: "Reset all" goes back to it."""
+    """The button "Reset all" restores the settings and the seed with which the scene was loaded."""
     made = SimulationRunner(
         SceneChoice(RunSpec("planar3-hold", set=("order=posture,position,orientation", "horizon=3"), seed=4))
     )
@@ -212,7 +214,8 @@ def test_late_torques_are_counted() -> None:
 
 
 def test_another_stack_has_memory_of_its_own(body: SimulationRunner) -> None:
-    """While it runs and while it is paused: rows of the new width go where the page hears of, once."""
+    """A change of the stack creates a new block with rows of the new width, while running and while paused;
+    the page is informed once."""
     body.tick(5)
     assert body.news() is None
     elbow = {"task": "position", "name": "elbow", "frame": "link_4", "level": 2}

@@ -1,4 +1,5 @@
-"""A page that is built anew, or cannot be: no press is lost in silence, and no page is dead."""
+"""Pages that are rebuilt or fail: every press has an effect or a message, and a failed page can be
+restarted."""
 
 from __future__ import annotations
 
@@ -27,8 +28,9 @@ NEXT = LessonPlace("deadlines")
 
 
 def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a slow computer the next lesson is there while the texts of this one are still being written. A page
-    that showed it at once, and was then built for it, lost what was pressed in between."""
+    """On a slow computer the next lesson is loaded while the page still writes the texts of this one. The
+    page is built once for the next lesson: if it were shown at once and then built again, presses in between
+    would be lost."""
     leaving, writing, write = threading.Event(), threading.Event(), Stage._write
     pages: list[Wire] = []
 
@@ -40,7 +42,8 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
             eventually(lambda: learner.lecture is not None and learner.lecture.exercise == NEXT)
         write(stage, moment)
         if late:
-            eventually(lambda: any(answers(page) for page in pages), 3.0)  # the browser has it already
+            # the browser shows the lesson already
+            eventually(lambda: any(answers(page) for page in pages), 3.0)
 
     monkeypatch.setattr(Stage, "_write", slow)
     server = PageServer(SceneChoice.of_lesson(LessonPlace("one-task")), port=0, max_sessions=1)
@@ -64,7 +67,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
 
 
 def answers(page: Wire) -> list[str]:
-    """Every place there ever was to answer the first step of the lesson on deadlines."""
+    """Returns all controls, existing or removed, that answer the first step of the lesson on deadlines."""
     return [each["uuid"] for each in page.made if each["props"].get("options") == ["A", "B", "C"]]
 
 
@@ -79,7 +82,8 @@ def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.Monk
             assert eventually(lambda: page.find("Playback") not in (None, before))
             said = len(page.notices)
             told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
-            page.write(told, value=f"{AWAKE}\nErrors")  # by the page itself: nobody pressed anything
+            # this message comes from the page itself and not from a press
+            page.write(told, value=f"{AWAKE}\nErrors")
             page.write(before, value="Pause")
             assert eventually(lambda: any("replaced" in body for _, body in page.notices))
             assert len(page.notices) == said + 1
@@ -113,4 +117,4 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
             assert isinstance(learner, SimulationClient) and learner.failure is None
     finally:
         server.close()
-    assert "no <place> for it" in capfd.readouterr().err  # whoever started it can see where
+    assert "no <place> for it" in capfd.readouterr().err  # the log shows the place of the error

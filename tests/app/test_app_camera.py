@@ -1,4 +1,4 @@
-"""Where the camera goes: all of what is looked at is seen, in the middle of what is free."""
+"""The camera's view: all points are in the picture, in the middle of the part that no panel covers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from lessons.scenes.run_spec import RunSpec
 from robots import load_robot
 
 SHEET = 0.2
-"""Where viser's sheet ends on a phone, of a picture from −1 to 1: it covers three fifths."""
+"""Upper edge of viser's sheet on a phone, in a picture from −1 to 1: the sheet covers three fifths."""
 
 
 def on_picture(points: np.ndarray, eye: np.ndarray, at: np.ndarray, fov: float, aspect: float) -> np.ndarray:
-    """Where points are in a picture from −1 to 1, (k, 2), by the geometry of a pinhole."""
+    """Returns the coordinates of points in a picture from −1 to 1, (k, 2), of a pinhole camera."""
     back = (eye - at) / np.linalg.norm(eye - at)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)

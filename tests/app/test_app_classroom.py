@@ -1,4 +1,4 @@
-"""A classroom without a browser: what watchers may do, and who has the token."""
+"""A classroom without a browser: the restrictions of watchers, and the token."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_watchers_change_nothing() -> None:
 
 
 def test_watchers_have_what_pages_use() -> None:
-    """Everything a page's code takes from its learner is there for one who only watches."""
+    """`Watcher` has every attribute of a learner that the code of a page uses."""
     used = {
         found
         for folder in ("page", "panels", "view", "client/moment.py")
@@ -68,7 +68,8 @@ def test_watchers_have_what_pages_use() -> None:
 
 
 def test_guesses_of_one_page_wait_for_each_other_only() -> None:
-    """A thousand wrong ones are one that is looked at; another page's right one is not kept waiting."""
+    """The guesses of one page are checked one at a time, so that a thousand wrong ones do not delay the right
+    token of another page."""
     looked_at: list[str] = []
 
     def give(token: str) -> bool:
@@ -86,7 +87,7 @@ def test_guesses_of_one_page_wait_for_each_other_only() -> None:
             guess.cancel()
         return right
 
-    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
         assert elsewhere.submit(lambda: asyncio.run(attack())).result()
 
 

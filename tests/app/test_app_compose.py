@@ -1,4 +1,4 @@
-"""The hierarchy is composed on a page without a browser: what its controls say, the simulation does."""
+"""Changes of the hierarchy by a page's controls, without a browser: the simulation applies them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def levels(learner: SimulationClient) -> list[str]:
 
 
 def shown(wire: Wire, label: str, at: int = 0) -> str:
-    """One of the controls with this label, from the top, once it is there."""
+    """Returns the id of one of the controls with this label, counted from the top, as soon as it exists."""
 
     def found() -> list[str]:
         return [uuid for uuid, each in list(wire.controls.items()) if each["props"].get("label") == label]
@@ -61,7 +61,8 @@ def press(wire: Wire, label: str) -> None:
 
 
 def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServer) -> None:
-    """The panel follows every change; the stack's code is the same stack elsewhere; the robot goes on."""
+    """The panel follows every change, the stack's code gives the same stack elsewhere, and the robot keeps
+    running."""
     with Wire(server.link) as wire:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
         learner = server.sessions.learners[0]
@@ -77,7 +78,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         shown(wire, "Remove elbow")
         assert wait_until(lambda: wire.shows("gets 2 of 3 directions"), LONG)
 
-        wire.press_key("4")  # which stood for no level before
+        wire.press_key("4")  # a key that belonged to no level before
         assert wait_until(lambda: not settings(learner).levels[3].enabled, LONG)
         wire.press_key("9")
         wire.press_key("4")
@@ -105,8 +106,8 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
 
 
 def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) -> None:
-    """Each joint has one, in degrees and within its limits; those moved at once build on each other, and a
-    reset puts them back."""
+    """Each joint has a slider in degrees within its limits. Sliders that are moved at the same time do not
+    overwrite each other, and a reset restores them."""
     with Wire(server.link) as wire:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
         learner = server.sessions.learners[0]
@@ -134,7 +135,7 @@ def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) 
 
 
 def test_where_a_posture_wants_what_slides_is_set_in_metres() -> None:
-    """A base without limits goes 2 m to each side."""
+    """The slider of a base joint without limits has a range of 2 m to each side."""
     run = RunSpec("ridgeback-ur10-hold", set=('stack.add={"task": "posture"}',))
     server = PageServer(SceneChoice(run), port=0, max_sessions=1, grace=2.0)
     try:
@@ -157,7 +158,7 @@ def test_where_a_posture_wants_what_slides_is_set_in_metres() -> None:
 def test_a_control_may_be_written_after_its_panel_was_rebuilt(
     server: PageServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A callback that is still on its way when its controls are taken away ends without a word."""
+    """A callback that runs after its controls were removed ends without an error message."""
     begun, rebuilt, ended = (threading.Event() for _ in range(3))
     show = AddTask._show
 
@@ -180,7 +181,7 @@ def test_a_control_may_be_written_after_its_panel_was_rebuilt(
         shown(wire, "Remove com")
         rebuilt.set()
         assert ended.wait(LONG)
-        choose(wire, "Kind", "damping")  # its callback comes after the other one's end
+        choose(wire, "Kind", "damping")  # its callback runs after the other one has ended
         assert wait_until(lambda: wire.shows("all joints come to rest"), LONG)
     said = capfd.readouterr()
     assert "removed" not in said.err + said.out

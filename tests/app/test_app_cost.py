@@ -1,4 +1,5 @@
-"""What a page sends: only what is seen, as little as shows it, and no faster than it is taken."""
+"""The amount of data that a page receives: only visible charts, few points per curve, and no more than the
+client reads."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
-LONG = 240.0  # s: the first start of a checkout compiles
+LONG = 240.0  # s: the first start after a checkout compiles
 TORQUE, STEP = "Torque, % of bound", "Control step, ms"
 
 
@@ -34,7 +35,7 @@ def circling() -> Iterator[PageServer]:
 
 @pytest.fixture
 def alone(circling: PageServer) -> PageServer:
-    """The test before has left."""
+    """The server after the client of the previous test has disconnected."""
     assert wait_until(lambda: not circling.sessions.learners, LONG)
     return circling
 
@@ -53,7 +54,8 @@ def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
         for tab, seen, unseen in (("Errors", STEP, TORQUE), ("Joints", TORQUE, STEP)):
             viewer.show(tab)
             viewer.second = Second()
-            hear_until(viewer, page, lambda seen=seen: seen in viewer.drawn)  # what was under way has come
+            # until data that were sent earlier have arrived
+            hear_until(viewer, page, lambda seen=seen: seen in viewer.drawn)
             viewer.second = Second()
             hear_until(viewer, page, lambda: max(viewer.second.plots.values(), default=0) >= 5)
             assert seen in viewer.drawn and unseen not in viewer.drawn
@@ -66,7 +68,7 @@ def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
         viewer.show(None)
         (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
         hear_until(viewer, page, lambda: shown._stage is not None and shown._stage._in_view.asleep)
-        for _ in range(2):  # the last pictures may still be under way at first
+        for _ in range(2):  # the last updates may still arrive in the first second
             viewer.second = Second()
             hear_until(viewer, page, lambda: viewer.second.messages >= 30)
         assert not viewer.second.plots and not viewer.second.links
@@ -80,14 +82,14 @@ def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
         hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
         (client,) = alone._viser.get_clients().values()
         (learner,) = alone.sessions.learners
-        # Nothing is read any more: what is written stays where it is.
+        # The client reads nothing any more, so written data stay in the buffers.
         assert wait_until(lambda: private.waiting(client) > 0, LONG)
         status = learner.status
         assert status is not None
         waits = private.waiting(client)
         assert wait_until(lambda: learner.status is not None and learner.status.t > status.t + 2.0, LONG)
-        assert private.waiting(client) < waits + 100  # texts, each of which takes its own former one's place
-        # Once it is read again, pictures come again.
+        assert private.waiting(client) < waits + 100  # each text replaces its previous one
+        # When the client reads again, updates arrive again.
         viewer.second = Second()
         hear_until(viewer, page, lambda: private.waiting(client) == 0)
         hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
@@ -132,7 +134,7 @@ def test_corners_show_the_curves() -> None:
 
 
 def test_curves_that_slide_past_keep_their_corners() -> None:
-    """Else they would shimmer."""
+    """A curve that moves along the axis keeps the same points, because it would flicker otherwise."""
     x = np.arange(400)
     curve = np.sin(x / 25)[None]
     now, then = (

@@ -1,4 +1,4 @@
-"""Who may come in: judged before an answer, and before a socket is opened."""
+"""Access to the server: every request is checked before it is answered and before a socket is opened."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PROXIED = Door(trusted=frozenset({"https://lab.example.org"}))
 
 
 def asked(path: str = "/", **headers: str | list[str]) -> Request:
-    """Keywords are headers, with _ for -."""
+    """Returns a request; keywords are headers, with _ for -."""
     given = Headers()
     for name, values in {"Host": OURS, **headers}.items():
         for value in values if isinstance(values, list) else [values]:
@@ -43,7 +43,7 @@ def judged(door: Door, path: str = "/", **headers: str | list[str]) -> Answer | 
         {"Origin": "null"},
         {"Origin": ""},
         {"Origin": "http://127.0.0.1:9999"},  # another page of this machine
-        {"Origin": "http://localhost:8080"},  # is not what the address says
+        {"Origin": "http://localhost:8080"},  # differs from the address of the page
         {"Origin": f"https://{OURS}"},
         {"Origin": f"http://{OURS}.evil.example"},
         {"Origin": f"http://evil.example@{OURS}"},
@@ -67,7 +67,7 @@ def test_other_sites_are_refused(headers: dict[str, str | list[str]], upgrade: d
 
 @pytest.mark.parametrize("host", [OURS, "localhost:8080", "[::1]:8080", "localhost:9000", "LOCALHOST:8080"])
 def test_our_own_page_comes_in(host: str) -> None:
-    """Also through a tunnel that ends at another port."""
+    """The page is also allowed through a tunnel with another port."""
     assert judged(LOCAL, Host=host) is None
     assert judged(LOCAL, Host=host, Origin=f"http://{host.lower()}", Upgrade="websocket") is None
 
@@ -91,13 +91,13 @@ def test_links_from_elsewhere_work_and_parts_of_other_pages_do_not() -> None:
         (f"/?{QUERY}={TOKEN[:-1]}", ""),
         (f"/?token={TOKEN}", ""),
         ("/", f"{COOKIE}x"),
-        ("/", COOKIE.replace("8080", "9090")),  # of another himpc-lab
+        ("/", COOKIE.replace("8080", "9090")),  # cookie of another himpc-lab
         ("/", f"himpc-lab-8080={TOKEN}"),
         ("/", PASSES.keep("guest", "1000")),
         ("/", "himpc-lab-8080=\xe4"),
         ("/", "=;=;,;"),
     ],
-    # The token is another one in each process, and tests go by their names.
+    # The token differs between processes, and pytest-xdist needs equal names of tests in all processes.
     ids=[
         "none",
         "empty",
@@ -131,7 +131,8 @@ def test_the_token_moves_from_the_address_into_a_cookie(secret: str) -> None:
     own = {"Origin": f"http://{OURS}", "Upgrade": "websocket"}
     assert judged(TOKENED, Cookie=cookie, **own) is None
     assert judged(TOKENED, Cookie=cookie, **{**own, "Origin": "https://evil.example"}) is not None
-    # A page of ours that a link elsewhere led to goes on by itself: only so the browser sends the cookie.
+    # A page of ours that was opened by a link on another site reloads itself, because the browser sends the
+    # cookie only then.
     answer = judged(TOKENED, f"/?{QUERY}={secret}", Referer="https://mail.example/")
     assert answer is not None and answer.status is HTTPStatus.OK
     assert dict(answer.headers)["Refresh"] == "0; url=./"
@@ -153,14 +154,16 @@ def test_the_owner_is_who_brings_the_owners_secret_and_through_no_proxy() -> Non
 
 @pytest.mark.parametrize("name", ["websocket", "playbackPath", "web%73ocket"])
 def test_an_address_that_leads_the_page_to_another_server_is_refused(name: str) -> None:
-    """viser's page would run what that one says, as a part of ours, whose cookie opens our sockets."""
+    """viser's page would connect to that server and run its messages as a part of our page, whose cookie
+    opens our sockets."""
     for door in (LOCAL, TOKENED):
         answer = judged(door, f"/?fixedDpr=1&{name}=ws://127.0.0.1:9999", Cookie=COOKIE)
         assert answer is not None and "another server" in answer.text
 
 
 def test_beyond_this_machine_addresses_and_our_own_names_are_ours() -> None:
-    """A name that merely resolves to us is not, with or without a token: it may be anybody's."""
+    """A host name that merely resolves to this machine is refused, with or without a token, because it may
+    belong to anybody."""
     for door in (TOKENED, Door(local=False, names=TOKENED.names)):
         refused = judged(door, Host="evil.example:8080", Origin="http://evil.example:8080")
         assert refused is not None and "--trusted-origin" in refused.text
@@ -170,7 +173,7 @@ def test_beyond_this_machine_addresses_and_our_own_names_are_ours() -> None:
 
 
 def test_a_trusted_proxy() -> None:
-    """Whether it passes the host on or not; another origin stays foreign."""
+    """A trusted proxy is accepted whether it passes the host on or not; other origins are refused."""
     origin = {"Origin": "https://lab.example.org"}
     assert judged(PROXIED, Host="lab.example.org", **origin) is None
     assert judged(PROXIED, Host=OURS, **origin) is None

@@ -1,4 +1,4 @@
-"""A target that is dragged: position and orientation go together, at once or after a short wait."""
+"""A dragged target: position and orientation are posted together, at once or after a short wait."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TIP = np.array([0.4, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0])
 
 
 class Scene:
-    """Keeps nodes by name, each with what it was made with, and the callbacks of controls."""
+    """Stores nodes by name, each with its arguments, and the callbacks of controls."""
 
     def __init__(self) -> None:
         self.nodes: dict[str, Any] = {}
@@ -49,7 +49,7 @@ class Scene:
 
 
 class Worker:
-    """Answers when it is told to."""
+    """A reachability worker that stores questions; the tests call `place` to answer them."""
 
     made: list[Worker]
 
@@ -68,7 +68,7 @@ class Worker:
 
 
 class Held:
-    """A hand, its scene, and what it posted."""
+    """A dragged target with its scene and the events that it posted."""
 
     def __init__(self, ready: Ready, clamp: bool) -> None:
         self.posted: list[Event] = []
@@ -97,7 +97,7 @@ class Held:
         self.scene.moved()
 
     def take(self) -> dict[str, tuple[float, ...]]:
-        """What was posted since, by task."""
+        """Returns the targets posted since the last call, by task."""
         posted = {each.task: each.value for each in self.posted if isinstance(each, MoveTarget)}
         assert len(posted) == len(self.posted)
         self.posted.clear()
@@ -139,7 +139,8 @@ def test_within_reach_both_come_when_the_judge_answers(held: Callable[[bool], He
 def test_a_slow_judge_is_not_waited_for_long_and_the_target_stays_within_reach(
     held: Callable[[bool], Held],
 ) -> None:
-    """The orientation goes on with the position that the controller has; the judge's follows."""
+    """After a short wait the orientation is posted with the controller's present position; the reachable
+    position is posted when the answer arrives."""
     one = held(True)
     one.drag(FAR)
     seconds, then = one.waiting[-1]
@@ -170,7 +171,8 @@ def test_a_drag_that_arrives_while_the_panel_is_rebuilt_is_dropped(held: Callabl
 
 
 def test_targets_from_before_the_axes_were_changed_are_not_drawn(held: Callable[[bool], Held]) -> None:
-    """A status from before it, and a moment that is looked back to."""
+    """Neither a status from before the change nor an earlier moment that the user looks back to moves the
+    drawn target."""
     one = held(True)
     before = {"position": np.array([0.3]), "orientation": np.eye(3)}
     one.hand.after_reset(before)

@@ -1,4 +1,4 @@
-"""Exercises on the page: a card each, and at the end of the lesson they belong to."""
+"""Exercises on the page: each has a card, also at the end of the lesson to which it belongs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_an_exercise_has_its_card_and_ends_its_lesson(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXERCISES)
 def test_the_hints_of_an_exercise_open_one_by_one(name: str) -> None:
-    """Each is inside what the one before unfolds."""
+    """Each hint is nested inside the previous one."""
     hints = load_exercise(name).hints
     opened = card(load_exercise(name)).split("<summary>Hint ")
     assert [each[0] for each in opened[1:]] == [str(number) for number in range(1, len(hints) + 1)]

@@ -1,4 +1,4 @@
-"""What is sent the short way is what viser would send."""
+"""Messages of the fast classes are serialised exactly as viser's own messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page does with files of one's own that its learner names, and with what the learner hands in."""
+"""A page opens its learner's own files by path, and signs the work that a learner hands in."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def open_file(wire: Wire, path: Path) -> None:
 
 
 def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path) -> None:
-    """A controller drives the scene that is there, a task can be added to it, a wrong file is a sentence."""
+    """A file may contain a controller for the present scene or a task to add; a wrong file gives one
+    sentence."""
     law, task, wrong = (tmp_path / f"{name}.py" for name in ("law", "task", "wrong"))
     law.write_text("def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n")
     task.write_text(text_of("task", None, "task.py"))

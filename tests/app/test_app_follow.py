@@ -1,4 +1,4 @@
-"""The camera that goes along with a mobile base."""
+"""The camera that follows a mobile base."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 
 def test_the_camera_keeps_its_place_beside_the_base() -> None:
-    """It moves as the base does, what is turned stays turned, and it stays where it is when let go."""
+    """The camera is translated with the base, keeps rotations and translations of the user, and stays in
+    place when following ends."""
     camera: Any = SimpleNamespace(position=np.array([3.0, 0.0, 1.0]), look_at=np.array([0.0, 0.0, 0.5]))
     follower = FollowBase(camera)
     follower.follow(np.array([5.0, 0.0, 0.0]), on=False)
@@ -40,7 +41,7 @@ def test_the_camera_keeps_its_place_beside_the_base() -> None:
 
 
 def test_a_browser_that_tells_late_where_it_looks_from_loses_nothing() -> None:
-    """It tells where its camera was before the last three steps."""
+    """A browser that reports its camera three steps late loses no step."""
     camera: Any = SimpleNamespace(position=np.array([3.0, 0.0, 1.0]), look_at=np.array([0.0, 0.0, 0.5]))
     follower = FollowBase(camera)
     shown = [(camera.position, camera.look_at)]

@@ -1,4 +1,5 @@
-"""Simulations are forked from a server that has everything imported; without it life goes on."""
+"""Simulations are forked from a server that has imported all modules; if it fails, they are spawned
+instead."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ def server_of(learner: SimulationClient) -> ForkServer:
 
 
 def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
-    """What a second thread holds at that moment would stay locked in the child for ever."""
+    """The fork server has one thread: a lock that a second thread holds during a fork would stay locked in
+    the child for ever."""
     learner = start("iiwa14-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     server = psutil.Process(server_of(learner).pid)
@@ -56,7 +58,8 @@ def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
 
 
 def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
-    """Who waits for it gets a simulation from another one, unasked; it is ended, its children go on."""
+    """A simulation that waits for the stopped server is started from a new one automatically. The stopped
+    server is ended, its children keep running."""
     learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     before = server_of(learner)
@@ -80,7 +83,8 @@ def test_a_fork_server_that_is_stopped_while_it_gets_ready_is_replaced(start: St
 def test_a_fork_server_that_says_what_it_does_is_not_stuck(
     start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A slow machine may take minutes to compile."""
+    """The server counts as alive as long as it reports progress, because a slow machine may take minutes to
+    compile."""
     learner = start("idle", "slow")
     server = server_of(learner)
     assert wait_until(lambda: bool(server.doing), LONG)

@@ -29,7 +29,7 @@ LONG = 60.0  # s
 
 
 def rings() -> int:
-    """Rings of telemetry that this process looks at."""
+    """Returns the number of telemetry rings that this process maps."""
     return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
 
 
@@ -47,7 +47,7 @@ def script_of(body: SimulationRunner) -> Script:
 
 
 def untimed(body: SimulationRunner) -> np.ndarray:
-    """All rows but what a clock measured."""
+    """Returns all rows, with the measured times set to zero."""
     layout = body.session.layout
     _, rows = body.block.since(0)
     for name, where in layout.fields.items():
@@ -57,7 +57,8 @@ def untimed(body: SimulationRunner) -> np.ndarray:
 
 
 def test_a_ghost_has_the_rows_of_its_leader(body: SimulationRunner) -> None:
-    """From the moment of leading on, although much had been changed before."""
+    """The ghost's rows equal the leader's from the moment of leading on, although settings were changed
+    before."""
     body.tick(20)
     for event in (Set("horizon", 3), Set("controller", "hqp"), Set("controller", "himpc")):
         body.handle(Post(event))
@@ -78,7 +79,7 @@ def test_a_ghost_has_the_rows_of_its_leader(body: SimulationRunner) -> None:
             pass
         assert ghost.body.session.t == body.session.t
         assert np.array_equal(untimed(body)[before:], untimed(ghost.body), equal_nan=True)
-        assert body.leader.script(body.session) is None  # told once
+        assert body.leader.script(body.session) is None  # the beginning is sent once
     finally:
         ghost.body.close()
 
@@ -124,7 +125,7 @@ def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], Simulation
 
 
 def together(learner: SimulationClient) -> bool:
-    """Both stand at the same time, which is not the start."""
+    """Whether both are paused at the same time t > 0.1 s."""
     status, ghost = learner.status, learner.ghost
     if status is None or ghost is None or ghost.status is None or status.running:
         return False
@@ -155,7 +156,8 @@ def test_a_ghost_begins_follows_and_ends(start: Callable[[str], SimulationClient
     assert wait_until(lambda: rings() == before - 1, LONG)
     learner.send(Play(True))
     t = learner.look() or 0.0
-    assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)  # nothing holds it back
+    # a closed ghost no longer limits its leader
+    assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
 
 
 def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(
@@ -171,7 +173,7 @@ def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(
 
 
 def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], SimulationClient]) -> None:
-    """Ready is on its way while the learner leaves: nobody else would free the memory it brings."""
+    """A `Ready` message that arrives after the learner was closed is discarded and its memory is released."""
     learner = start("planar3-hold")
     learner.close()
     late = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))

@@ -1,4 +1,4 @@
-"""The door and the budgets around viser's server, with real connections."""
+"""Access control and budgets of viser's server, with real connections."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ def get(server: PageServer, path: str = "/", **headers: str) -> http.client.HTTP
 
 
 def path_of(server: PageServer) -> str:
-    """With the token."""
+    """Returns the path with the token."""
     return f"/?{urlsplit(server.link).query}"
 
 
 def closed_with(page: Connection) -> int | None:
-    """The code, once everything that came before is read."""
+    """Reads all remaining messages and returns the code with which the connection was closed."""
     try:
         while True:
             page.recv(timeout=LONG)
@@ -99,7 +99,7 @@ def closed_with(page: Connection) -> int | None:
     ids=str,
 )
 def test_who_is_not_admitted_reaches_nothing(plain: PageServer, headers: dict[str, str]) -> None:
-    """No socket, no frame, no learner, no process."""
+    """A refused visitor gets no socket, no frame, no learner and no process."""
     learners, taken = plain.sessions.learners, plain.guard.taken
     host = headers.get("Host", urlsplit(plain.url).netloc)
     with socket.create_connection((urlsplit(plain.url).hostname, urlsplit(plain.url).port)) as stranger:
@@ -113,7 +113,7 @@ def test_who_is_not_admitted_reaches_nothing(plain: PageServer, headers: dict[st
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
             f"Sec-WebSocket-Protocol: {PROTOCOL[0]}",
         ]
-        # A frame that is sent along with the handshake is not looked at either.
+        # A frame that is sent along with the handshake is not read either.
         stranger.sendall("\r\n".join([*lines, "", ""]).encode() + b"\x82\x80\x00\x00\x00\x00")
         answer = stranger.recv(100)
         assert answer.startswith(b"HTTP/1.1 403 ")
@@ -137,7 +137,7 @@ def test_every_answer_forbids_frames_and_guesses(plain: PageServer) -> None:
 
 
 def test_a_place_is_kept_for_who_reloads(plain: PageServer) -> None:
-    """Somebody without its token does not get it, however often he comes."""
+    """A visitor without the learner's token does not get its place, even after several attempts."""
     pages = [dial(plain), dial(plain)]
     for page in pages:
         page.send(pack(camera()))
@@ -157,7 +157,8 @@ def test_a_place_is_kept_for_who_reloads(plain: PageServer) -> None:
 
 @pytest.mark.parametrize("kind", ["plain", "tokened"])
 def test_without_the_token_nothing_opens(kind: str, request: pytest.FixtureRequest) -> None:
-    """On this machine, too: it has other users. With it page and socket open, from address or cookie."""
+    """The token is also required on this machine, which may have other users. With the token, page and socket
+    open from the address or the cookie."""
     server: PageServer = request.getfixturevalue(kind)
     learners, taken = server.sessions.learners, server.guard.taken
     refused = get(server)
@@ -185,7 +186,7 @@ def test_without_the_token_nothing_opens(kind: str, request: pytest.FixtureReque
 
 
 def test_no_token_lets_everybody_in() -> None:
-    """But nobody is its owner."""
+    """No visitor counts as the owner then."""
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")), port=0, ask_token=False, own_files=Folder.at(".")
     )
@@ -203,7 +204,8 @@ def test_no_token_lets_everybody_in() -> None:
 
 
 def test_cookies_of_two_servers_live_in_one_jar() -> None:
-    """A browser keeps both, sends each server both, and neither opens the other one."""
+    """A browser stores the cookies of both servers and sends both to each server; neither cookie opens the
+    other server."""
     servers = [PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1) for _ in range(2)]
     try:
         opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
@@ -230,10 +232,10 @@ def test_cookies_of_two_servers_live_in_one_jar() -> None:
 
 @pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="needs another user: run it as root")
 def test_a_cookie_that_another_user_has_seen_opens_nothing(plain: PageServer) -> None:
-    """Cookies know no port: a browser shows them to the servers of all users of a machine."""
+    """Cookies do not depend on the port: a browser sends them to the servers of all users of a machine."""
     cookie = let_in(plain.link)
     assert get(plain, Cookie=cookie).status == 200
-    code = (  # everything is imported before: the other user may not be able to read it
+    code = (  # all imports come first, because the other user may not be able to read the modules
         "import encodings.idna, os, socket, sys; os.setuid(65534); "
         "line = socket.create_connection(('127.0.0.1', int(sys.argv[1]))); "
         "line.sendall('\\r\\n'.join(['GET / HTTP/1.1', 'Host: 127.0.0.1', 'Cookie: ' + sys.argv[2], '', ''])"
@@ -257,7 +259,8 @@ def test_a_message_has_a_size(plain: PageServer) -> None:
 
 
 def test_files_on_their_way_have_a_size(plain: PageServer) -> None:
-    """More than the importer reads is dropped before it is decoded; the page stays."""
+    """An upload that is larger than the importer reads is dropped before it is decoded; the page stays
+    open."""
     with dial(plain) as page:
         page.send(pack(camera()))
         assert wait_until(lambda: bool(plain._viser.get_clients()), LONG)
@@ -270,7 +273,7 @@ def test_files_on_their_way_have_a_size(plain: PageServer) -> None:
             filename="robot.urdf",
             mime_type="text/xml",
             part_count=count,
-            size_bytes=100,  # it lies
+            size_bytes=100,  # a wrong size
         )
         page.send(pack(start))
         for index in range(count):
@@ -310,7 +313,7 @@ def test_a_bucket_is_paid_for_by_waiting() -> None:
 def test_who_drags_never_waits_and_who_floods_is_ended() -> None:
     now = [0.0]
     spent = Budget(lambda: now[0])
-    for _ in range(10 * 100):  # a minute of dragging and turning at once is no more than this per second
+    for _ in range(10 * 100):  # a minute of dragging and rotating at once needs no more than this per second
         now[0] += 0.01
         assert spent.wait(300) == 0.0
     flooded = 0
@@ -333,9 +336,9 @@ def test_the_silent_make_room() -> None:
         assert crowd.enter(key, "1", lambda key=key: left.append(key))
     crowd.spoke("b")
     assert crowd.enter("c", "1", lambda: left.append("c"))
-    assert left == ["a"]  # the oldest that is silent
+    assert left == ["a"]  # the oldest silent connection
     crowd.spoke("c")
-    assert not crowd.enter("d", "1", lambda: None)  # everybody here is somebody
+    assert not crowd.enter("d", "1", lambda: None)  # all connections have sent a message
     assert crowd.enter("e", "2", lambda: left.append("e")) and crowd.enter("f", None, lambda: None)
     assert crowd.enter("g", "3", lambda: None)
     assert left == ["a", "e"] and len(crowd) == 4
@@ -352,7 +355,7 @@ def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: py
         return changed(*given, **keywords)
 
     with monkeypatch.context() as patch:
-        patch.setattr(web, "serve", without)  # the answer is no longer asked of us
+        patch.setattr(web, "serve", without)  # this version no longer asks our process
         with pytest.raises(InputError, match=r"viser .*how it serves"):
             private.self_test(ConnectionGuard(Door()))
     for gone in ("FileTransferPart", "GuiUpdateMessage"):
@@ -395,7 +398,7 @@ def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.Monke
 
 
 def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
-    """It has begun, and is still asked what it keeps."""
+    """The server is closed while it still waits for the page's answer about its local storage."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     with dial(server) as page:
         page.send(pack(camera()))
@@ -406,7 +409,8 @@ def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogC
 
 
 def test_a_page_that_is_gone_is_forgotten_at_once(plain: PageServer) -> None:
-    """Nothing that waits for a silent page's first word keeps it, and all that it held."""
+    """A closed page is released from memory at once, although the timeout for its first message has not
+    passed."""
 
     def held() -> int:
         gc.collect()
@@ -421,14 +425,14 @@ def test_a_page_that_is_gone_is_forgotten_at_once(plain: PageServer) -> None:
 
 
 def test_whoever_needs_longer_than_the_handshake_is_let_go(plain: PageServer) -> None:
-    """A connection without a request holds nothing for long."""
+    """A connection that sends no request is closed after the timeout of the handshake."""
     with socket.create_connection((urlsplit(plain.url).hostname, urlsplit(plain.url).port)) as silent:
         silent.settimeout(LONG)
         assert silent.recv(1) == b""
 
 
 def test_what_the_wire_says_is_what_viser_reads() -> None:
-    """`browsing/wire.py` speaks viser's own format."""
+    """`browsing/wire.py` uses viser's own format."""
     message = _messages.Message.deserialize(pack(camera()))
     assert isinstance(message, _messages.ViewerCameraMessage)
     assert msgspec.msgpack.decode(pack(camera()))["type"] == "ViewerCameraMessage"

@@ -1,4 +1,4 @@
-"""What the Start tab says of levels is what the stack has, in every scene and after every change."""
+"""The Start tab's sentences about levels agree with the stack, in every scene and after every change."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CHANGES = (
 
 
 def opened(scene: str, change: str = "") -> tuple[tuple[TaskView, ...], Sequence[Level]]:
-    """What the page knows of a scene's tasks, and its stack."""
+    """Returns the page's data of a scene's tasks, and its stack."""
     urdf = your_robot.LAMP if scene == "hold" else None
     run = start(prepared(load_scene(scene, urdf), None, (change,) if change else ()), 0)
     assert isinstance(run, TorqueRun)
@@ -37,7 +37,7 @@ def opened(scene: str, change: str = "") -> tuple[tuple[TaskView, ...], Sequence
 
 
 def told(text: str) -> dict[str, int]:
-    """The levels that a text names, and their places."""
+    """Returns the levels that a text names, and their numbers."""
     return {
         html.unescape(name): int(place) for name, place in re.findall(r"<b>([^<]+)</b> \(level (\d+)\)", text)
     }
@@ -51,7 +51,8 @@ def enabled(levels: Sequence[Level]) -> dict[str, int]:
     ("scene", "change"), [*((name, "") for name in SCENES), *(("iiwa14-hold", each) for each in CHANGES)]
 )
 def test_levels_are_named_where_they_are(scene: str, change: str) -> None:
-    """All that are switched on, by their own names and places; the ball has the colour of its level."""
+    """The guide names all enabled levels with their names and numbers; the ball has the colour of its
+    level."""
     tasks, levels = opened(scene, change)
     colours = level_colours([level.name for level in levels])
     first = guide(tasks, levels, colours, dragged=False)
@@ -67,7 +68,7 @@ def test_levels_are_named_where_they_are(scene: str, change: str) -> None:
         assert "switched off" in first
     then = told(guide(tasks, levels, colours, dragged=True))
     assert then.items() <= enabled(levels).items() and len(then) == 2
-    # No level of another scene is spoken of, and no number but those of places.
+    # The guide names no level of another scene, and no other numbers than those of levels.
     rest = re.sub(r"<b>[^<]+</b> \(level \d+\)|<[^>]+>", "", first)
     assert "level" not in rest.replace("Its level", "")
     assert scene != "planar3-plane" or told(first) == {"reach": 1, "pose": 2, "wrist": 3}
@@ -82,7 +83,7 @@ def test_one_level_or_none_offers_nothing_that_is_not_there() -> None:
 
 @pytest.mark.parametrize("scene", VELOCITY_SCENES)
 def test_roles_have_the_levels_that_are_told(scene: str) -> None:
-    """Also after a swap, and while a role has no task."""
+    """The guide names the level of each role, also after a swap, and while a role has no task."""
     made = load_scene(scene)
     assert isinstance(made.settings, VelocitySettings)
     roles = [level.name for level in made.settings.levels]

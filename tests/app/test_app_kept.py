@@ -29,7 +29,7 @@ LONG = 240.0  # s: the first start of a checkout compiles
 
 
 def allocated() -> int:
-    """Bytes that this process holds of the system's allocator, in all its arenas."""
+    """Returns the bytes that this process has allocated from the system, in all arenas."""
     gc.collect()
     library = ctypes.CDLL(None)
     if not hasattr(library, "malloc_info"):
@@ -47,7 +47,7 @@ def allocated() -> int:
 
 @pytest.mark.parametrize("scene", ["iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag"])
 def test_ticks_keep_nothing(scene: str) -> None:
-    """80 bytes a tick are 5 MB a minute."""
+    """A leak of 80 bytes per tick would be 5 MB per minute."""
     body = SimulationRunner(SceneChoice(RunSpec(scene)))
 
     def run() -> None:

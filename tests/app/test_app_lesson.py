@@ -1,4 +1,4 @@
-"""Following a lesson without a page: the run, its judgement, the prediction, the ghost, the challenge."""
+"""A lesson without a page: the run, the checks of its claims, the prediction, the ghost, the challenge."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from robots import InputError
 
 
 class Learner:
-    """A body, driven by hand; `lecture` is the last that was reported."""
+    """A simulation that the test advances; `lecture` is the last state of the lesson that it reported."""
 
     def __init__(self, exercise: LessonPlace) -> None:
         self.body = SimulationRunner(SceneChoice.of_lesson(exercise))
@@ -45,7 +45,7 @@ class Learner:
         return self.look()
 
     def runs(self, *commands: Command) -> Lecture:
-        """Commands, then everything until the run is over."""
+        """Executes commands, then runs until the run of the lesson has ended."""
         self.does(*commands)
         while not self.body.running:
             self.body.settle()
@@ -71,7 +71,8 @@ Start = Callable[..., Learner]
 
 
 def test_a_run_in_the_page_measures_what_the_headless_one_does(learn: Start) -> None:
-    """To the bit, ghost included; the report survives the pipe."""
+    """The values are bitwise equal to those of a headless run, ghost included, and the report can be
+    pickled."""
     learner = learn("your-robot", 2)
     lesson = load_lesson("your-robot")
     step = lesson.steps[2]
@@ -101,7 +102,7 @@ def test_nothing_moves_before_the_prediction_and_marks_come_while_it_runs(learn:
         learner.body.settle()
     assert learner.body.pace == 1.0
     learner.body.tick(600)
-    for _ in range(5):  # twice a second
+    for _ in range(5):  # the claims are checked at every fifth report
         learner.look()
     assert learner.lecture.phase == "running" and 0.5 < learner.lecture.t < 0.7
     assert None not in learner.lecture.holds and learner.lecture.grade is None
@@ -109,9 +110,9 @@ def test_nothing_moves_before_the_prediction_and_marks_come_while_it_runs(learn:
         learner.body.tick(20)
     lecture = learner.lecture
     assert lecture.grade is not None and lecture.grade.score in (0.0, 1.0) and math.isfinite(lecture.truth)
-    assert learner.body.running  # free play
+    assert learner.body.running  # the robot keeps running after the lesson's run
     learner.body.tick(50)
-    assert learner.look() is lecture  # what was measured stays
+    assert learner.look() is lecture  # the measured values do not change
 
 
 def test_a_run_of_ones_own_is_called_that_and_leaves_the_prediction_alone(learn: Start) -> None:
@@ -140,11 +141,12 @@ def test_a_robot_that_is_lost_ends_the_run_as_headless(learn: Start) -> None:
     assert lecture.values == tuple(values[each] for each in measures)
     assert lecture.lost_at is not None and 1.0 < lecture.lost_at < step.duration
     assert lecture.phase == "done" and lecture.t < step.duration
-    assert not learner.body.running  # what is out of control only gets worse
+    assert not learner.body.running  # the simulation of a robot that lost control is stopped
 
 
 def test_what_is_refused_leaves_everything_as_it_was(learn: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever refuses, and however late: scene, run, lecturer and what is shown go on."""
+    """If a new scene or step is refused, at any point of its loading, the present scene, run and lesson
+    continue unchanged."""
     learner = learn("deadlines", 1)
     body = learner.body
     learner.does(Predict(2.0))
@@ -174,13 +176,14 @@ def test_steps_of_a_lesson_follow_without_building_anything_anew(learn: Start) -
     assert learner.body.block is block
     lecture = learner.look()
     assert lecture.exercise.place == 2 and lecture.phase == "waiting"
-    assert not learner.body.session.settings.levels[1].enabled  # the step's own settings
+    assert not learner.body.session.settings.levels[1].enabled  # the settings of this step
     other = learner.body.handle(Load(SceneChoice.of_lesson(LessonPlace("one-task"))))
     assert isinstance(other, Ready)
 
 
 def test_a_code_opens_the_step_with_the_settings_somebody_made() -> None:
-    """They are a learner's changes: they stand until the step's own run, and a challenge counts them."""
+    """The settings in a code count as the learner's changes: they are in effect until the step's own run, and
+    a challenge counts them."""
     lesson = load_lesson("deadlines")
     challenge, last = lesson.challenge, len(lesson.steps) + 1
     assert challenge is not None
@@ -246,7 +249,7 @@ def test_every_control_reads_what_it_sets(name: str) -> None:
 
 
 def test_what_a_script_changes_is_undone_before_the_next_run(learn: Start) -> None:
-    """Else a challenge whose script hangs on a load would begin with the load the second time."""
+    """Without this, a challenge whose script adds a load would start its second run with the load."""
     challenge = load_lesson("no-model-needed").challenge
     assert challenge is not None and any(isinstance(event, Set) for _, event in challenge.events)
     learner = learn("no-model-needed", len(load_lesson("no-model-needed").steps))

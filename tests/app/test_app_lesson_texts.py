@@ -31,13 +31,13 @@ CALLED = {
     "relative_pose": "relative pose",
     "plane_distance": "distance to a plane",
 }
-"""Kinds of tasks whose word on the command line is not the one of the glossary."""
+"""Kinds of tasks whose name on the command line differs from the word in the glossary."""
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_task_is_a_word_with_its_unit(kind: str) -> None:
     meaning = words()[CALLED.get(kind, kind)]
-    unitless = ("pose", "damping")  # a pose is two kinds, and damping has no target
+    unitless = ("pose", "damping")  # a pose consists of two kinds, and damping has no target
     assert kind in unitless or " in m" in meaning or " in rad" in meaning
 
 
@@ -111,7 +111,7 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
 
 
 def test_a_guess_that_came_too_late_is_not_drawn() -> None:
-    """The drawing shows what was graded."""
+    """The picture shows the prediction that was graded, although the slider was moved afterwards."""
     prediction = next(
         each.prediction
         for name in COURSE
@@ -123,7 +123,7 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
     asking = Asking(gui, prediction, lambda _: None)
     slider = gui.add_slider.return_value
     slider.value = STEPS
-    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
         elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](None))).result()
     assert figure(prediction.high, prediction.measure.unit) in picture.content
     graded = prediction.low * 2

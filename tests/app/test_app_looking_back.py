@@ -80,14 +80,14 @@ def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
         tape.add(frame(1e-3 * k))
     assert len(list(tape.between(-1.0, 10.0))) < 3.0 * 30 + 3
     found = tape.at(2.999)
-    assert found is not None and found.t == 2.999  # the newest moment is always there
+    assert found is not None and found.t == 2.999  # the newest moment is always stored
     tape.add(frame(0.0))
     assert tape.span == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("rate", [30.0, 10.0])
 def test_the_tape_holds_no_more_than_a_minute(rate: float) -> None:
-    """Also where a busy machine shows fewer frames than it would keep."""
+    """The history has at most a minute of frames, also if a busy machine shows fewer frames per second."""
     tape = PoseHistory()
     lengths: list[int] = []
     for k in range(round(150 * rate)):
@@ -125,7 +125,8 @@ def test_plots_of_the_past_are_those_that_were_seen(layout: Layout) -> None:
 
 
 def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
-    """A ghost with another control period, or one that is a little behind, is drawn at the same places."""
+    """A ghost with another control period or a small delay has its samples in the same buckets as its
+    leader."""
     found = []
     for period, late in ((0.001, 0), (0.004, 3)):
         block = Block(layout.size, 1)
@@ -184,7 +185,7 @@ def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
     t, value = layout.fields["t"].start, layout.fields["step_us"].start
     assert len(recent) == 6000 and recent[0, t] == pytest.approx(420.0)
     assert MOST // 3 < len(whole) < MOST and whole[0, t] == 0.0 and whole[-1, t] > 479.5
-    assert np.unique(np.round(np.diff(whole[:, t]), 6)).size == 1  # evenly
+    assert np.unique(np.round(np.diff(whole[:, t]), 6)).size == 1  # evenly spaced
     for rows in (recent, whole):
         assert np.array_equal(rows[:, value], rows[:, t] ** 2)
     record.take(rows_at(layout, np.zeros(1), "step_us", np.ones(1)))
@@ -233,7 +234,7 @@ def test_the_picture_is_drawn_with_and_without_a_ghost(run: Recorded, tmp_path: 
 
 
 def test_a_pull_acts_at_the_point_that_is_held() -> None:
-    """The acceleration under the push equals that of the force alone at the held point, J(point)ᵀ f."""
+    """The acceleration under the push equals that of the force alone at the grasped point, J(point)ᵀ f."""
     robot, settings = load_robot("iiwa14"), PlantSettings(payload_kg=2.0)
     plant = Plant(robot, settings)
     rng = np.random.default_rng(5)

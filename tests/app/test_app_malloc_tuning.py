@@ -1,4 +1,5 @@
-"""Many threads of the server share few arenas of the allocator. In a process of its own: it is for good."""
+"""The server's threads share few arenas of the memory allocator. Tested in a process of its own, because the
+option cannot be reset."""
 
 from __future__ import annotations
 
@@ -40,7 +41,7 @@ libc.fclose(stream)
 
 
 def arenas(few: bool, report: Path) -> int:
-    """Of a process with six threads that hold memory."""
+    """Returns the number of arenas of a process with six threads that hold memory."""
     environment = {key: value for key, value in os.environ.items() if key != "MALLOC_ARENA_MAX"}
     subprocess.run(
         [sys.executable, "-c", COUNT.format(few=few), str(report)],
@@ -78,7 +79,8 @@ print(1e-6 * (psutil.Process().memory_info().rss - before))
 
 @pytest.mark.skipif("CS_GNU_LIBC_VERSION" not in os.confstr_names, reason="the option is glibc's")
 def test_what_a_scene_recorded_is_given_back_when_it_goes() -> None:
-    """Although small objects that stay were made meanwhile."""
+    """The memory of a scene's recording is released although small objects, which remain, were created in the
+    meantime."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("MALLOC_")}
     done = subprocess.run(
         [sys.executable, "-c", HOLES],
@@ -88,4 +90,4 @@ def test_what_a_scene_recorded_is_given_back_when_it_goes() -> None:
         capture_output=True,
         text=True,
     )
-    assert float(done.stdout) < 25.0  # MB; 8 of them small objects. Left alone, glibc keeps 85.
+    assert float(done.stdout) < 25.0  # MB; 8 of them small objects. Without the options, glibc keeps 85 MB.

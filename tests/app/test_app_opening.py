@@ -1,4 +1,4 @@
-"""How the page comes into the owner's browser, and what is printed for whom."""
+"""How the page is opened in the owner's browser, and the addresses that are printed."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ time.sleep(60)
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Path:
-    """A program that writes its arguments down beside it, and stays."""
+    """A program that writes its arguments to a file and keeps running."""
     path = tmp_path / "browser"
     path.write_text(BROWSER.format(python=sys.executable, said=str(tmp_path / "said")))
     path.chmod(0o755)
@@ -46,8 +46,8 @@ def browser(tmp_path: Path) -> Path:
 
 
 def test_no_argument_list_holds_what_the_browser_is_opened_with(browser: Path, tmp_path: Path) -> None:
-    """Every user of the machine can read argument lists. A file that nobody else can read leads to the page,
-    and is gone with the lab."""
+    """Every user of the machine can read argument lists. The browser therefore opens a file that no other
+    user can read; it redirects to the page, and is deleted at the end."""
     places = tmp_path / "places"
     places.mkdir()
     with subprocess.Popen(
@@ -111,7 +111,7 @@ def test_who_works_alone_reads_one_line() -> None:
 
 
 def test_who_serves_others_reads_which_address_is_for_whom() -> None:
-    """The first one is the owner's, and nothing to hand on contains the owner's secret."""
+    """The first address is the owner's, and no other line contains the owner's secret."""
     origin = "https://lab.example.org"
     with made(own_files=Folder.at("."), trusted_origins=[origin], classroom=True) as server:
         first, *others = greeting(server, "127.0.0.1", (origin,))

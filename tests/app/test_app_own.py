@@ -1,4 +1,5 @@
-"""A controller from a file on the page: what is saved runs, what is wrong is a sentence, the rest goes on."""
+"""A user's controller file on the page: a saved file runs at once, and a wrong file gives one sentence while
+the previous controller continues."""
 
 from __future__ import annotations
 
@@ -45,7 +46,7 @@ def body(file: Path) -> Iterator[SimulationRunner]:
 
 
 def after(body: SimulationRunner, condition: Callable[[], bool]) -> bool:
-    """Whether something comes true while the body runs and reports."""
+    """Whether a condition becomes true while the simulation runs."""
 
     def looked() -> bool:
         body.tick(5)
@@ -102,7 +103,7 @@ def test_own_code_that_fails_can_be_reset(body: SimulationRunner, file: Path) ->
 
 
 def test_own_code_has_a_ghost_beside_it(body: SimulationRunner, file: Path) -> None:
-    """The lab's controller as the ghost of one's own, and the other way round."""
+    """The ghost of a user's controller may be one of ours, and the other way round."""
     body.handle(Lead(True))
     begin = body.leader.script(body.session)
     assert begin is not None and begin.begin is not None
@@ -134,7 +135,8 @@ def test_own_code_is_switched_to_by_name_only_if_it_was_named_at_the_start(
 
 
 def test_own_code_is_known_by_its_content(body: SimulationRunner, file: Path) -> None:
-    """A code names the file and what is in it; it opens for whoever started with the same one."""
+    """A code names the file and the digest of its content; it opens for a user who started with the same
+    file."""
     state = state_of(RunSpec("planar3-hold"), body.session.settings_now)
     code = encode(state)
     with pytest.raises(InputError, match=r"add --controller mine\.py"):
@@ -160,7 +162,7 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
             assert eventually(lambda: page.shows("line 2: NameError"))
             assert page.shows("YOUR CODE")
 
-            def faults() -> list[str]:  # in sight wherever the panel is scrolled to
+            def faults() -> list[str]:  # visible at every position of the panel
                 return [body for title, body in list(page.standing.values()) if title == "Your code"]
 
             assert ["line 2: NameError" in each for each in faults()] == [True]
@@ -191,8 +193,8 @@ def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
 
 
 def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> None:
-    """One sentence says why, the scene is open, and another robot has the task again; a stack that names it
-    is refused for the same reason."""
+    """One sentence gives the reason, and the scene opens. On a robot that has the frame, the task is there
+    again. A stack that names the task is refused for the same reason."""
     path = tmp_path / "reach.py"
     path.write_text(text_of("task", None, "reach.py").replace('name="reach"', 'name="reach", frame="link_4"'))
     choice = SceneChoice.starting("iiwa14-hold", tasks=(str(path),))

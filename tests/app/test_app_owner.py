@@ -1,4 +1,4 @@
-"""Who runs a Python file of the machine from the page: whoever started the server, below one folder."""
+"""Only the user who started the server can run Python files from the page, and only files in one folder."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def torque(now):
 
 @pytest.fixture
 def mark(tmp_path: Path) -> Path:
-    """A file that is there once code was run."""
+    """A file that exists after the code was run."""
     return tmp_path / "was-run"
 
 
@@ -63,7 +63,8 @@ def serving(own: Path | None, **more: Any) -> Iterator[PageServer]:
 
 
 def built(page: Wire, times: int = 1) -> bool:
-    """Whether the Robot tab comes so often: its last folder follows all that files are named in."""
+    """Whether the Robot tab was built this many times: its last folder is created after all fields for
+    files."""
     return eventually(lambda: page.folders("Import report") >= times, LONG)
 
 
@@ -78,7 +79,7 @@ def ask(page: Wire, field: str, path: object, button: str) -> None:
 
 
 def answer(page: Wire) -> Callable[[], str]:
-    """What stands beside NOT LOADED."""
+    """Returns a function that reads the text beside NOT LOADED."""
 
     def text() -> str:
         shown = [each["props"] for each in list(page.controls.values()) if each["props"].get("visible", True)]
@@ -96,7 +97,7 @@ def test_files_are_opened_only_on_the_page_of_the_owners_address(own: Path, mark
             assert guest.find("Python file") is None and guest.find("File") is None
         with Wire(server.link) as page:
             assert built(page)
-            ask(page, "Python file", "law.py", "Open file")  # counts from the folder
+            ask(page, "Python file", "law.py", "Open file")  # relative to the folder
             assert eventually(mark.exists, LONG)
             learner = server.sessions.learners[-1]
             assert eventually(
@@ -116,7 +117,8 @@ def test_without_a_folder_nobody_opens_files(own: Path) -> None:
 
 
 def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
-    """Even with the owner's address, until the page steers: it may be on the wall for all to use."""
+    """A page that opened the owner's address may open files only after it took control, because its screen
+    may be visible to all."""
     with serving(own, classroom=True) as server:
         for link in (server.guest_link, server.link):
             with Wire(link) as page:
@@ -134,7 +136,7 @@ def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
 
 
 def test_a_request_that_a_proxy_passes_on_is_not_the_owners(own: Path) -> None:
-    """With the owner's secret or cookie, too."""
+    """A forwarded request does not count as the owner's, even with the owner's secret or cookie."""
     protocol: Any = [f"viser-v{__version__}"]
     with serving(own, max_sessions=3) as server:
         cookie = let_in(server.link)
@@ -157,7 +159,8 @@ def test_a_request_that_a_proxy_passes_on_is_not_the_owners(own: Path) -> None:
 
 
 def test_nothing_outside_the_folder_is_opened(own: Path, mark: Path) -> None:
-    """However the path leads there; and nobody learns whether there is a file."""
+    """No form of the path leads outside the folder, and the message is the same whether the file exists or
+    not."""
     outside = code_that_runs(own.parent / "outside.py", mark)
     (own / "link.py").symlink_to(outside)
     (own / "up").symlink_to(own.parent)
@@ -207,7 +210,7 @@ def test_a_code_opens_no_file_and_does_not_say_where_files_lie(own: Path, mark: 
 
 
 def encoded(setting: str) -> str:
-    """A code by hand: ours would mark files."""
+    """Returns a code that is written by hand; `encode` would mark the file."""
     text = json.dumps({"s": "planar3-hold", "a": [setting]}, separators=(",", ":"))
     return "hl1-" + base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
 

@@ -1,4 +1,4 @@
-"""Pictures of a tick as SVG: well-formed, inside their frame, and true to the numbers."""
+"""Pictures of a tick as SVG: they are well-formed, inside their frame, and agree with the numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from lessons.scenes.catalog import prepared, torque_scene
 from lessons.session.torque import TorqueSession
 
 JOINTS = ("one & two", "<three>")
-"""Names of a stranger's robot."""
+"""Joint names from an untrusted file."""
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_points_stand_where_their_numbers_say(plane: Plane) -> None:
 def test_what_is_far_off_is_an_arrow_with_its_numbers(plane: Plane) -> None:
     far = replace(plane, osf=np.array([50.0, -20.0]))
     half = plane_svg.half_width(plane, None)
-    assert plane_svg.half_width(far, None) == half  # OSF does not make everything else small
+    assert plane_svg.half_width(far, None) == half  # a distant OSF solution does not change the scale
     (mark,) = drawn(far, half).findall(".//g[@class='osf']")
     x, y = (float(each) for each in re.findall(r"-?[\d.]+", mark.get("transform", ""))[:2])
     assert 50.0 < x < 410.0 and 10.0 < y < 370.0
@@ -115,7 +115,7 @@ def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytes
     sent: list[InsideRequest] = []
     watching = Watching(sent.append)
     watching.ask(InsideRequest(), None)
-    assert not sent  # nobody looks: nothing is asked
+    assert not sent  # the panel is not visible, so nothing is requested
     wish = InsideRequest(plane=(0, 1))
     for _ in range(3):
         watching.ask(wish, None)
@@ -123,7 +123,7 @@ def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytes
     now[0] += 1.0
     watching.ask(wish, Inside())
     assert sent == [wish]
-    watching.ask(wish, None)  # the run began anew
+    watching.ask(wish, None)  # the run was restarted
     assert sent == [wish, wish]
     watching.ask(InsideRequest(), Inside())
     assert sent[-1] == InsideRequest()

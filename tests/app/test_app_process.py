@@ -1,4 +1,4 @@
-"""The simulation in its own process: pause, speed, crash, recovery, neighbours, the end."""
+"""The simulation in its own process: pause, speed, crash, recovery, several simulations, the end."""
 
 from __future__ import annotations
 
@@ -82,7 +82,8 @@ def _factor(learner: SimulationClient) -> float:
 def test_a_page_that_shows_the_scene_before_keeps_its_settings(
     start: Callable[[str], SimulationClient],
 ) -> None:
-    """Until it has built the next scene, whose settings may be of another kind altogether."""
+    """A page has the settings of the scene that it shows until it has built the next one, whose settings may
+    be of another type."""
     learner = start("planar3-hold")
     learner.send(Post(Set("horizon", 8)))
     before = learner.ready
@@ -171,7 +172,7 @@ def test_a_lent_fork_server_outlives_who_used_it(fork_server: ForkServer | None)
 
 
 def rings() -> int:
-    """Rings of telemetry that this process looks at."""
+    """Returns the number of telemetry rings that this process maps."""
     return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
 
 
@@ -183,7 +184,7 @@ def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
         assert sessions.enter([]) is None  # full
         assert sessions.enter([one.token]) is None  # attached elsewhere: two tabs never share a robot
         sessions.leave(one)
-        assert sessions.enter([]) is None  # its place is kept for who reloads
+        assert sessions.enter([]) is None  # the place is reserved for the page that reloads
         assert sessions.enter(["stranger", one.token]) is one  # a reload
         sessions.leave(two)
         assert wait_until(lambda: two not in sessions.learners, LONG)

@@ -1,4 +1,5 @@
-"""Simulations that hang, are stopped or killed, and pages that are: nobody waits, nothing is left behind."""
+"""Simulations and pages that hang, are stopped or are killed: nothing else waits for them, and no process or
+memory is left."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ HERE = Path(__file__).parent
 
 @pytest.fixture(scope="module")
 def lent(lent: dict[str, ForkServer | None]) -> Iterator[dict[str, ForkServer | None]]:
-    """One of the stubborn, too."""
+    """The fork servers of other tests, and one for the worker `stubborn`."""
     if lent[WORKER] is None:
         yield lent
         return
@@ -43,11 +44,12 @@ def lent(lent: dict[str, ForkServer | None]) -> Iterator[dict[str, ForkServer | 
     stubborn.close()
 
 
-# ---------------------------------------------------------------- silence
+# ---------------------------------------------------------------- simulations that do not answer
 
 
 def test_nobody_waits_for_a_stopped_child(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither for its pipe, which is full, nor when it is started again; and who gave a command is told."""
+    """Calls of a stopped simulation return at once although its pipe is full, the user gets a notice about
+    lost commands, and a restart does not wait."""
     learner, other = start("planar3-hold"), start("planar3-hold")
     assert wait_until(lambda: running(learner) and running(other), LONG)
     pid = born(learner)
@@ -93,7 +95,7 @@ def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.Mo
     )
     monkeypatch.setattr(trouble, "DEADLINE", 3.5)
     assert wait_until(lambda: getattr(learner.trouble(), "state", "") == "SILENT", LONG)
-    assert not gone(pid)  # the machine may only be slow: people decide
+    assert not gone(pid)  # the machine may only be slow, so the user decides
     learner.restart()
     assert wait_until(lambda: gone(pid), LONG)
     assert learner.choice.run.scene == "planar3-hold"
@@ -102,11 +104,11 @@ def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("scene", [None, "panda-hold"])
 def test_what_is_pressed_before_a_death_is_known_is_done(start: Start, scene: str | None) -> None:
-    """*Reset all*, or another scene, in the moment between a child's death and the word of it."""
+    """*Reset all*, or another scene, is requested between a child's death and the detection of this death."""
     learner = start("planar3-hold")
     assert wait_until(lambda: running(learner), LONG)
     pid, ready = born(learner), learner.ready
-    with learner._lock:  # nothing is heard meanwhile
+    with learner._lock:  # no message is processed meanwhile
         os.kill(pid, signal.SIGKILL)
         assert wait_until(lambda: gone(pid), LONG)
         if scene is None:
@@ -115,7 +117,7 @@ def test_what_is_pressed_before_a_death_is_known_is_done(start: Start, scene: st
             learner.load(SceneChoice(RunSpec(scene)))
     assert wait_until(lambda: learner.ready is not ready and running(learner), LONG)
     assert learner.choice.run.scene == (scene or "planar3-hold") and learner.failure is None
-    os.kill(born(learner), signal.SIGKILL)  # what was done is not done twice
+    os.kill(born(learner), signal.SIGKILL)  # the command is not repeated after a second death
     assert wait_until(lambda: learner.failure is not None, LONG)
 
 
@@ -183,7 +185,7 @@ time.sleep(1e6)
 
 @pytest.mark.parametrize("spawn", [False, True])
 def test_a_page_that_is_killed_leaves_nobody_behind(spawn: bool) -> None:
-    """Whatever its children are doing: computing, asleep, waiting, or stopped."""
+    """All child processes end with the page, whether they compute, sleep, wait or are stopped."""
     code = PAGE.format(paths=[str(HERE), str(HERE.parents[1])], spawn=spawn)
     page = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert page.stdout is not None
@@ -191,7 +193,7 @@ def test_a_page_that_is_killed_leaves_nobody_behind(spawn: bool) -> None:
     assert len(pids) == (4 if spawn else 5)
     busy = psutil.Process(pids[1])
     assert wait_until(lambda: busy.status() == psutil.STATUS_RUNNING, LONG)
-    if not spawn:  # one that has yet to import everything could not be told to end so early
+    if not spawn:  # a spawned process that is stopped during its first imports cannot end with its parent
         os.kill(pids[3], signal.SIGSTOP)
     page.kill()
     page.communicate()
@@ -211,7 +213,8 @@ def test_a_child_takes_sigterm(start: Start, scene: str) -> None:
 
 
 def test_a_ring_is_as_large_as_there_is_memory() -> None:
-    """On a machine without room it is smaller, then one sentence; never a crash in the middle of a run."""
+    """On a machine with little memory the ring is smaller; with less memory one sentence is shown. No run
+    crashes later."""
     width = 180
     assert measured(width, None) == f"{min(MAX_ROWS, 12_000_000 // (8 * width))}"
     assert int(measured(width, 4_000_000)) in range(MIN_ROWS, 2800)
@@ -219,7 +222,8 @@ def test_a_ring_is_as_large_as_there_is_memory() -> None:
 
 
 def measured(width: int, limit: int | None) -> str:
-    """Rows of a ring, written to the last, in a process whose files may not be larger; or the sentence."""
+    """Returns the number of rows of a ring that was written completely, in a process with limited file size;
+    or the error message."""
     code = (
         "import numpy as np; from app.link.ring import Block; from robots import InputError\n"
         "try:\n"
@@ -243,7 +247,8 @@ def measured(width: int, limit: int | None) -> str:
 
 
 def test_files_arrive_with_their_message(start: Start) -> None:
-    """A ring has no name: the page holds it, and the child's death takes nothing away."""
+    """A ring has no name in the file system: the page holds its file descriptor, which stays valid after the
+    child's death, and releases it."""
     learner = start("planar3-hold")
     assert wait_until(lambda: running(learner), LONG)
     open_before = len(os.listdir("/proc/self/fd"))
@@ -256,10 +261,10 @@ def test_files_arrive_with_their_message(start: Start) -> None:
     assert isinstance(learner.read(lambda block, _: block), Block)
 
 
-# ---------------------------------------------------------------- all of it
+# ---------------------------------------------------------------- everything together
 
 
 def test_pages_get_over_a_rough_day() -> None:
-    """In short what `python -m benchmarks.rough` does at length: the buttons bring every page back."""
+    """A short version of `python -m benchmarks.rough`: every page recovers with its buttons."""
     found = treat(kills=4, stops=2, scene="planar3-hold")
     assert found["recovered"] == found["treated"] and not found["left behind"], found

@@ -1,4 +1,4 @@
-"""docs/serving.md: its nginx configuration, run as it is printed."""
+"""The nginx configuration in docs/serving.md, tested as it is printed."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def nginx() -> str:
 
 @pytest.fixture(scope="module")
 def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PageServer, int, Path]]:
-    """The page, the port nginx shows it at, and the certificate."""
+    """The page, nginx's port for it, and the certificate."""
     folder, port = tmp_path_factory.mktemp("nginx"), free_port()
     certificate, key = folder / "lab.pem", folder / "lab.key"
     subprocess.run(
@@ -89,7 +89,7 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
 
 @contextmanager
 def nginx_with(nginx: str, folder: Path, site: str, port: int) -> Iterator[None]:
-    """nginx, until the end, with a configuration that listens on a port."""
+    """Runs nginx with a configuration that listens on a port, until the context ends."""
     folders = "".join(
         f"{kind}_temp_path {folder}/{kind};\n"
         for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
@@ -116,7 +116,7 @@ def answers(port: int) -> bool:
 
 
 def get(port: int, certificate: Path, path: str = "/", *, host: str = NAME, cookie: str = "") -> str:
-    """The answer's head."""
+    """Returns the head of the response."""
     context = ssl.create_default_context(cafile=str(certificate))
     with (
         socket.create_connection(("127.0.0.1", port), timeout=LONG) as plain,
@@ -144,7 +144,7 @@ def dial(port: int, certificate: Path, origin: str, cookie: str) -> Any:
 
 
 def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path]) -> None:
-    """With TLS, the token and web sockets; other origins and hosts stay out."""
+    """The page opens with TLS, the token and web sockets; other origins and hosts are refused."""
     server, port, certificate = proxied
     origin = f"https://{NAME}:{port}"
     assert " 403 " in get(port, certificate)
@@ -186,8 +186,9 @@ server {
 def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
     host: str, nginx: str, tmp_path: Path
 ) -> None:
-    """The lab behind it thinks that it is alone: whatever host the proxy names, strangers have no token; and
-    through one that says what it is not even the owner opens files."""
+    """The server behind the proxy was started without --trusted-origin. Whatever host the proxy passes on,
+    visitors need the token; and through a proxy that adds forwarding headers, even the owner cannot open
+    files."""
     port = free_port()
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, own_files=Folder.at(str(tmp_path))
@@ -216,7 +217,7 @@ def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
 
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Several proxies too."""
+    """Several proxies are accepted as well."""
     from app.server import server
 
     asked: dict[str, Any] = {}
@@ -234,7 +235,7 @@ def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_the_page_names_options_that_exist() -> None:
-    """Every option it shows is one of the command's."""
+    """Every option in the text is an option of the command."""
     from app.commands.serve import serve
 
     shown = set(re.findall(r"--([a-z][a-z-]*)", PAGE.read_text()))

@@ -1,4 +1,5 @@
-"""A moment of what `benchmarks.soak` and `benchmarks.switches` do for an hour: the server stays as it is."""
+"""Short versions of `benchmarks.soak` and `benchmarks.switches`: the server's memory and handles stay
+constant."""
 
 from __future__ import annotations
 
@@ -12,22 +13,22 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_nothing_grows() -> None:
-    """Memory of server and simulations, threads, handles; and over reloads. In a process of its own, which
-    holds nothing of other tests."""
+    """Memory of server and simulations, threads and handles stay constant, also over reloads. The benchmark
+    runs in a process of its own, without the memory of other tests."""
     options = ["--minutes", "2", "--clients", "2", "--reconnects", "50", "--scene", "planar3-hold"]
     found = json.loads(run("soak", *options, "--json", "-"))
     assert found["faults"] == [], found
 
 
 def test_scenes_and_ghosts_that_are_left_are_given_back() -> None:
-    """Two learners change them every two seconds."""
+    """Two learners change scenes and ghosts every two seconds; all memory and processes are released."""
     options = ["--minutes", "0.25", "--clients", "2", "--every", "2", "--speed", "0.5"]
     lines = [json.loads(line) for line in run("switches", *options).splitlines()]
     assert lines[-1]["faults"] == [], lines
 
 
 def run(benchmark: str, *options: str) -> str:
-    """What it prints."""
+    """Returns the output of a benchmark."""
     done = subprocess.run(
         [sys.executable, "-m", f"benchmarks.{benchmark}", *options],
         cwd=ROOT,

@@ -1,4 +1,4 @@
-"""The first page: the server listens before anything that computes is loaded."""
+"""The first page: the server listens before any numerical library is loaded."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ finally:
     ],
 )
 def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None:
-    """viser itself needs NumPy; all else comes while the browser opens."""
+    """viser itself needs NumPy; all other libraries are loaded while the browser opens."""
     code = LISTEN.replace("{choice}", choice)
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
@@ -70,7 +70,7 @@ def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None
 
 @pytest.mark.parametrize("scene", ["iiwa14-hold", "ridgeback-ur10-square"])
 def test_the_process_of_the_pages_compiles_nothing(scene: str) -> None:
-    """It shows a robot that runs and has loaded neither the compiler nor what draws pictures to be kept."""
+    """The server's process shows a running robot without importing Numba or matplotlib."""
     code = SHOWN.replace("{scene}", scene)
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False

@@ -1,4 +1,4 @@
-"""A page never stands still because two threads met."""
+"""A page's sender does not miss a wake-up from another thread."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from app.adapter.thread_safe_event import ThreadSafeEvent
 
 
 class Meeting(deque[Any]):
-    """An event's waiters; another thread sets the event just before the first of them goes to sleep."""
+    """An event's list of waiters. Another thread sets the event just before the first waiter starts to
+    wait."""
 
     def __init__(self, event: asyncio.Event) -> None:
         super().__init__()
@@ -29,7 +30,8 @@ class Meeting(deque[Any]):
 
 
 async def wakes(event: asyncio.Event) -> bool:
-    """Whether a waiter that met another thread's call wakes up, from that call or from a later one."""
+    """Whether a waiter wakes up if another thread sets the event at that moment, by this call or by a later
+    one."""
     event._waiters = Meeting(event)  # pyright: ignore[reportAttributeAccessIssue]
     waiter = asyncio.ensure_future(event.wait())
     await asyncio.sleep(0.1)
@@ -43,10 +45,10 @@ def test_a_sender_wakes_though_it_is_called_while_it_goes_to_sleep() -> None:
     async def both() -> tuple[bool, bool]:
         return await wakes(ThreadSafeEvent(asyncio.get_running_loop())), await wakes(asyncio.Event())
 
-    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
         ours, plain = elsewhere.submit(lambda: asyncio.run(both())).result()
     assert ours
-    assert not plain  # or `ThreadSafeEvent` is needed no longer
+    assert not plain  # otherwise `ThreadSafeEvent` is no longer needed
 
 
 def test_a_call_after_the_end_is_no_error() -> None:

@@ -1,4 +1,4 @@
-"""Files that a page sends: what is too much is refused in one sentence, and holds nothing afterwards."""
+"""Uploads: a file that is too large is refused in one sentence, and its memory is released."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def server() -> Iterator[PageServer]:
 
 
 def shown(page: Wire) -> str:
-    """The button to upload a robot, once it is there."""
+    """Returns the button to upload a robot, as soon as it exists."""
     assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)
     button = page.find("Upload a URDF")
     return button or shown(page)
 
 
 def upload(page: Wire, name: str, content: bytes, parts: int = 1, size: int | None = None) -> None:
-    """parts: how often the content is sent; size: what is said beforehand that it is."""
+    """Uploads a file. parts: how often the content is sent; size: the announced number of bytes."""
     button, size = shown(page), parts * len(content) if size is None else size
     page.say(_messages.FileTransferStartUpload(button, name, "robot.urdf", "text/xml", parts, size))
     for place in range(parts):
@@ -49,14 +49,15 @@ def refusals(page: Wire) -> int:
 
 
 def taken(page: Wire) -> bool:
-    """A file that comes afterwards is read: the page says what is wrong with it."""
+    """Whether a later file is read: the page shows the fault of its content."""
     upload(page, "small", b"\xff")
     return eventually(lambda: page.shows("is not text"), LONG)
 
 
 @pytest.mark.parametrize("said", [LARGE, 100], ids=["honest", "lying"])
 def test_each_page_is_told_once(server: PageServer, said: int) -> None:
-    """Two at once, on pages whose robots were killed and started again."""
+    """Two pages upload at the same time after their robots were killed and restarted; each gets one
+    refusal."""
     with Wire(server.link) as one, Wire(server.link) as two:
         before = {page: shown(page) for page in (one, two)}
         for learner in [each for each in server.sessions.learners if each.attached]:

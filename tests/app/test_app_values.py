@@ -1,4 +1,4 @@
-"""What strangers write into a page's controls: refused with a notice, and the page lives on."""
+"""Invalid values for a page's controls are refused with a notice, and the page keeps working."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def test_whatever_is_written_the_page_goes_on(choice: SceneChoice, capfd: pytest
                 for name in NAMES if control["type"] not in tried else random.sample(NAMES, 3):
                     page.write(uuid, **{name: random.choice(VALUES)})
                     page.write(uuid, **{"value": control["value"], name: random.choice(VALUES)})
-                if control["type"] not in pressable:  # what a press does is no bad value
+                if control["type"] not in pressable:  # a press is not a bad value
                     for value in VALUES if control["type"] not in tried else random.sample(VALUES, 4):
                         page.write(uuid, value=value)
                 tried.add(control["type"])
-                time.sleep(0.05)  # a flood is another matter
+                time.sleep(0.05)  # slowly, because floods are tested elsewhere
             page.say(_messages.GuiUpdateMessage("no such control", {"value": 1}))
             page.say(_messages.GuiUpdateMessage(next(iter(inputs)), {}))
             odd = {"type": "GuiUpdateMessage", "uuid": 5, "updates": 7}
@@ -71,7 +71,7 @@ def test_whatever_is_written_the_page_goes_on(choice: SceneChoice, capfd: pytest
 
 
 def assert_is_alive(page: Wire, learner: Any, runs: bool) -> None:
-    """The session answers, the page shows what it says, and what is pressed is done."""
+    """Checks that the session responds, the page shows its state, and presses take effect."""
     assert learner.failure is None
     before = learner.status.ticks
     playback = page.find("Playback")
@@ -87,7 +87,8 @@ def assert_is_alive(page: Wire, learner: Any, runs: bool) -> None:
 
 
 def test_a_press_whose_panel_goes_meanwhile_is_told_of(capfd: pytest.CaptureFixture[str]) -> None:
-    """What its callback then writes is gone: a notice, and no traceback."""
+    """The callback writes to a control that was removed meanwhile: the user gets a notice, and no traceback
+    is printed."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Wire(server.link) as page:

@@ -1,4 +1,4 @@
-"""A velocity-level scene behind a page, driven by hand: no process, no clock."""
+"""A velocity-level scene of a page, called directly: without a process and without real time."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_reports_survive_the_pipe(body: SimulationRunner) -> None:
 
 
 def test_the_robot_moves_between_two_control_steps(body: SimulationRunner) -> None:
-    """Ten small motions and then one row, not one jump of a tenth of a second."""
+    """A control step consists of ten small motions and one row; the robot does not jump once per step."""
     body.handle(Post(MoveTarget("base", (0.5, 0.5))))
     body.tick(5)
     x, rows = [], body.block.count
@@ -88,7 +88,8 @@ def test_the_robot_moves_between_two_control_steps(body: SimulationRunner) -> No
 
 
 def test_a_pause_stands_between_two_control_steps(body: SimulationRunner) -> None:
-    """The step that was begun is carried out; then edits and a reset show though no time passes."""
+    """A pause first completes the present control step. While paused, edits and a reset take effect without a
+    step."""
     body.handle(Post(MoveTarget("base", (0.5, 0.5))))
     for _ in range(14):
         body.advance()
@@ -139,7 +140,7 @@ def test_the_base_stops_where_the_arm_is_stretched_until_it_comes_first(body: Si
 
 
 def test_the_list_follows_the_mission(handover: SimulationRunner) -> None:
-    """Events change it, people move with their tasks and keep what they were given."""
+    """Events change the list of tasks; people move with their tasks and keep the balls that they received."""
     before = mission(handover.status())
     assert [row.name for row in before.rows] == ["base 1", "ee 1", "base 2", "ee 2"]
     assert [person.balls for person in before.people] == [0, 0]
@@ -171,7 +172,7 @@ def test_a_role_without_an_open_task_has_no_target(handover: SimulationRunner) -
 
 
 def test_what_a_kind_does_not_know_is_a_sentence(body: SimulationRunner) -> None:
-    """Pushes at velocity level, missions at torque level."""
+    """A push at velocity level and a mission event at torque level each give one notice."""
     body.handle(Post(Push("base", (10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.1)))
     body.tick()
     assert len(body.status().notices) == 1
@@ -182,7 +183,7 @@ def test_what_a_kind_does_not_know_is_a_sentence(body: SimulationRunner) -> None
 
 
 def test_an_arm_turns_its_hand_as_it_is_told() -> None:
-    """Once no task of that role is left, there is nothing to turn."""
+    """After all tasks of that role are removed, the role has no target."""
     for arm in opened("iiwa14-htmpc"):
         arm.tick()
         wanted = exp3(np.array([0.0, 0.0, 0.5])) @ arm.status().targets["orientation"]
@@ -213,7 +214,7 @@ def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
                 row = learner.read(lambda _, history: history.latest[history.layout.fields["x/orientation"]])
                 return row is not None and bool(np.abs(log3(from_quaternion(row) @ before.T))[2] > 0.45)
 
-            # As a hand does: not once, maybe before anybody listens.
+            # The message is repeated, because the first one may arrive before the control has a callback.
             assert any(page.turn(RINGS, wanted) or eventually(turned, 10.0) for _ in range(6))
             assert eventually(lambda: page.shows("turned as its rings are"))
     finally:
@@ -233,7 +234,8 @@ def test_a_fast_simulation_may_owe_as_much_real_time_as_a_slow_one() -> None:
 
 
 def test_a_row_counts_until_the_next_one_comes(body: SimulationRunner) -> None:
-    """At 10 Hz a bucket of the plots in two has no row: the curve has no holes, and looking back finds it."""
+    """At 10 Hz every second bucket of the plots has no row. A row is used until the next one arrives, so the
+    curve has no gaps, and looking back finds a row at every time."""
     body.tick(30)
     layout = body.session.layout
     history = History(body.block, layout)

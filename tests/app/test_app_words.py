@@ -1,4 +1,5 @@
-"""What a browser may say, and what comes of everything else: pages go on, and the terminal stays empty."""
+"""The messages that a browser may send. All others are refused; pages keep working, and nothing is
+printed."""
 
 from __future__ import annotations
 
@@ -59,7 +60,7 @@ def said(kind: object, *parts: dict[str, Any]) -> bytes:
     "kind", [*words.Small.__args__, *words.File.__args__], ids=lambda kind: kind.__name__
 )
 def test_every_word_is_one_of_visers(kind: Any) -> None:
-    """With the fields that viser has, neither more nor fewer."""
+    """Every message class has exactly the fields of viser's class."""
     of_viser = wire_field_names(getattr(_messages, kind.__name__))
     assert set(kind.__struct_fields__) == set(of_viser)
 
@@ -119,7 +120,7 @@ def test_what_is_no_message_is_refused(raw: bytes) -> None:
 
 
 def test_a_hostile_user_stops_nothing() -> None:
-    """Some seconds of what `benchmarks.monkey --hostile` does for minutes."""
+    """The page survives a few seconds of `benchmarks.monkey --hostile` without a fault."""
     with StandardError() as terminal:
         server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=4, grace=0.2)
         try:
@@ -155,7 +156,7 @@ def test_whatever_the_camera_says_the_next_scene_is_shown(capfd: pytest.CaptureF
 
 
 def test_what_is_written_before_there_is_a_session_is_checked(capfd: pytest.CaptureFixture[str]) -> None:
-    """On the page that says that all places are taken."""
+    """Invalid values are also refused on the page that says that all places are taken."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Wire(server.link) as first, Wire(server.link) as second:
@@ -169,7 +170,8 @@ def test_what_is_written_before_there_is_a_session_is_checked(capfd: pytest.Capt
 
 
 def test_what_strangers_send_reaches_no_other_page_and_no_terminal() -> None:
-    """Not kept for everybody either: viser hands on that a form was changed, whether there is one or not."""
+    """Invalid messages of a page are neither broadcast nor printed; viser would broadcast that a form was
+    changed, even if the form does not exist."""
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
@@ -229,11 +231,11 @@ def test_a_paused_lesson_says_how_to_go_on() -> None:
         server.close()
 
 
-# ---------------------------------------------------------------- one by one
+# ---------------------------------------------------------------- single functions
 
 
 class Camera:
-    """Of a page whose canvas has a size. Refuses what viser does."""
+    """The camera of a page whose canvas has a size. It raises ValueError where viser does."""
 
     fov, up_direction = 0.9, (0.0, 0.0, 1.0)
 
@@ -289,7 +291,8 @@ def test_a_camera_that_looks_at_where_it_will_be_is_turned(position: tuple[float
 
 
 def test_poses_of_another_scene_are_none_of_this_page() -> None:
-    """A page is built for one scene while the next one comes in, whose robot has other joints."""
+    """A page is still built for one scene while the next scene arrives, whose robot has other joints; it gets
+    no poses of that robot."""
     robot, now = load_robot("iiwa14"), object()
     block = SimpleNamespace(poses=lambda: np.ones((4, 7)))
     learner = SimpleNamespace(ready=now, read=lambda look: look(block, None))
@@ -322,14 +325,14 @@ def test_a_control_that_goes_before_it_is_written_is_no_news() -> None:
     bindings.bind(gone, lambda settings: settings, lambda _: None)  # pyright: ignore[reportArgumentType]
     bindings.refresh(2)
     loop.call_soon(loop.stop)
-    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has a loop on this thread
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
         elsewhere.submit(loop.run_forever).result()
     loop.close()
     assert heard == []
 
 
 def test_the_newest_row_does_not_keep_all_that_came_with_it() -> None:
-    """Up to 12 MB of each robot, until the next look."""
+    """A view would keep all rows in memory until the next call, up to 12 MB per robot."""
     body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     history = History(body.block, body.session.layout)
     body.tick(50)

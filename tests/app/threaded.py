@@ -1,4 +1,5 @@
-"""A worker that leaves a second thread in the fork server, whose locks no child could ever open."""
+"""A worker that starts a second thread in the fork server; a lock that this thread held could never be
+released in a child."""
 
 from __future__ import annotations
 

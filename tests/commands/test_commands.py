@@ -1,4 +1,4 @@
-"""The command line as its users meet it: exit codes, one clear sentence, and JSON that keeps its contract."""
+"""The command line: exit codes, one clear sentence per error, and the documented JSON keys."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ WRONG: dict[str, tuple[list[str], str]] = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_input_gets_one_sentence_and_exit_2(case: str, capfd: pytest.CaptureFixture[str]) -> None:
-    """One line on stderr that names the trouble or the remedy, no traceback, nothing on stdout."""
+    """One line on stderr names the fault or the remedy, without a traceback; stdout is empty."""
     arguments, says = WRONG[case]
     assert main(arguments) == 2
     out, err = capfd.readouterr()
@@ -122,7 +122,7 @@ KEYS = {
 
 
 def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
-    """`run --json -` prints one JSON object with the promised keys and nothing else."""
+    """`run --json -` prints one JSON object with the documented keys and nothing else."""
     given = ["--duration", "0.05", "--seed", "7", "--set", "horizon=3", "--json", "-"]
     assert main(["run", "iiwa14-hold", *given]) == 0
     result: dict[str, Any] = json.loads(capfd.readouterr().out)
@@ -146,7 +146,7 @@ def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_run_writes_files(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """--json FILE and --npz FILE hold the run; the table goes to people only without --json."""
+    """--json FILE and --npz FILE store the run; the table is printed only without --json."""
     target, rows = tmp_path / "out.json", tmp_path / "out.npz"
     arguments = ["run", "planar3-hold", "--duration", "0.05", "--json", str(target), "--npz", str(rows)]
     assert main(arguments) == 0
@@ -166,7 +166,7 @@ def test_run_shows_a_table(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_disabled_levels_and_many_sets_go_together(capfd: pytest.CaptureFixture[str]) -> None:
-    """Several --set in one line; a level that is off has no cost."""
+    """Several --set are accepted in one line; a disabled level has no cost."""
     changes = ("levels.2.enabled=false", "levels.3.enabled=false", "limits.position=off")
     sets = [word for change in changes for word in ("--set", change)]
     assert main(["run", "iiwa14-hold", "--duration", "0.05", *sets, "--json", "-"]) == 0
@@ -177,7 +177,7 @@ def test_disabled_levels_and_many_sets_go_together(capfd: pytest.CaptureFixture[
 
 @pytest.mark.parametrize("command", ["scenes", "controllers", "robots"])
 def test_lists_as_table_and_json(command: str, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Every entry has a name and a line that says what it is, in both forms."""
+    """Every entry has a name and a description of one line, in both forms."""
     assert main([command, "--json", "-"]) == 0
     entries = json.loads(capfd.readouterr().out)
     assert entries
@@ -191,7 +191,7 @@ def test_lists_as_table_and_json(command: str, capfd: pytest.CaptureFixture[str]
 
 
 def test_the_catalog_can_be_checked(capfd: pytest.CaptureFixture[str]) -> None:
-    """Our own URDFs are usable; the report is the same in both forms."""
+    """All URDFs of the catalog are usable."""
     for entry in CATALOG.values():
         assert main(["robots", "--check", str(entry.path), "--json", "-"]) == 0
         report = json.loads(capfd.readouterr().out)
@@ -202,7 +202,7 @@ def test_the_catalog_can_be_checked(capfd: pytest.CaptureFixture[str]) -> None:
 def test_a_urdf_that_cannot_be_used_is_reported_with_exit_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """It ran, and the check failed: exit 1, the reason in the report."""
+    """The command runs and the check fails: exit code 1, with the reason in the report."""
     path = tmp_path / "still.urdf"
     path.write_text('<robot name="still"><link name="base"/></robot>')
     assert main(["robots", "--check", str(path), "--json", "-"]) == 1
@@ -210,7 +210,7 @@ def test_a_urdf_that_cannot_be_used_is_reported_with_exit_1(
 
 
 def test_the_example_of_the_readme_runs() -> None:
-    """The twenty lines for one's own program do what they print."""
+    """The README's example program runs, and its printed error is small."""
     readme = ROOT / "README.md"
     blocks = re.findall(r"```python\n(.*?)```", readme.read_text(), re.DOTALL) if readme.exists() else []
     if not blocks:
@@ -228,7 +228,7 @@ def test_the_example_of_the_readme_runs() -> None:
 
 
 def test_a_state_code_runs_like_its_command_line(capfd: pytest.CaptureFixture[str]) -> None:
-    """`run --state CODE` is the run that the code's command line names; more options go on top."""
+    """`run --state CODE` gives the same run as the code's command line; further options are added."""
     state = State(RunSpec("planar3-hold", set=("controller=tdeosf", "plant.payload_kg=0.4"), seed=2))
     results = []
     for given in (["run", "--state", encode(state)], shlex.split(state.run.command_line())[1:]):
@@ -240,7 +240,8 @@ def test_a_state_code_runs_like_its_command_line(capfd: pytest.CaptureFixture[st
 
 
 def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
-    """An assumed computer of 0.3 ms per knot misses 1 ms with N = 4 at every tick, with N = 3 never."""
+    """With an assumed computing time of 0.3 ms per knot, the deadline of 1 ms is missed at every tick with N
+    = 4, and never with N = 3."""
     for horizon, late in ((3, 0), (4, 50)):
         given = ["--set", "deadline_ms=1", "--set", "solve_ms_per_knot=0.3", "--set", f"horizon={horizon}"]
         assert main(["run", "planar3-hold", *given, "--duration", "0.05", "--json", "-"]) == 0
@@ -249,7 +250,7 @@ def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_flag_says_no_twice(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nor is there a second flag that takes one back: it would be the default."""
+    """No flag begins with --no-no-, and no flag is listed together with its opposite."""
     with pytest.raises(SystemExit) as ended:
         main([command, "--help"])
     told = capsys.readouterr().out

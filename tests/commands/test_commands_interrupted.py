@@ -1,4 +1,4 @@
-"""Ctrl-C in every phase of a command: it ends, without a traceback, and leaves no process behind."""
+"""Ctrl-C in every phase of a command: the command ends without a traceback and leaves no process."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ class Program:
         return psutil.Process(self.process.pid).children(recursive=True)
 
     def interrupt(self) -> None:
-        """As the terminal does it: the whole group hears of it."""
+        """Sends SIGINT to the whole process group, as a terminal does."""
         os.killpg(self.process.pid, signal.SIGINT)
 
     def end(self) -> str:
-        """Everything it said, once it has ended."""
+        """Waits for the end and returns everything that was printed."""
         self.process.wait(LONG)
         for thread in self._listening:
             thread.join(LONG)
@@ -101,13 +101,14 @@ def test_ctrl_c_ends_it(phase: str, tmp_path: Path) -> None:
         if program.process.poll() is None:
             os.killpg(program.process.pid, signal.SIGKILL)
     assert "Traceback" not in said and "Exception" not in said
-    # Interrupted in code that was made from text, Python itself passes the signal on at its end.
+    # If the signal interrupts code that was compiled from text, Python itself raises it again at its end.
     assert program.process.returncode in (0, 130, -signal.SIGINT)
     assert wait_until(lambda: not any(child.is_running() for child in children), LONG)
 
 
 def test_what_swallows_an_interrupt_is_interrupted_again(tmp_path: Path) -> None:
-    """A callback that a library calls loses the exception; a library that goes on is ended all the same."""
+    """A callback that a library calls loses the exception; a library that continues nevertheless is
+    interrupted again."""
     code = """
 import ctypes, time
 from app.commands.interrupts import interruptible
@@ -151,7 +152,8 @@ sys.meta_path.insert(0, Interrupted())
 
 
 def python(*arguments: str, before: Callable[[], None] | None = None) -> subprocess.CompletedProcess[str]:
-    """Python with these arguments, once it has ended; `before`: what is done first in its process."""
+    """Runs Python with these arguments and returns the result; `before`: a function that is called first in
+    the new process."""
     command = [sys.executable, *arguments]
     return subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=LONG, check=False, preexec_fn=before
@@ -173,7 +175,7 @@ def deaf() -> None:
 
 
 def test_a_job_in_the_background_goes_on() -> None:
-    """Who starts a program so that Ctrl-C is not meant for it (`nohup`, `&` in a script) has it so."""
+    """A program that was started so that it ignores Ctrl-C (`nohup`, `&` in a script) keeps ignoring it."""
     code = """
 import os, signal
 from app.commands.interrupts import interruptible
@@ -186,7 +188,7 @@ print("went on")
 
 
 def test_tests_in_the_background_start_programs_as_a_terminal_does() -> None:
-    """They inherit that Ctrl-C means nothing, the programs that they test must not."""
+    """Tests that run in the background ignore Ctrl-C, but the programs that they start must not."""
     done = python("-m", "pytest", "-n", "0", "-k", "first_modules_load", __file__, before=deaf)
     assert done.returncode == 0, done.stdout
     assert "2 passed" in done.stdout

@@ -1,4 +1,4 @@
-"""`himpc-lab lessons` as its users meet it."""
+"""The command `himpc-lab lessons`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def verdicts(fault: str) -> list[Verdict]:
 
 
 def test_a_fault_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """One sentence per fault; without one the exit code is 0."""
+    """Each fault gives one sentence and exit code 1; without faults the exit code is 0."""
     monkeypatch.setattr(
         "lessons.teaching.check.check", lambda *args, **options: verdicts("it is false: 3 mm")
     )
@@ -48,7 +48,7 @@ def test_a_fault_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
 
 
 def test_the_verdicts_as_json(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Standard output is one JSON object, valid also where nothing was measured."""
+    """Standard output is one valid JSON object, also for checks without a measured value."""
     monkeypatch.setattr("lessons.teaching.check.check", lambda *args, **options: verdicts("it is false"))
     assert main(["lessons", "--check", "one-task", "--json", "-"]) == 1
     result = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)

@@ -1,4 +1,4 @@
-"""Commands that compute nothing load nothing to compute with, and lazy packages show what they promise."""
+"""Lists and help load no numerical library, and lazy packages have all names that they declare."""
 
 from __future__ import annotations
 
@@ -52,7 +52,8 @@ def test_lists_load_no_numerics(command: str) -> None:
 
 
 def test_the_plant_looks_for_no_window() -> None:
-    """MuJoCo's import would ask other processes for a window library; Ctrl-C reached them."""
+    """By default MuJoCo's import would start processes that look for a window library, and Ctrl-C would reach
+    them."""
     code = """
 import sys
 import app.commands.early, robots.plant
@@ -71,7 +72,8 @@ assert "mujoco" in sys.modules and "glfw" not in sys.modules
 
 
 def test_the_papers_jobs_load_no_statistics() -> None:
-    """Every process that computes them would, for the outline of one figure."""
+    """Every process that computes the papers' jobs would load `scipy.stats`, which only the outline of one
+    figure needs."""
     code = "import sys, lessons.papers; assert 'scipy.stats' not in sys.modules"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -84,7 +86,7 @@ def test_help_names_every_command() -> None:
 
 @pytest.mark.parametrize("package", ["robots", "himpc", "himpc.controllers", "himpc.htmpc"])
 def test_a_lazy_package_has_all_it_names(package: str) -> None:
-    """Every public name is found, the same object each time, and no other name is."""
+    """Every public name is found and gives the same object each time; other names raise AttributeError."""
     module = import_module(package)
     for name in module.__all__:
         assert getattr(module, name) is getattr(module, name)

@@ -1,4 +1,4 @@
-"""`reproduce`, `sweep` and `tune` as their users meet them."""
+"""The commands `reproduce`, `sweep` and `tune`."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_wrong_input_gets_one_sentence_and_exit_2(case: str, capfd: pytest.Captu
 
 
 def test_reproduce_writes_a_report(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Two items without runs: report.md, results.json, and the same on standard output."""
+    """Two items without runs give report.md and results.json, which is also printed."""
     arguments = ["reproduce", "himpc-table-1", "himpc-table-4", "--out", str(tmp_path), "--json", "-"]
     assert main(arguments) == 0
     printed = json.loads(capfd.readouterr().out)
@@ -67,7 +67,7 @@ def test_reproduce_writes_a_report(tmp_path: Path, capfd: pytest.CaptureFixture[
 def test_a_check_that_fails_is_exit_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ran, but a claim does not hold: the command says which and by what."""
+    """The command runs, but a claim does not hold: it names this claim."""
     from lessons import papers
     from lessons.papers.item import Item, PaperCheck, Section
 
@@ -79,13 +79,13 @@ def test_a_check_that_fails_is_exit_1(
 
 
 def cells(folder: Path) -> list[dict[str, Any]]:
-    """Finished cells of a sweep's folder."""
+    """Returns the finished cells in a sweep's folder."""
     file = folder / "cells.jsonl"
     return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
 
 
 def gone(group: int, within: float) -> bool:
-    """Whether no process of a group is left after at most so many seconds."""
+    """Whether no process of a group is left within this number of seconds."""
     give_up = time.monotonic() + within
     while time.monotonic() < give_up:
         try:
@@ -96,13 +96,13 @@ def gone(group: int, within: float) -> bool:
     return False
 
 
-# Cells long enough that the second is not done when the first is seen.
+# Each cell takes long enough that the second is not finished when the first one is found.
 SWEEP = ["planar3-circle", "--over", "Q=100:200:6", "--duration", "0.4"]
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """Results of the sweep that nobody stops."""
+    """The results of the sweep without an interruption."""
     out = tmp_path_factory.mktemp("whole")
     assert main(["sweep", *SWEEP, "--out", str(out)]) == 0
     return (out / "results.json").read_bytes()
@@ -111,7 +111,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 def test_a_sweep_without_a_folder_has_one_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It is told, the same sweep carries on there, and another one does not."""
+    """The folder is printed. The same sweep continues there; another sweep gets another folder."""
     monkeypatch.chdir(tmp_path)
     for over, held in (("Q=100:200:2", 0), ("Q=100:200:2", 2), ("Q=100:300:2", 0)):
         assert main(["sweep", "planar3-circle", "--over", over, "--duration", "0.02"]) == 0
@@ -124,8 +124,8 @@ def test_a_sweep_without_a_folder_has_one_of_its_own(
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals, whole: bytes) -> None:
-    """Interrupted like from a terminal, or told to end: it says how far it got, leaves no process
-    behind, and the same command ends in the same results as an uninterrupted one."""
+    """A sweep that is interrupted by SIGINT or SIGTERM says how many cells are finished and leaves no
+    process; the same command then ends with the same results as without an interruption."""
     command = [sys.executable, "-m", "app", "sweep", *SWEEP, "--out"]
     part = tmp_path / "part"
     process = subprocess.Popen(
@@ -155,7 +155,7 @@ def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals
 
 
 def test_tune_prints_its_steps(capfd: pytest.CaptureFixture[str]) -> None:
-    """M̄ grows by the factor until the accuracy is reached, and the result can be pasted."""
+    """M̄ grows by the factor until the accuracy is reached, and the result is printed as an assignment."""
     arguments = ["tune", "planar3-circle", "--duration", "0.5", "--start", "0.2", "--accuracy", "1e-4"]
     assert main(arguments) == 0
     lines = capfd.readouterr().out.splitlines()
@@ -165,7 +165,8 @@ def test_tune_prints_its_steps(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_tune_stops_when_the_torque_is_noisy(capfd: pytest.CaptureFixture[str]) -> None:
-    """With coarse encoders M̄ stays below what an unreachable accuracy would ask for."""
+    """With coarse encoders the torque becomes noisy, so that M̄ stops growing before an unreachable accuracy
+    is reached."""
     coarse = ["--set", "plant.encoder_resolution_deg=0.005"]
     arguments = ["tune", "planar3-circle", "--duration", "0.3", "--start", "0.02", "--accuracy", "1e-9"]
     assert main([*arguments, *coarse, "--json", "-"]) == 0

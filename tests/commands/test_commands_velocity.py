@@ -1,4 +1,4 @@
-"""The command line on velocity-level scenes: the contract of the HTMPC keys, and refusals in a sentence."""
+"""The command line with velocity-level scenes: the documented HTMPC keys, and one sentence per error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ SQUARE = "ridgeback-ur10-square"
 
 
 def test_run_prints_the_contract_of_a_velocity_level_scene(tmp_path: Path) -> None:
-    """Parts, line search, base path and mission beside the usual keys; one row per tick in the npz."""
+    """The result has the keys of parts, line search, base path and mission in addition; the npz file has one
+    row per tick."""
     out, rows = tmp_path / "out.json", tmp_path / "rows.npz"
     assert main(["run", SQUARE, "--duration", "1", "--json", str(out), "--npz", str(rows)]) == 0
     result = json.loads(out.read_text())
@@ -34,7 +35,7 @@ def test_run_prints_the_contract_of_a_velocity_level_scene(tmp_path: Path) -> No
 
 
 def test_run_shows_people_a_table(capsys: pytest.CaptureFixture[str]) -> None:
-    """What the hand and the base did, in words."""
+    """The table shows the motion of the hand and of the base."""
     assert main(["run", SQUARE, "--duration", "1", "--controller", "htmpc_wpt"]) == 0
     shown = capsys.readouterr().out
     assert "way of the base" in shown

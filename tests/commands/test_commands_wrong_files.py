@@ -1,4 +1,5 @@
-"""Wrong scenes, tasks and lessons, over twenty ways each: a sentence that names the file, exit code 2."""
+"""Files with wrong scenes, tasks and lessons, more than twenty cases each: one sentence that names the file,
+exit code 2."""
 
 from __future__ import annotations
 
@@ -122,7 +123,7 @@ def test_a_wrong_file_is_a_sentence(
 ) -> None:
     text, words = WRONG[kind][what]
     Path("mine.py").write_bytes(text if isinstance(text, bytes) else text.encode())
-    # None of these harms the process it is loaded in; those that do come below.
+    # None of these files harms the process that loads it; the tests below have files that do.
     monkeypatch.setattr(judge, "isolated", lambda function, source, **_: function(source))
     assert main(LINES[kind]) == 2
     said = capsys.readouterr().err.strip()

@@ -1,4 +1,4 @@
-"""What a solved hierarchy must satisfy, and how far two solutions are apart."""
+"""Checks of a solved hierarchy, and distances between two solutions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def assert_sound(hierarchy: Hierarchy, solutions: list[LevelSolution], tolerance: float = 1e-6) -> None:
-    """Every level solved its printed problem: KKT conditions, priorities and bounds."""
+    """Checks that every level solved its printed problem: KKT conditions, priorities and bounds."""
     above = np.zeros(hierarchy.shape)
     for level, solution in enumerate(solutions):
         assert solution.fallback == "solve"
@@ -30,13 +30,14 @@ def assert_within(rows: Rows, U: Array, tolerance: float = 1e-8) -> None:
 
 
 def torque_rows(hierarchy: Hierarchy) -> Rows:
-    """The torque rows (32f) alone."""
+    """Returns the torque rows (32f) alone."""
     rows, (N, _) = hierarchy.rows, hierarchy.shape
     return Rows(rows.L[:N], rows.lower[:N], rows.upper[:N], rows.kinds[:1])
 
 
 def assert_agree(one: list[LevelSolution], other: list[LevelSolution], tolerance: float = 1e-6) -> None:
-    """Equal increments, level by level; once two points differ, the levels below solve different problems."""
+    """Checks for equal increments, level by level. After a level whose points differ slightly, the levels
+    below solve different problems and are not compared."""
     for a, b in zip(one, other, strict=True):
         difference = largest_difference([a], [b])
         assert difference <= tolerance
@@ -49,8 +50,8 @@ def largest_difference(one: list[LevelSolution], other: list[LevelSolution]) -> 
 
 
 def exact_increments(hierarchy: Hierarchy, *guesses: list[LevelSolution]) -> list[Array]:
-    """The increments of every level to the last digit, by `benchmarks.exact`: it never gives up where a
-    guess is nearly right, and whether one is right does not depend on who made it."""
+    """Returns the increments of every level, computed by `benchmarks.exact` with high precision. It finds the
+    optimum from every guess that is nearly right, and the result does not depend on the guess."""
     above: list[tuple[LevelProblem, Exact]] = []
     for place, problem in enumerate(hierarchy.problems):
         found = None
@@ -62,12 +63,13 @@ def exact_increments(hierarchy: Hierarchy, *guesses: list[LevelSolution]) -> lis
 
 
 def off(solutions: list[LevelSolution], exact: list[Array]) -> float:
-    """How far solutions are from the optima, N·m."""
+    """Returns the largest distance of solutions from the optima, N·m."""
     return max(float(np.abs(one.U - U).max()) for one, U in zip(solutions, exact, strict=True))
 
 
 def second_opinion(hierarchy: Hierarchy, compiled: list[LevelSolution]) -> list[Array]:
-    """The optima by the explicit route; where it gives up on one, which it may, by `exact_increments`."""
+    """Returns the optima of the explicit route; if it has no verified optimum at a level, those of
+    `exact_increments`."""
     explicit = hierarchy.solve("explicit")
     if all(solution.fallback == "solve" for solution in explicit):
         return [solution.U for solution in explicit]

@@ -1,4 +1,4 @@
-"""The oracle of the clearances: the same distances by a collision library, pair by pair."""
+"""The reference for the clearances: the same distances by a collision library, pair by pair."""
 
 # pyright: reportAttributeAccessIssue=false
 # coal is a compiled module without type information.
@@ -62,7 +62,7 @@ class _Touch(NamedTuple):
 
 
 class _Placed(NamedTuple):
-    """Where spheres and joints are at every configuration."""
+    """Positions of spheres and joints at every configuration."""
 
     centres: Array
     rotations: Array
@@ -73,7 +73,7 @@ class _Placed(NamedTuple):
 class Oracle:
     """Distances of a robot's spheres to obstacles, and of its arm's spheres to its own base.
 
-    A coarse test with bounding balls picks the pairs worth an exact distance.
+    A coarse test with bounding balls selects the pairs whose exact distance is computed.
     """
 
     def __init__(self, robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: bool = False) -> None:
@@ -93,7 +93,7 @@ class Oracle:
         self._moves = np.zeros((robot.n + 1, robot.n))
         for joint in range(1, robot.n + 1):
             self._moves[joint, [k - 1 for k in robot.model.supports[joint] if k > 0]] = 1.0
-        # Spheres of a body that some unbounded joints carry over the floor: a mobile base.
+        # The spheres of a mobile base, a body that some unbounded joints move over the floor.
         free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
         mobile = [joint for joint in range(robot.n + 1) if joint > 2 and free[:joint].all()]
         base = max(mobile, default=0)
@@ -106,7 +106,7 @@ class Oracle:
 
     @property
     def empty(self) -> bool:
-        """Whether there is nothing to keep clear of."""
+        """Whether there are no pairs."""
         return not self._pairs
 
     def _fixed(self, obstacle: Obstacle, base: int) -> _Pair:
@@ -127,7 +127,8 @@ class Oracle:
         return _Pair(obstacle.name, shape, coal.Transform3s(turn, centre), 0, every, centre, reach)
 
     def _own_base(self, base: int) -> _Pair:
-        """The base as the box around its own spheres; links next to it cannot be kept clear of it."""
+        """Returns the base as the box around its own spheres; the links next to it are not checked against
+        it."""
         own = self._joints == base
         low = (self._local[own] - 0.6 * self._radius[own, None]).min(axis=0)
         high = (self._local[own] + 0.6 * self._radius[own, None]).max(axis=0)
@@ -138,7 +139,8 @@ class Oracle:
         return _Pair("base", coal.Box(x, y, z), coal.Transform3s(np.eye(3), centre), base, far, centre, reach)
 
     def clearances(self, q: Array, within: float, gradients: bool = True) -> Touched:
-        """All pairs nearer than `within`, m, at configurations q (K, n); without gradients they are empty."""
+        """Returns all pairs nearer than `within`, m, at configurations q (K, n); without gradients that array
+        is empty."""
         placed = self._kinematics(q, gradients)
         centres = placed.centres
         touches: list[_Touch] = []
@@ -182,7 +184,7 @@ class Oracle:
         return _Placed(turned + translations[:, self._joints], rotations, translations, J)
 
     def _near(self, pair: _Pair, placed: _Placed, within: float) -> tuple[list[int], list[int]]:
-        """Knots and spheres whose bounding balls are near enough."""
+        """Returns the knots and spheres whose bounding balls are near enough."""
         centres, radius = placed.centres[:, pair.spheres], self._radius[pair.spheres]
         if math.isinf(pair.reach):
             near = centres[..., 2] - radius < within + pair.height
@@ -197,7 +199,8 @@ class Oracle:
         return knots.tolist(), pair.spheres[spheres].tolist()
 
     def _slopes(self, touches: list[_Touch], J: Array) -> Array:
-        """∂distance/∂q, (r, n): the normal, from the obstacle to the sphere, on the relative motion there."""
+        """Returns ∂distance/∂q, (r, n): the normal, from the obstacle to the sphere, times the Jacobian of
+        the relative motion."""
         if not touches:
             return np.empty((0, self._robot.n))
         normal = -np.array([touch.normal for touch in touches])
@@ -212,7 +215,7 @@ class Oracle:
 
     @staticmethod
     def _along(normal: Array, point: Array, J: Array) -> Array:
-        """The speed along a normal, per joint velocity, of a point that all joints move."""
+        """Returns the speed along a normal, per joint velocity, of a point that all joints move."""
         return np.einsum("ri,rij->rj", np.hstack([normal, np.cross(point, normal)]), J)
 
 

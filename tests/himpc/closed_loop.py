@@ -1,4 +1,4 @@
-"""A controller and the plant in their loop, as whoever uses `himpc` without `lessons` writes it."""
+"""A controller and the plant in a loop, written with `himpc` alone, without `lessons`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from robots import NominalSettings, Plant, PlantSettings, Robot, load_robot
 Array = NDArray[np.float64]
 
 GEARED = PlantSettings(armature=(0.05, 0.05, 0.03))
-"""The planar arm's M̄ supposes geared motors."""
+"""The planar arm's M̄ is chosen for geared motors."""
 
 
 class Loop:
-    """Measure, preview, step, apply, at rest at first."""
+    """A loop that starts at rest; each tick measures, previews, computes and applies a torque."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class Loop:
 
 
 def holding(name: str, controller: str, horizon: int = 5, nominal: NominalSettings | None = None) -> Loop:
-    """A robot of the catalog that holds hand and posture, with targets that can be moved."""
+    """Returns a robot of the catalog that holds hand and posture, with targets that can be moved."""
     robot = load_robot(name)
     flat = name == "planar3"
     position = FramePosition(name="position", axes="xy" if flat else "xyz", K_p=100.0, K_v=20.0)

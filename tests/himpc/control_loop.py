@@ -1,4 +1,4 @@
-"""What tests of the controller in its loop share: a stack for the iiwa, references."""
+"""Shared functions for tests of the controller in its loop: a stack for the iiwa, and references."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def iiwa_settings(robot: Robot, **changes: Any) -> Settings:
 
 
 def holds(robot: Robot, N: int, T_s: float = 1e-3) -> dict[str, Preview]:
-    """Previews that ask to stay at home."""
+    """Returns previews of constant references at home."""
     configuration = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
     tip = configuration.placement()
     values = {"position": tip.translation, "orientation": tip.rotation, "q1": robot.home[:1]}

@@ -1,4 +1,5 @@
-"""What tests of HTMPC share: a stack, previews, and as oracle Algorithm 1 solved by a general NLP solver."""
+"""Shared functions for tests of HTMPC: a stack, previews, and as reference Algorithm 1 solved by a general
+NLP solver."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ def mobile_settings(**changes: Any) -> HTMPCSettings:
 
 
 def point(robot: Robot, q: Array, frame: str = "") -> Array:
-    """World position of a frame, (3,), by Pinocchio alone."""
+    """Returns the world position of a frame, (3,), by Pinocchio alone."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
     return data.oMf[robot.frame_id(frame or robot.tip)].translation.copy()
@@ -62,7 +63,7 @@ def closed_loop(
     seconds: float,
     before: Callable[[int], None] | None = None,
 ) -> tuple[list[VelocityPlan], Array]:
-    """Plans and true positions (ticks, n) with a plant that does exactly as commanded."""
+    """Returns plans and true positions (ticks, n) with a plant that follows the commands exactly."""
     v = np.zeros_like(q)
     plans, path = [], []
     period = controller.settings.period
@@ -78,22 +79,23 @@ def closed_loop(
 
 
 def at_home(robot: Robot, base: Array) -> dict[str, Reference]:
-    """The end-effector stays where it is at home; the base goes to a point (2,)."""
+    """Returns references: the end-effector stays where it is at home, the base goes to a point (2,)."""
     return {"ee": Hold(point(robot, robot.home)), "base": Hold(base)}
 
 
 class Oracle:
-    """Algorithm 1 on (9), with kinematics, costs and constraints written down again, solved by SLSQP."""
+    """Algorithm 1 on (9), with an independent implementation of kinematics, costs and constraints, solved by
+    SLSQP."""
 
     def __init__(
         self, robot: Robot, settings: HTMPCSettings, goals: list[tuple[str, list[int], Array]]
     ) -> None:
-        """goals: per level a frame, the axes that count and the point to reach at every knot."""
+        """goals: for each level a frame, the controlled axes, and the point to reach at every knot."""
         self.robot, self.settings, self.goals = robot, settings, goals
         self.q, self.v = robot.home.copy(), np.zeros(robot.n)
 
     def states(self, u: Array) -> tuple[Array, Array]:
-        """Positions and velocities at knots 1 … N, step by step."""
+        """Returns positions and velocities at knots 1 … N, integrated step by step."""
         dt, q, v = self.settings.dt, self.q, self.v
         Q, V = [], []
         for a in u.reshape(-1, self.robot.n):
@@ -103,17 +105,17 @@ class Oracle:
         return np.array(Q), np.array(V)
 
     def errors(self, level: int, u: Array) -> Array:
-        """(N, m)"""
+        """Returns the errors of a level, (N, m)."""
         frame, axes, goal = self.goals[level]
         return np.array([point(self.robot, q, frame)[axes] - goal for q in self.states(u)[0]])
 
     def tracking(self, level: int, u: Array) -> float:
-        """(8) without knot 0."""
+        """Returns the tracking cost (8) without knot 0."""
         e, weight = self.errors(level, u), float(np.asarray(self.settings.stack[level].Q))
         return 0.5 * weight * float((e[:-1] ** 2).sum() + self.settings.terminal * (e[-1] ** 2).sum())
 
     def effort(self, u: Array) -> float:
-        """(10)"""
+        """Returns the effort cost (10)."""
         settings = self.settings
         S, R, W = (
             float(np.asarray(each))
@@ -124,7 +126,8 @@ class Oracle:
         return 0.5 * float(S * (self.states(u)[1] ** 2).sum() + R * (u**2).sum() + W * (change**2).sum())
 
     def solve(self, delta: float, start: Array) -> list[Array]:
-        """Inputs after every level, (12) relaxed by δ; upper levels pay a share of the effort, from rest."""
+        """Returns the inputs after every level, with (12) relaxed by δ; upper levels have a share of the
+        effort, and the robot starts at rest."""
         found: list[Array] = []
         constraints: list[dict[str, Any]] = []
         u = start.ravel()
@@ -154,7 +157,7 @@ class Oracle:
 
 
 def lexicographically_less(one: Array, other: Array, tolerance: Array) -> bool:
-    """Definition III.1, where entries no farther apart than their tolerance count as equal."""
+    """Definition III.1, where entries whose difference is within the tolerance count as equal."""
     for a, b, equal in zip(one, other, tolerance, strict=True):
         if abs(a - b) > equal:
             return bool(a < b)

@@ -1,4 +1,4 @@
-"""Random hierarchies for the tests of the cascade, and an independent reading of (31)–(34)."""
+"""Random hierarchies for the tests of the cascade, and an independent implementation of (31)–(34)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def level_problem(
     name: str, B: Array, C: Array, free: Array, Q: Array, R: Array, knots: int | None = None
 ) -> LevelProblem:
-    """A level's data from the weights as the paper prints them."""
+    """Returns a level's data from the weights as the paper prints them."""
     K = len(B) if knots is None else knots
     return LevelProblem(
         name=name,
@@ -39,7 +39,7 @@ def level_problem(
 
 
 def shifted(problem: LevelProblem, change: Array) -> LevelProblem:
-    """The same level with another free residual."""
+    """Returns the same level with another free residual."""
     free = problem.free + change
     return problem._replace(free=free, weighted_free=problem.root_Q * free)
 
@@ -68,21 +68,22 @@ class Hierarchy:
 
 
 def row_blocks(N: int, kinds: Sequence[str]) -> Array:
-    """How the increments add up to torque, velocity and position: sums, sums of sums, and so on."""
+    """Returns the coefficients of the increments in torque, velocity and position: sums, sums of sums, and so
+    on."""
     torque = np.tril(np.ones((N, N)))
     velocity = torque @ torque
     position = np.vstack([np.zeros((1, N)), (torque @ velocity)[:-1]]) if N > 1 else np.zeros((1, 1))
-    # The printed Euler step: q at knot j+1 sees the velocity up to knot j.
+    # The printed Euler step: q at knot j+1 contains the velocity up to knot j.
     return np.vstack([{"torque": torque, "velocity": velocity, "position": position}[kind] for kind in kinds])
 
 
 def random_hierarchy(
     seed: int, n: int, N: int, levels: int, position_rows: bool = False, room: float = 1.0, even: bool = False
 ) -> Hierarchy:
-    """Regular levels with M̄ over decades, and bounds that admit a point and bind now and then.
+    """Returns regular levels with M̄ over decades, and feasible bounds of which some are active.
 
-    room: how wide the bounds are, as a share of what the levels would do without them.
-    even: one R for all joints of a level, and all levels look ahead equally far.
+    room: width of the bounds, relative to the motion of the levels without them.
+    even: the same R for all joints of a level, and the same horizon for all levels.
     """
     rng = np.random.default_rng(seed)
     M_bar = 10 ** rng.uniform(-3.0, 0.0, n)
@@ -104,11 +105,13 @@ def random_hierarchy(
 
 
 def bounds_around(rng: np.random.Generator, problems: list[LevelProblem], rows: Rows, room: float) -> Rows:
-    """Bounds in proportion to what the unbounded levels want, with a point strictly inside."""
+    """Returns bounds in proportion to the increments of the unbounded levels, with a point strictly
+    inside."""
     N, _, n = problems[0].B.shape
     reach = sum(np.abs(unbounded_optimum(problem)) for problem in problems) + 1e-3
     inside = 0.3 * rng.normal(0, 1, (N, n)) * reach
-    inside[problems[0].knots :] = 0.0  # what level 1 cannot move must not be needed
+    # a point beyond level 1's horizon must not require increments, because level 1 has none there
+    inside[problems[0].knots :] = 0.0
     size = rows.L @ reach + 1e-3
     margin = [10 ** rng.uniform(-1.5, 0.5, size.shape) * size * room for _ in range(2)]
     lower, upper = rows.L @ inside - margin[0], rows.L @ inside + margin[1]
@@ -117,7 +120,7 @@ def bounds_around(rng: np.random.Generator, problems: list[LevelProblem], rows: 
 
 
 def quadratic(problem: LevelProblem) -> tuple[Array, Array]:
-    """H and f of ½UᵀHU + fᵀU = half of (32a), summed literally over knots."""
+    """Returns H and f of ½UᵀHU + fᵀU = half of (32a), summed literally over knots."""
     N, m, n = problem.B.shape
     H, f = np.zeros((N * n, N * n)), np.zeros(N * n)
     Q = np.diag(problem.root_Q**2)
@@ -132,7 +135,7 @@ def quadratic(problem: LevelProblem) -> tuple[Array, Array]:
 
 
 def unbounded_optimum(problem: LevelProblem) -> Array:
-    """The level's increments if it were alone and without bounds."""
+    """Returns the level's increments if it is solved alone and without bounds."""
     H, f = quadratic(problem)
     N, _, n = problem.B.shape
     used = problem.knots * n
@@ -142,7 +145,8 @@ def unbounded_optimum(problem: LevelProblem) -> Array:
 
 
 def equalities(problems: Sequence[LevelProblem], level: int) -> Array:
-    """Orthonormal rows that span those of (33) for a level and the knots beyond its horizon, (k, N·n)."""
+    """Returns orthonormal rows that span those of (33) for a level and the knots beyond its horizon, (k,
+    N·n)."""
     N, _, n = problems[0].B.shape
     blocks = []
     for j in range(N):
@@ -158,7 +162,7 @@ def equalities(problems: Sequence[LevelProblem], level: int) -> Array:
 
 
 def row_space(A: Array, tolerance: float = 1e-9) -> Array:
-    """Orthonormal rows spanning those of A."""
+    """Returns orthonormal rows that span those of A."""
     if not A.size:
         return A
     _, singular, Vt = np.linalg.svd(A)
@@ -168,10 +172,11 @@ def row_space(A: Array, tolerance: float = 1e-9) -> Array:
 def kkt_violation(
     hierarchy: Hierarchy, level: int, solution: LevelSolution, U_above: Array, rows: Rows | None = None
 ) -> float:
-    """Largest violation of the KKT conditions of Problem i in the full space of U, scaled as documented.
+    """Returns the largest violation of the KKT conditions of Problem i in the full space of U, scaled as
+    documented.
 
-    Built from the literal H, f, bounds and equality rows; the multipliers of the bounds are the reported
-    ones, those of the equalities the best there are.
+    It is computed from the literal H, f, bounds and equality rows. The multipliers of the bounds are the
+    reported ones; those of the equalities are chosen such that the violation is smallest.
     """
     problem, rows = hierarchy.problems[level], rows or hierarchy.rows
     H, f = quadratic(problem)
@@ -192,10 +197,11 @@ def kkt_violation(
 
 
 def singular_hierarchy(seed: int, n: int, N: int, size: float) -> Hierarchy:
-    """Three levels, the second of which repeats the first up to one direction of relative size `size`.
+    """Returns three levels, the second of which repeats the first except for one direction of relative size
+    `size`.
 
-    The third asks for all joints, so whatever the second leaves free is used. With size 0 the second
-    level has nothing of its own.
+    The third level controls all joints, so it uses all directions that the second leaves free. With size 0
+    the second level adds no direction.
     """
     rng = np.random.default_rng(seed)
     m = int(rng.integers(1, n))

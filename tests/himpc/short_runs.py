@@ -1,4 +1,5 @@
-"""Short runs of controllers along a given motion; as a program: those of its arguments, into a file.
+"""Short runs of controllers along a given motion. As a program, it writes the results of the named runs to a
+file.
 
 python short_runs.py FILE.npz NAME …
 """
@@ -22,13 +23,14 @@ Array = NDArray[np.float64]
 
 
 def motion(robot: Robot, t: float) -> tuple[Array, Array]:
-    """A state on the way, near home: q and q̇, (n,)."""
+    """Returns a state of the motion near home: q and q̇, (n,)."""
     rate, phase = 3.0, np.arange(robot.n)
     return robot.home + 0.05 * np.sin(rate * t + phase), 0.05 * rate * np.cos(rate * t + phase)
 
 
 def planar() -> tuple[Robot, Settings, dict[str, Reference]]:
-    """The planar arm's hand on a circle, then its first joint."""
+    """Returns a problem in which the planar arm's hand follows a circle, and its first joint has the second
+    priority."""
     robot = load_robot("planar3")
     hand = FramePosition(name="hand", axes="xy")
     stack = (Level((hand,)), Level((Joints(name="q1", joints=robot.joint_names[:1]),)))
@@ -38,7 +40,7 @@ def planar() -> tuple[Robot, Settings, dict[str, Reference]]:
 
 
 def osf() -> Array:
-    """Torques, (ticks, n)."""
+    """Returns the torques of OSF, (ticks, n)."""
     from himpc.controllers.osf import OSF
 
     robot, settings, references = planar()
@@ -47,7 +49,7 @@ def osf() -> Array:
 
 
 def himpc() -> Array:
-    """Torques, (ticks, n)."""
+    """Returns the torques of HIMPC, (ticks, n)."""
     from himpc.controllers.himpc import HIMPC
 
     robot, settings, references = planar()
@@ -57,7 +59,7 @@ def himpc() -> Array:
 def torques(
     controller: Controller, robot: Robot, settings: Settings, references: Mapping[str, Reference], ticks: int
 ) -> Array:
-    """What a controller asks for along the motion."""
+    """Returns a controller's torques along the motion."""
     controller.reset(np.zeros(robot.n))
     found = []
     for tick in range(ticks):
@@ -68,7 +70,7 @@ def torques(
 
 
 def htmpc() -> Array:
-    """Velocities, (ticks, n)."""
+    """Returns the velocities of HTMPC, (ticks, n)."""
     from himpc.htmpc import HTMPC, HTMPCSettings
 
     robot = load_robot("iiwa14")

@@ -1,4 +1,4 @@
-"""M̄ that looks after itself: what is found, within which bounds, and what a payload does then."""
+"""Adaptation of M̄: the estimated payload, the limits of M̄, and the effect of a payload."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PERIOD = 1e-3
 
 
 def inertias(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
-    """M_n, and what a kilogram more adds at a point in space."""
+    """Returns M_n, and the additional inertia of one kilogram at a point in space."""
     root, size = rng.normal(size=(n, n)), 10.0 ** rng.uniform(-1, 0, n)
     M = size[:, None] * (root @ root.T + 0.1 * np.eye(n)) * size
     J = rng.normal(size=(3, n))
@@ -28,7 +28,8 @@ def largest(M: Array, M_bar: Array) -> float:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one(seed: int) -> None:
-    """Unless a joint is bounded by LARGEST; with links above half the weight it stays below 2."""
+    """The largest eigenvalue is 1 at the payload unless a joint is limited by LARGEST; with links above half
+    the nominal mass the eigenvalue stays below 2."""
     rng = np.random.default_rng(seed)
     n, m = int(rng.integers(1, 9)), float(rng.uniform(0.0, 6.0))
     M, Phi = inertias(rng, n)
@@ -40,14 +41,14 @@ def test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one(
     assert (found <= LARGEST * M_bar * (1 + 1e-12)).all()
     assert largest(M + (m + 2.0) * Phi, found) <= 1.0 + 1e-9
     assert largest(0.51 * (M + m * Phi), found) < 2.0
-    # The scale of what was set is no matter, its shape is.
+    # The result depends on the shape of the set value, not on its scale.
     twice = wanted(M, Phi, m, 2.0 * M_bar)
     if (found < LARGEST * M_bar * (1 - 1e-9)).all():
         np.testing.assert_allclose(twice, found)
 
 
 def weighed(payload_kg: float, gravity: bool = True, ticks: int = 1000) -> list[Adaptation]:
-    """What is known of an iiwa14 that rests, tick by tick."""
+    """Returns the states of the adaptation for an iiwa14 at rest, tick by tick."""
     robot = load_robot("iiwa14")
     model = LoadModel(robot, NominalSettings(gravity=gravity))
     tau = NominalModel(robot, NominalSettings(payload_kg=payload_kg)).bias(robot.home, np.zeros(robot.n))
@@ -64,7 +65,7 @@ def test_a_payload_is_weighed(payload_kg: float) -> None:
 
 
 def test_M_bar_rises_slowly() -> None:
-    """By RISE a second at most, from what was set."""
+    """M̄ grows from the set value by at most RISE per second."""
     M_bar = np.array([each.M_bar for each in weighed(4.0)])
     np.testing.assert_array_equal(M_bar[:EVERY], np.tile(M_bar[0], (EVERY, 1)))
     assert (M_bar[1:] / M_bar[:-1]).max() <= 1.0 + RISE * EVERY * PERIOD + 1e-12

@@ -1,4 +1,4 @@
-"""The table of the arrays of a tick: what it says of each one is so."""
+"""The table of the arrays of a tick agrees with the code."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HINTS = get_type_hints(TickArrays, include_extras=True)
 
 @pytest.mark.quick
 def test_every_view_is_the_array_of_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`arrays_of` and the arena agree on the place and the shape of every array."""
+    """`arrays_of` and the arena agree on the index and the shape of every array."""
     for name, dimensions in (("vector", 1), ("matrix", 2), ("matrices", 3)):
 
         def view(data: np.ndarray, start: int, *shape: int, dimensions: int = dimensions) -> np.ndarray:

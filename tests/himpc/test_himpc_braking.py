@@ -1,4 +1,5 @@
-"""Increments found joint by joint: inside all bounds whenever any are, by linear programs, and braking."""
+"""Increments that are computed joint by joint: they satisfy all bounds if these are feasible (compared with
+linear programs), and they brake."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def slack_needed(rows: Rows, joint: int) -> float:
-    """By how much the worst row of a joint must give way, by linear programming in (U, slack); 0 if none."""
+    """Returns by how much the most violated row of a joint must be relaxed, by linear programming in (U,
+    slack); 0 if none."""
     from scipy.optimize import linprog
 
     N = rows.L.shape[1]
@@ -35,7 +37,7 @@ def slack_needed(rows: Rows, joint: int) -> float:
 
 
 def random_rows(seed: int, n: int, N: int, position_rows: bool) -> tuple[Rows, float]:
-    """Rows around a random point: some are wide, some leave it a room of almost nothing, some miss it."""
+    """Returns rows around a random point: some are wide, some are very narrow, and some exclude the point."""
     rng = np.random.default_rng(seed)
     kinds = ("torque", "velocity", "position") if position_rows else ("torque", "velocity")
     L = toeplitz(N, kinds)
@@ -57,8 +59,8 @@ def random_rows(seed: int, n: int, N: int, position_rows: bool) -> tuple[Rows, f
 def test_braking_meets_all_rows_whenever_any_increments_do(
     seed: int, n: int, N: int, position_rows: bool
 ) -> None:
-    """Rows that leave much, next to nothing or nothing: what a linear program says can be met is met, and
-    torque rows always."""
+    """All rows are satisfied whenever a linear program finds them feasible, for wide, very narrow and
+    infeasible rows; torque rows are always satisfied."""
     rows, room = random_rows(seed, n, N, position_rows)
     U = braking(rows)
     value = rows.L @ U
@@ -77,8 +79,8 @@ def test_braking_meets_all_rows_whenever_any_increments_do(
 @pytest.mark.parametrize("position", ["viability", "paper", "off"])
 @pytest.mark.parametrize("N", [1, 5, 30])
 def test_braking_brakes(N: int, position: str) -> None:
-    """From fast joints and random torques the velocities at the last knot are close to what `BRAKING`
-    makes of them, and no joint is faster than it is now."""
+    """From fast joints and random torques, the velocities at the last knot are close to those that `BRAKING`
+    prescribes, and no joint becomes faster."""
     robot = load_robot("iiwa14")
     rng = np.random.default_rng(N)
     limits = Limits(position=position)  # pyright: ignore[reportArgumentType]

@@ -1,4 +1,4 @@
-"""The cascade: two routes to one optimum, strict priorities, verified points."""
+"""The cascade: two routes give the same optimum, priorities are strict, and points are verified."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ depths = st.integers(1, 4)
 @given(seeds, joints, horizons, depths, st.booleans(), st.sampled_from([1.0, 5.0, 30.0]))
 @settings(max_examples=250)
 def test_routes_agree(seed: int, n: int, N: int, levels: int, position_rows: bool, room: float) -> None:
-    """The compiled route solves every feasible hierarchy, and a second opinion is within 1e-6 N·m."""
+    """The compiled route solves every feasible hierarchy, and an independent solution is within 1e-6 N·m."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
     compiled = hierarchy.solve("compiled")
     assert_sound(hierarchy, compiled)
@@ -46,15 +46,15 @@ def test_routes_agree(seed: int, n: int, N: int, levels: int, position_rows: boo
 
 
 def test_the_random_hierarchies_bind() -> None:
-    """The property tests are about active bounds: most of their levels have some."""
+    """The random hierarchies of these tests have active bounds at most of their levels."""
     solutions = [s for seed in range(60) for s in random_hierarchy(seed, 6, 5, 3).solve()]
     share = np.mean([len(solution.active) > 0 for solution in solutions])
     assert share > 0.6
 
 
 def test_proxqp_agrees_where_it_solves() -> None:
-    """ProxQP on the explicit QPs finds the same increments wherever its point is accurate, and it is often
-    enough: of these stacks about one in eight."""
+    """ProxQP on the explicit QPs finds the same increments if its point is accurate, which is the case for
+    about one in eight of these stacks."""
     compared = 0
     for seed in range(200):
         n, N, levels = np.random.default_rng(seed).integers((2, 1, 1), (8, 6, 4)).tolist()
@@ -67,7 +67,8 @@ def test_proxqp_agrees_where_it_solves() -> None:
 
 
 def accurate(problem: LevelProblem, solution: LevelSolution) -> bool:
-    """A point passes at a scaled residual of 1e-6, which leaves more than 1e-6 N·m where H ≥ R is flat."""
+    """Whether a point is accurate: the tolerance of 1e-6 for the scaled residual allows errors of more than
+    1e-6 N·m where H ≥ R is flat."""
     H, f = quadratic(problem)
     scale = max(1.0, float(np.linalg.norm(H) * np.linalg.norm(solution.U)), float(np.linalg.norm(f)))
     return solution.fallback == "solve" and solution.kkt_residual * scale / problem.R.min() <= 1e-6
@@ -86,7 +87,7 @@ def test_qpoases_agrees(seed: int) -> None:
 @given(seeds, joints, horizons, st.integers(2, 4))
 @settings(max_examples=80)
 def test_lower_levels_change_nothing_above(seed: int, n: int, N: int, levels: int) -> None:
-    """Level 1's optimum, its cost and its acceleration B₁U are the same whatever follows it."""
+    """Level 1's optimum, its cost and its acceleration B₁U do not depend on the levels below."""
     hierarchy = random_hierarchy(seed, n, N, levels)
     alone = Hierarchy(hierarchy.problems[:1], hierarchy.rows).solve()[0]
     solutions = hierarchy.solve()
@@ -111,10 +112,12 @@ decades = st.floats(-15, -12.001) | st.floats(-7.999, -2) | st.none()
 @given(seeds, st.integers(2, 8), st.integers(1, 6), decades)
 @settings(max_examples=120)
 def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade: float | None) -> None:
-    """A level that repeats another, exactly or nearly, keeps both routes equal away from the tolerance.
+    """With a level that repeats another, exactly or nearly, both routes are equal, except near the rank
+    tolerance.
 
-    A direction of relative size s is known to rounding over s only, and so is what lower levels may use: with
-    s = 1.3e-8 the explicit route was 2.8e-6 N·m and the compiled one 8e-8 N·m from the optimum by 300 bits.
+    A direction of relative size s is known with an accuracy of rounding divided by s, and this limits the
+    accuracy of lower levels: with s = 1.3e-8 the explicit route was 2.8e-6 N·m and the compiled one 8e-8 N·m
+    from the optimum by 300 bits.
     """
     size = 0.0 if decade is None else 10**decade
     assert size < 0.01 * RANK_TOLERANCE or size > 100 * RANK_TOLERANCE
@@ -129,7 +132,7 @@ def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-12, -8))
 @settings(max_examples=80)
 def test_near_the_rank_tolerance_points_are_still_sound(seed: int, n: int, N: int, decade: float) -> None:
-    """Near the tolerance either reading of the rank is right; residual, leak and bounds hold."""
+    """Near the rank tolerance both ranks are acceptable; residual, leak and bounds hold."""
     hierarchy = singular_hierarchy(seed, n, N, 10**decade)
     for solution in hierarchy.solve():
         assert solution.fallback == "solve"
@@ -139,7 +142,7 @@ def test_near_the_rank_tolerance_points_are_still_sound(seed: int, n: int, N: in
 
 
 def test_no_freedom_left_keeps_the_upper_levels() -> None:
-    """A level below a full stack has nothing to choose and changes nothing."""
+    """A level below a full stack has no freedom and changes nothing."""
     hierarchy = random_hierarchy(3, 4, 5, 1)
     everything = random_hierarchy(4, 4, 5, 1).problems[0]
     full = replace_rows(everything, np.random.default_rng(0).normal(0, 1, (5, 4, 4)))
@@ -159,7 +162,7 @@ def replace_rows(problem: LevelProblem, B: Array) -> LevelProblem:
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.integers(1, 3))
 @settings(max_examples=60)
 def test_warm_starts_change_nothing(seed: int, n: int, N: int, levels: int) -> None:
-    """What was active a tick ago only saves time: the optimum of the new problem is found all the same."""
+    """The active set of the previous tick only saves time: the same optimum of the new problem is found."""
     hierarchy = random_hierarchy(seed, n, N, levels)
     before = {solution.name: solution for solution in hierarchy.solve()}
     changed = with_other_errors(hierarchy, seed)
@@ -173,7 +176,7 @@ def test_warm_starts_change_nothing(seed: int, n: int, N: int, levels: int) -> N
     [(161, 7, 6, 2), (29, 8, 6, 2), (17, 7, 6, 2), (98, 8, 6, 2), (75, 8, 6, 2), (26, 8, 6, 3)],
 )
 def test_corners_that_many_bounds_make_are_found(seed: int, n: int, N: int, levels: int) -> None:
-    """Where nearly all freedom is at bounds, rounding of a point looks like a bound that cannot be kept."""
+    """If nearly all freedom is used by active bounds, rounding errors can look like an infeasible bound."""
     hierarchy = with_other_errors(random_hierarchy(seed, n, N, levels), seed)
     found = hierarchy.solve()
     assert_sound(hierarchy, found)
@@ -205,7 +208,7 @@ def with_other_errors(hierarchy: Hierarchy, seed: int) -> Hierarchy:
 
 
 def test_multipliers_tell_what_room_is_worth() -> None:
-    """Twice a multiplier is what the level's cost would save per N·m of further room."""
+    """Twice a multiplier is the decrease of the level's cost per N·m by which the bound is relaxed."""
     compared = 0
     for seed in range(12):
         hierarchy = random_hierarchy(seed, 5, 4, 1)

@@ -1,4 +1,5 @@
-"""Controllers and plant in their loop: they hold, follow, and read what they say they read."""
+"""Controllers and plant in a loop: they hold, follow, and use only the model that they are documented to
+use."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ HEAVY = NominalSettings(payload_kg=3.0, damping=0.4, armature=0.2, inertia_scale
 @pytest.mark.parametrize("name", ["iiwa14", "planar3"])
 @pytest.mark.parametrize("horizon", [1, 2, 20])
 def test_any_horizon_holds_and_follows(name: str, horizon: int) -> None:
-    """N = 1 (HIQP) and long horizons keep the arm on its targets and bring it to a moved one."""
+    """N = 1 (HIQP) and long horizons hold the arm at its targets and move it to a moved target."""
     loop = holding(name, "himpc", horizon)
     loop.tick()
     target = loop.references["position"]
@@ -46,7 +47,7 @@ def test_every_controller_holds_every_catalog_robot(name: str, robot: str) -> No
 
 
 def torques(name: str, nominal: NominalSettings | None = None) -> Array:
-    """Of a planar arm whose hand is dragged, (60, 3) N·m."""
+    """Returns the torques of a planar arm whose hand is dragged, (60, 3) N·m."""
     loop = holding("planar3", name, nominal=nominal)
     target = loop.references["position"]
     assert isinstance(target, Target)
@@ -56,7 +57,7 @@ def torques(name: str, nominal: NominalSettings | None = None) -> Array:
 
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if name not in MODEL_BASED])
 def test_model_free_controllers_never_read_the_nominal_model(name: str) -> None:
-    """The same torques to the bit whatever the nominal model is."""
+    """The torques are bitwise equal for every nominal model."""
     np.testing.assert_array_equal(torques(name), torques(name, HEAVY))
 
 

@@ -1,4 +1,4 @@
-"""Compiling: once, in one process, wherever the code can be kept, and never in the middle of a run."""
+"""Compilation happens once, in one process, wherever the code can be stored, and never during a run."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ print(len(found), small.twice.stats.cache_path)
 
 
 def like_anybody() -> None:
-    """Root may write wherever it likes; from the next program on it may not."""
+    """Removes root's permission to write everywhere, from the next program on."""
     if os.getuid() == 0:
         assert ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) == 0
 
@@ -57,8 +57,8 @@ def like_anybody() -> None:
 def start(
     folder: Path, script: str = LOAD, before: Callable[[], None] | None = None, **environment: str
 ) -> subprocess.Popen[str]:
-    """Somebody who may read everything and write nothing but to a temporary folder of the test; `before`:
-    what is done first in that process."""
+    """Starts a process that can read everything, but can write only to a temporary folder of the test;
+    `before`: a function that is called first in that process."""
 
     def prepare() -> None:
         like_anybody()
@@ -98,7 +98,8 @@ def compiled_and_place(process: subprocess.Popen[str]) -> tuple[int, str]:
 
 
 def test_what_cannot_be_kept_here_goes_to_a_temporary_folder_of_ones_own(tmp_path: Path) -> None:
-    """Installation and home read-only: compiled once all the same, where nobody else can write."""
+    """With a read-only installation and home folder, functions are still compiled once and stored where
+    nobody else can write."""
     first, place = compiled_and_place(start(tmp_path))
     assert first == 2
     assert Path(place).is_relative_to(tmp_path / "tmp")
@@ -123,7 +124,7 @@ def test_without_any_folder_it_is_compiled_and_not_kept(tmp_path: Path) -> None:
 
 
 def test_processes_that_start_together_compile_once(tmp_path: Path) -> None:
-    """The others wait, and find it on disk."""
+    """The other processes wait, and then load the code from disk."""
     shared = tmp_path / "shared"
     shared.mkdir()
     together = [start(tmp_path, NUMBA_CACHE_DIR=str(shared)) for _ in range(3)]
@@ -131,7 +132,8 @@ def test_processes_that_start_together_compile_once(tmp_path: Path) -> None:
 
 
 def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
-    """In memory a compiler holds something else than what it writes down, by the last digit."""
+    """The process that compiled a function loads it from disk, because its code in memory differs in the last
+    digit."""
     script = LOAD + "print(sum(small.twice.stats.cache_hits.values()), file=sys.stderr)"
     for _ in range(2):
         process = start(tmp_path, script)
@@ -139,7 +141,8 @@ def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
 
 
 def test_what_is_on_disk_needs_no_compiler() -> None:
-    """Getting ready to compile costs a process more than all that it loads; SciPy comes along with that."""
+    """Loading compiled functions imports no part of Numba's compiler: its preparation takes longer than
+    loading all functions, and imports SciPy."""
     compile_all(lambda *_: None)
     script = (
         "import sys\n"
@@ -154,7 +157,8 @@ def test_what_is_on_disk_needs_no_compiler() -> None:
 
 
 def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> None:
-    """When it changes, or a constant that it imports, those that call it are compiled afresh."""
+    """When an inline kernel or a constant in another folder changes, the functions that use it are compiled
+    anew."""
     for folder in ("install/parts/below", "home", "tmp"):
         (tmp_path / folder).mkdir(parents=True)
     above, below = SMALL.split("\n\n@kernel")
@@ -167,7 +171,8 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
         f"@kernel{below}"
     )
     wrong = start(tmp_path)
-    assert "AssertionError" in wrong.communicate(timeout=120)[1]  # of LOAD: what is compiled gives half
+    # from LOAD: the compiled function returns half of the expected value
+    assert "AssertionError" in wrong.communicate(timeout=120)[1]
     constants.write_text("TWO = 2.0")
     assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]
     (tmp_path / "install" / "parts" / "part.py").write_text(f"{above}\n# changed")
@@ -175,7 +180,8 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
 
 
 def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
-    """Whatever a compiled function's module imports of ours, directly or not, is in its digest."""
+    """The digest of a compiled function includes all files of this package that its module imports, directly
+    or not."""
 
     def imported(file: Path, known: set[Path]) -> set[Path]:
         known.add(file)
@@ -198,13 +204,13 @@ def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
 
 
 def test_nobody_but_compiled_code_calls_a_piece() -> None:
-    """There is no code of its own to run: it is said, and nothing crashes."""
+    """A call of an inline kernel from Python raises TypeError."""
     with pytest.raises(TypeError, match="dot is a piece of compiled functions"):
         dot(np.ones(2), np.ones(2), 2)
 
 
 def test_the_first_run_equals_the_second(first_and_second_run: tuple[tuple[Path, str], ...]) -> None:
-    """To the bit, from a machine on which nothing was compiled."""
+    """On a machine with nothing compiled, the first run gives bitwise the same numbers as the second."""
     runs = []
     for (file, said), compiles in zip(first_and_second_run, (True, False), strict=True):
         assert ("compiling" in said) == compiles
@@ -221,7 +227,7 @@ def test_one_word_tells_of_it_once(tmp_path: Path) -> None:
 
 
 def test_everything_compiled_is_counted() -> None:
-    """Every function that Numba compiles is in the list that the progress counts."""
+    """The list for the progress contains every function that Numba compiles."""
     told_of: list[tuple[int, int]] = []
     compile_all(lambda ready, total: told_of.append((ready, total)))
     listed = compiled_functions()

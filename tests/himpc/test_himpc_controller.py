@@ -1,4 +1,4 @@
-"""The controller in its loop: what it works with, whatever comes in, and the evidence it gives."""
+"""The controller in its loop: its levels, its robustness to any input, and its evidence."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from robots import InputError, Robot
 Array = NDArray[np.float64]
 
 
-# ------------------------------------------------------------------ what it works with
+# ------------------------------------------------------------------ the levels
 
 
 def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
-    """It comes last when the enabled levels leave freedom, stays away when they do not, and can be off."""
+    """The damping level is added as the last level if the enabled levels leave freedom, is absent otherwise,
+    and can be switched off."""
     previews = holds(iiwa, 5)
 
     def names(**changes: Any) -> list[str]:
@@ -31,7 +32,7 @@ def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
         return [level.name for level in controller.step(iiwa.home, np.zeros(7), previews).levels]
 
     stack = iiwa_settings(iiwa).stack
-    # 3 + 3 + 1 rows of full rank leave a 7-joint arm nothing.
+    # 3 + 3 + 1 rows of full rank leave no freedom to a 7-joint arm.
     assert names() == ["position", "orientation", "q1"]
     assert names(stack=stack[:2]) == ["position", "orientation", "damping"]
     off = tuple(replace(level, enabled=False) for level in stack)
@@ -41,7 +42,7 @@ def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
     assert names(stack=off, damping=False) == []
 
 
-# ------------------------------------------------------------------ whatever comes in
+# ------------------------------------------------------------------ any input
 
 
 def odd_numbers(rng: np.random.Generator, size: int, kind: str) -> Array:
@@ -74,7 +75,7 @@ kinds = st.sampled_from(["fine", "fine", "huge", "nan", "inf", "tiny"])
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
     iiwa: Robot, seed: int, states: list[tuple[str, ...]], N: int, route: Any, solver: Any, position: Any
 ) -> None:
-    """Random, huge or not finite states, references and torques: never an exception."""
+    """Random, huge or not finite states, references and torques raise no exception."""
     rng = np.random.default_rng(seed)
     torque_scale, velocity_scale = 10 ** rng.uniform([-2, -3], [1, 2])
     limits = Limits(position=position, velocity_scale=velocity_scale, torque_scale=torque_scale)
@@ -112,7 +113,8 @@ def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
 
 
 def test_a_state_that_is_not_finite_holds_the_torque(iiwa: Robot) -> None:
-    """The plan says so: rung "hold", one unsolved; the next good state goes on as if fresh."""
+    """The plan reports the fallback "hold" and one unsolved QP; at the next finite state the controller
+    starts anew."""
     controller = HIMPC(iiwa, iiwa_settings(iiwa))
     tau = np.linspace(-5, 5, 7)
     controller.reset(tau)
@@ -125,7 +127,7 @@ def test_a_state_that_is_not_finite_holds_the_torque(iiwa: Robot) -> None:
 
 
 def test_the_controller_sees_no_mass(iiwa: Robot) -> None:
-    """On a robot with the same geometry and other masses it answers with the same torques to the bit."""
+    """On a robot with the same geometry and other masses the torques are bitwise equal."""
     model = iiwa.model.copy()
     for k in range(1, model.njoints):
         model.inertias[k].mass *= 7.0
@@ -143,7 +145,7 @@ def test_the_controller_sees_no_mass(iiwa: Robot) -> None:
 
 
 def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
-    """A refused configure leaves the controller as it was, to the bit."""
+    """After a refused `configure` the controller's torques are bitwise unchanged."""
     one, other = HIMPC(iiwa, iiwa_settings(iiwa)), HIMPC(iiwa, iiwa_settings(iiwa))
     previews = holds(iiwa, 5)
     for _ in range(3):
@@ -169,7 +171,7 @@ def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
 
 
 def test_a_plan_carries_its_evidence(iiwa: Robot) -> None:
-    """Per level: increments, cost, residual, time, leak; the torque is τ₀ plus the first input."""
+    """Each level has increments, cost, residual, time and leak; the torque is τ₀ plus the first input."""
     controller = HIMPC(iiwa, iiwa_settings(iiwa, horizon=7))
     tau_0 = np.linspace(-3, 3, 7)
     controller.reset(tau_0)

@@ -1,4 +1,5 @@
-"""Errors of all kinds of tasks, differentiated up to 179°: they change by ẋ − ẋ_d, and ẋ_d changes by ẍ_d."""
+"""Errors of all kinds of tasks, differentiated numerically up to 179°: their derivative is ẋ − ẋ_d, and that
+of ẋ_d is ẍ_d."""
 
 from __future__ import annotations
 
@@ -56,17 +57,19 @@ def arm() -> Robot:
 
 
 def test_every_class_is_among_them() -> None:
-    """But for damping, whose error is always zero."""
+    """The list contains every class except damping, whose error is always zero."""
     assert {type(task) for task in TASKS.values()} | {Damping} == {
         k for each in KINDS.values() for k in each.makes
     }
 
 
 class Motion:
-    """A robot and a target on their way: q = q₀ + vt and, in a task's own target, y_d with ẏ_d and ÿ_d."""
+    """A moving robot and a moving target: q = q₀ + vt and, in the coordinates of the task's target, y_d with
+    ẏ_d and ÿ_d."""
 
     def __init__(self, task: Task, seed: int, angle: float) -> None:
-        """angle: by which the target is turned away at t = 0, or the axis points past it, rad."""
+        """angle: the angle between value and target, or between axis and direction to the point, at t = 0,
+        rad."""
         self.task, robot, rng = task, arm(), np.random.default_rng(seed)
         self.data = robot.model.createData()
         self.q, self.v = rng.uniform(-1.5, 1.5, 7), rng.uniform(-1.0, 1.0, 7)
@@ -90,7 +93,7 @@ class Motion:
         return exp3(gone) @ self.y if self.y.ndim == 2 else self.y + gone
 
     def at(self, t: float, N: int = 1) -> tuple[Configuration, Preview]:
-        """The state and the preview of the next N periods of 1e-3 s."""
+        """Returns the state and the preview of the next N periods of 1e-3 s."""
         times = 1e-3 * np.arange(N + 1)
         gone = [self.target(t + s) for s in times]
         velocity = self.y_dot + (t + times[:, None]) * self.y_ddot
@@ -106,7 +109,7 @@ class Motion:
         return self.task.error(self.task.value(here), preview.value)
 
     def slope(self, t: float) -> Array:
-        """ẋ − ẋ_d as controllers have it."""
+        """Returns ẋ − ẋ_d as controllers compute it."""
         here, preview = self.at(t)
         return self.task.jacobian(here)[0] @ self.v - self.task.asked(here, preview).velocity[0]
 
@@ -122,17 +125,17 @@ ANGLES = st.one_of(st.floats(0.0, np.pi), st.just(np.radians(179.0)), st.just(0.
 def test_what_controllers_take_for_its_derivative_is_the_errors_own(
     name: str, seed: int, angle: float
 ) -> None:
-    """d/dt x̃ = ẋ − ẋ_d while robot and target move; of rotations on two or three axes along x̃."""
+    """d/dt x̃ = ẋ − ẋ_d while robot and target move; for rotations on two or three axes only along x̃."""
     motion = Motion(TASKS[name], seed, angle)
     before, after, slope = motion.error(-H), motion.error(H), motion.slope(0.0)
     moved = (after - before) / (2 * H)
     if isinstance(motion.task, OrientationTask) and len(motion.task.axes) > 1:
-        # A reduced error can be anywhere: close to 180° its direction turns arbitrarily fast, its length not.
+        # Close to 180° the direction of a reduced error changes arbitrarily fast, but its length does not.
         moved = (after @ after - before @ before) / (4 * H)
         slope = motion.error(0.0) @ slope
     scale = 1.0 + float(np.abs(slope).max())
     if np.linalg.norm(motion.error(0.0)) > np.radians(179.0) + 1e-9:
-        return  # the two sides of the opposite direction
+        return  # the difference would cross the opposite direction
     np.testing.assert_allclose(moved, slope, atol=2e-5 * scale**3)
 
 
@@ -140,7 +143,7 @@ def test_what_controllers_take_for_its_derivative_is_the_errors_own(
 @given(seed=st.integers(0, 2**32 - 1), angle=st.floats(-np.radians(179.0), np.radians(179.0)))
 @settings(max_examples=25)
 def test_a_free_rotation_does_not_turn_the_error(task: OrientationTask, seed: int, angle: float) -> None:
-    """On two axes: where x̃ = 0 its derivative is ẋ − ẋ_d, however far the third axis has turned."""
+    """On two axes: at x̃ = 0 the derivative of x̃ is ẋ − ẋ_d for every rotation about the third axis."""
     motion = Motion(task, seed, 0.0)
     free = np.array([float(axis not in task.axes) for axis in "xyz"])
     motion.y = exp3(angle * free) @ motion.y
@@ -155,7 +158,8 @@ def test_a_free_rotation_does_not_turn_the_error(task: OrientationTask, seed: in
 def test_accelerations_of_references_are_derivatives_of_their_velocities(
     name: str, seed: int, angle: float
 ) -> None:
-    """ẍ_d = d/dt ẋ_d along the motion of robot and target, and x_d and ẋ_d go together over the horizon."""
+    """ẍ_d = d/dt ẋ_d along the motion of robot and target, and x_d is the integral of ẋ_d over the
+    horizon."""
     motion, N = Motion(TASKS[name], seed, angle), 6
     asked = [motion.task.asked(*motion.at(t, N)) for t in (-H, 0.0, H)]
     found = (asked[2].velocity[0] - asked[0].velocity[0]) / (2 * H)
@@ -163,15 +167,15 @@ def test_accelerations_of_references_are_derivatives_of_their_velocities(
     np.testing.assert_allclose(asked[1].acceleration[0], found, atol=1e-4 * scale**2)
     trapezoid = 0.5e-3 * (asked[1].velocity[1:] + asked[1].velocity[:-1]).cumsum(axis=0)
     np.testing.assert_allclose(asked[1].displacement[1:], trapezoid, atol=2e-5 * scale)
-    # The last knot of the state is the one before the last of the reference.
+    # The state has one knot less than the reference.
     later = motion.task.asked(*motion.at(1e-3 * (N - 1), 1)).velocity[0]
     np.testing.assert_allclose(asked[1].velocity[N - 1], later, atol=2e-5 * scale)
 
 
 @pytest.mark.parametrize("axes", SUBSETS)
 def test_errors_end_at_180_degrees(axes: str) -> None:
-    """At half a turn and within rounding of it an error is finite and no longer than π; on axes that see the
-    whole turn it is π long."""
+    """At 180°, also with rounding errors, the error is finite and at most π; if the controlled axes contain
+    the axis of rotation, it is π."""
     rng = np.random.default_rng(3)
     task = FrameOrientation(name="turn", axes=axes)
     for noise in (0.0, 1e-15, 1e-12, 1e-9, 1e-6):
@@ -190,7 +194,7 @@ def test_errors_end_at_180_degrees(axes: str) -> None:
 
 @pytest.mark.parametrize("axis", ["x", "y", "z", "-x", "-y", "-z"])
 def test_pointing_away_is_180_degrees(axis: str) -> None:
-    """Exactly away from the point and around there the error is what the angle is, in a direction."""
+    """If the axis points in the opposite direction or nearly so, the norm of the error is the angle."""
     robot = arm()
     task, data = Pointing(name="look", axis=axis), robot.model.createData()
     here = Configuration(robot, data, robot.home, np.zeros(7))
@@ -212,7 +216,7 @@ def test_pointing_away_is_180_degrees(axis: str) -> None:
 
 
 def test_htmpc_knows_how_an_orientation_on_one_axis_changes() -> None:
-    """Its ∂e/∂q at the knots is the derivative of e, however far the other axes have turned."""
+    """∂e/∂q at the knots is the derivative of e for every rotation about the other axes."""
     robot, rng = arm(), np.random.default_rng(5)
     task = FrameOrientation(name="turn", axes="z")
     q, goals = rng.uniform(-1.5, 1.5, (3, 7)), [exp3(rng.normal(size=3)) for _ in range(3)]

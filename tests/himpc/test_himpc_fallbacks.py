@@ -1,4 +1,5 @@
-"""When a level has no sound solution: softened rows, the previous plan, braking, within all bounds if any."""
+"""The fallbacks for a level without a verified solution: softened rows, the previous plan, and braking,
+within all bounds if these are feasible."""
 
 from __future__ import annotations
 
@@ -26,12 +27,13 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def unreachable(hierarchy: Hierarchy, excess: float = 1.0) -> Hierarchy:
-    """The hierarchy with a velocity bound at the first knot that no torque within its bounds can meet."""
+    """Returns the hierarchy with a velocity bound at the first knot that no torque within its bounds
+    satisfies."""
     rows = hierarchy.rows
     N, n = hierarchy.shape
     lower, upper = rows.lower.copy(), rows.upper.copy()
     lower[:N], upper[:N] = -np.ones((N, n)), np.ones((N, n))
-    # Every other bound is wide; joint 0 is asked for 1 + excess N·m where at most 1 N·m is to be had.
+    # Every other bound is wide; joint 0 needs 1 + excess N·m and has at most 1 N·m.
     lower[N:], upper[N:] = -1e3, 1e3
     lower[N, 0] = 1.0 + excess
     return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
@@ -40,7 +42,7 @@ def unreachable(hierarchy: Hierarchy, excess: float = 1.0) -> Hierarchy:
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
 @pytest.mark.parametrize("seed", range(6))
 def test_infeasible_rows_are_softened_by_the_least(seed: int, route: Route) -> None:
-    """State rows give way by what torque cannot do and no more; lower levels stay feasible (Theorem 2)."""
+    """State rows are relaxed by the smallest feasible amount; lower levels stay feasible (Theorem 2)."""
     hierarchy = unreachable(random_hierarchy(seed, 5, 4, 3))
     N, _ = hierarchy.shape
     solutions = hierarchy.solve(route)
@@ -57,13 +59,14 @@ def test_infeasible_rows_are_softened_by_the_least(seed: int, route: Route) -> N
 
 @pytest.mark.parametrize("seed", range(4))
 def test_softened_routes_agree(seed: int) -> None:
-    """Both routes soften by the same slack and then find the same increments."""
+    """Both routes use the same slack and then find the same increments."""
     hierarchy = unreachable(random_hierarchy(seed, 4, 3, 2))
     assert largest_difference(hierarchy.solve("compiled"), hierarchy.solve("explicit")) <= 1e-6
 
 
 def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
-    """The hierarchy with one torque box for all knots; joint 0 is `past` N·m outside it now."""
+    """Returns the hierarchy with the same torque bounds at all knots; the bounds of joint 0 are shifted by
+    `past` N·m."""
     rows = hierarchy.rows
     N, _ = hierarchy.shape
     lower, upper = rows.lower.copy(), rows.upper.copy()
@@ -75,7 +78,7 @@ def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
 
 @pytest.fixture(scope="module")
 def pressed() -> Hierarchy:
-    """Three levels whose bounds all bind, solved once in good health."""
+    """Three levels with active bounds, which the undisturbed cascade solves."""
     tight = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
     rows = containing(tight.rows, np.zeros(tight.shape))
     hierarchy = Hierarchy(tight.problems, rows.widened(np.full(rows.lower.shape, 0.01)))
@@ -91,7 +94,7 @@ def pressed() -> Hierarchy:
 def test_a_broken_solver_falls_to_the_previous_plan(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, solver: qp.Solver
 ) -> None:
-    """Level 1 goes on with its shifted plan, lower levels inherit, and all rows hold."""
+    """Level 1 continues its shifted plan, lower levels inherit it, and all rows are satisfied."""
     previous = {s.name: s._replace(U=1e-4 * s.U) for s in pressed.solve()}
     break_solver(monkeypatch, kind)
     solutions = pressed.solve("explicit", solver, previous)
@@ -107,8 +110,8 @@ def test_a_broken_solver_falls_to_the_previous_plan(
 def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, stale: str
 ) -> None:
-    """A shifted plan that meets the torque rows and no velocity row, or that was a fallback itself, would let
-    the joints go on as they went: they are braked."""
+    """The joints are braked if the shifted plan satisfies the torque rows but violates a velocity row, or if
+    it was a fallback itself; otherwise they would continue their motion."""
     rows, (N, n) = pressed.rows, pressed.shape
     sound = {s.name: s._replace(U=np.zeros((N, n))) for s in pressed.solve()}
     if stale == "rung":
@@ -135,7 +138,7 @@ def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
 def test_a_broken_solver_without_a_plan_brakes(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, route: Route
 ) -> None:
-    """Without a previous plan the joints are braked within all rows, which some increments meet here."""
+    """Without a previous plan the joints are braked within all rows, which are feasible here."""
     break_solver(monkeypatch, kind)
     if route == "compiled":
         break_kernel(monkeypatch)
@@ -149,7 +152,7 @@ def test_a_broken_solver_without_a_plan_brakes(
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """When only a lower level fails it keeps the increments of the level above, and says so."""
+    """If only a lower level fails, it keeps the increments of the level above, and reports the fallback."""
     hierarchy = random_hierarchy(11, 6, 4, 3, room=0.3)
     sound = hierarchy.solve()
     assert all(len(solution.active) for solution in sound[:2])
@@ -165,7 +168,8 @@ def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) ->
 @given(seeds, st.integers(1, 6), st.integers(1, 5), st.booleans())
 @settings(max_examples=60)
 def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, position_rows: bool) -> None:
-    """Random, mostly contradictory state rows: some rung answers, finite, within torque, no level leaks."""
+    """For random, mostly contradictory state rows a fallback returns a finite point within the torque bounds,
+    and no level leaks."""
     hierarchy = random_hierarchy(seed, max(n, 2), N, 3, position_rows)
     rng = np.random.default_rng(seed)
     rows = hierarchy.rows
@@ -184,7 +188,7 @@ def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, posit
 @given(seeds, st.integers(1, 6), st.integers(1, 6), st.booleans())
 @settings(max_examples=60)
 def test_least_slack_makes_any_rows_feasible(seed: int, n: int, N: int, position_rows: bool) -> None:
-    """Rows widened by the least slack always admit a point within the torque rows."""
+    """Rows relaxed by the least slack are always feasible within the torque rows."""
     hierarchy = random_hierarchy(seed, max(n, 2), N, 1, position_rows)
     rng = np.random.default_rng(seed)
     rows = hierarchy.rows
@@ -197,7 +201,7 @@ def test_least_slack_makes_any_rows_feasible(seed: int, n: int, N: int, position
 
 
 def feasible(rows: Rows) -> bool:
-    """Whether some increments meet all rows, by linear programming joint by joint."""
+    """Whether all rows are feasible, by linear programming joint by joint."""
     from scipy.optimize import linprog
 
     N = rows.L.shape[1]
@@ -213,7 +217,7 @@ def feasible(rows: Rows) -> bool:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("limit", [1, 7, 40])
 def test_a_qp_takes_no_more_iterations_than_it_may(monkeypatch: pytest.MonkeyPatch, limit: int) -> None:
-    """All attempts of DAQP together stay within their budget; what is given up is not called solved."""
+    """All attempts of DAQP together stay within their budget; a QP that is ended does not count as solved."""
     rng = np.random.default_rng(0)
     used: list[int] = []
     healthy = daqp.solve

@@ -1,4 +1,5 @@
-"""Compiled code on disk: what is not whole, not ours or cannot be written ends no start and is never run."""
+"""Compiled code on disk: a file that is damaged, belongs to another user or cannot be written does not
+prevent a start, and is never executed."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from himpc.tick.kernel.target import roll
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An installation of a small function that was compiled once and is taken from disk since."""
+    """An installation of a small function that was compiled once and is loaded from disk since."""
     folder = tmp_path_factory.mktemp("compiled")
     assert [again(folder), again(folder)] == [2, 0]
     return folder
@@ -28,13 +29,13 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def place(compiled: Path) -> Iterator[Path]:
-    """The same, which is as it was after each test."""
+    """The same installation, restored after each test."""
     (file,) = code_of(compiled)
     data = file.read_bytes()
     yield compiled
     os.chown(file.parent, os.getuid(), -1)
     file.parent.chmod(0o700)
-    for each in {file, *code_of(compiled)}:  # of a folder that is not trusted it goes elsewhere
+    for each in {file, *code_of(compiled)}:  # a folder that is not trusted is replaced by another one
         each.unlink(missing_ok=True)
     file.touch(0o600)
     file.write_bytes(data)
@@ -45,7 +46,8 @@ def code_of(folder: Path) -> list[Path]:
 
 
 def again(folder: Path, before: Callable[[], None] | None = None) -> int:
-    """How many functions another start compiles, which ends well and says nothing but that it does."""
+    """Starts again and returns how many functions are compiled; the start succeeds without an error
+    message."""
     process = start(folder, before=before)
     errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
@@ -71,14 +73,14 @@ def test_a_damaged_file_is_compiled_anew_and_replaced(place: Path, kind: str) ->
 
 
 def loaded() -> bool:
-    """Whether a function of ours is taken from where it is kept."""
+    """Whether one of our functions can be loaded from its file."""
     return roll._cache.load_overload(roll.signatures[0], roll.targetctx) is not None
 
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
-    """The files with that function's code, one per processor that it was compiled for, in a folder of the
-    test's."""
+    """The files with that function's code, one for each processor that it was compiled for, in a folder of
+    this test."""
     files = sorted(Path(roll.stats.cache_path).glob("target.roll-*.code"))
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path_factory.mktemp("kept")))
@@ -104,7 +106,7 @@ def test_one_bit_is_noticed_wherever_it_is(kept: list[Path]) -> None:
 
 
 def full() -> None:
-    """No file can become longer than this: what a full disk is to whoever writes."""
+    """Limits the size of files, which has the effect of a full disk."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
 
 
@@ -113,7 +115,7 @@ def test_on_a_full_disk_it_is_used_from_memory(place: Path) -> None:
     file.unlink()
     assert again(place, full) == 2
     assert not code_of(place)
-    assert not [each for each in place.glob("tmp/**/.*") if each.is_file()]  # nothing half written
+    assert not [each for each in place.glob("tmp/**/.*") if each.is_file()]  # no incomplete file is left
     assert again(place) == 2
     assert again(place, full) == 0
 

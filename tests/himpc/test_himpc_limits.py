@@ -1,4 +1,4 @@
-"""Limits: a joint that can always still stop, bounds that never cross, and tightening without a jolt."""
+"""Limits: a joint can always still stop, bounds never cross, and limits are tightened without a jump."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def bounds_at(
 def test_a_joint_inside_the_viable_set_never_passes_its_limit(
     seed: int, span: float, v_max: float, a: float, T_s: float, later: float
 ) -> None:
-    """Whatever velocity is wanted, braking with a_max keeps the double integrator inside."""
+    """For every desired velocity, braking with a_max keeps the double integrator inside its limits."""
     rng = np.random.default_rng(seed)
     low, high, reaction = -0.4 * span, 0.6 * span, T_s * later
     q = rng.uniform(low, high)
@@ -46,11 +46,12 @@ def test_a_joint_inside_the_viable_set_never_passes_its_limit(
     for k in range(400):
         if k % 40 == 0:
             wanted = rng.uniform(-2, 2) * v_max if not outward else rng.choice([-1, 1]) * v_max
-        # It stops with the velocity of now for one period, then with a_max: the printed bound's promise.
+        # The joint keeps its velocity for one period and then brakes with a_max; the printed bound assumes
+        # this.
         q += T_s * v
         lower, upper = bounds_at(q, low, high, v_max, a, reaction)
         assert lower <= upper
-        # Braking beyond a_max is what the bound must never ask for.
+        # The bound must never require a deceleration above a_max.
         assert upper >= v - a * T_s - 1e-9 or v < 0
         assert lower <= v + a * T_s + 1e-9 or v > 0
         v = min(max(wanted, lower, v - a * T_s), upper, v + a * T_s)
@@ -61,7 +62,7 @@ def test_a_joint_inside_the_viable_set_never_passes_its_limit(
 @given(seeds, st.booleans())
 @settings(max_examples=100)
 def test_bounds_never_cross(seed: int, unbounded: bool) -> None:
-    """lower ≤ upper for every joint, far beyond the limits and without any as well."""
+    """lower ≤ upper for every joint, also far beyond the limits and without limits."""
     rng = np.random.default_rng(seed)
     n = 6
     low, high = np.sort(rng.normal(0, 10 ** rng.uniform(-6, 2), (2, n)), axis=0)
@@ -75,7 +76,8 @@ def test_bounds_never_cross(seed: int, unbounded: bool) -> None:
 
 
 def test_beyond_a_limit_the_joint_must_return() -> None:
-    """Past the limit the bound asks for a velocity back, in proportion to the excess and within the limit."""
+    """Beyond the limit the bound requires a velocity back, in proportion to the excess and within the
+    velocity limit."""
     assert bounds_at(1.1, -1.0, 1.0, 2.0, 10.0, 1e-3)[1] == pytest.approx(-RETURN_RATE * 0.1)
     assert bounds_at(-1.1, -1.0, 1.0, 2.0, 10.0, 1e-3)[0] == pytest.approx(RETURN_RATE * 0.1)
     assert bounds_at(9.0, -1.0, 1.0, 2.0, 10.0, 1e-3) == (-2.0, -2.0)
@@ -87,7 +89,7 @@ def test_beyond_a_limit_the_joint_must_return() -> None:
 @given(seeds, st.integers(1, 6), st.integers(1, 10), st.sampled_from(["viability", "paper", "off"]))
 @settings(max_examples=100)
 def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: Any) -> None:
-    """A row is met exactly when the predicted torque, velocity or position is inside its bound."""
+    """A row is satisfied if and only if the predicted torque, velocity or position is inside its bound."""
     rng = np.random.default_rng(seed)
     T_s, M_bar = 1e-3, 10 ** rng.uniform(-3, 0, n)
     state = JointState(*rng.normal(0, [[1], [2], [30]], (3, n)))
@@ -119,15 +121,16 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
     [
         ("viability", 0.0, "velocity", "velocity"),
         ("viability", 0.98, "position", "velocity"),
-        ("viability", 1.2, "position", "velocity"),  # beyond: it must come back, no faster than it may
-        ("paper", 0.98, "velocity", "velocity"),  # has rows of its own for positions
+        # beyond the limit it must return, within the velocity limit
+        ("viability", 1.2, "position", "velocity"),
+        ("paper", 0.98, "velocity", "velocity"),  # this variant has separate rows for positions
         ("off", 0.98, "velocity", "velocity"),
     ],
 )
 def test_a_velocity_row_tells_which_limit_it_stands_for(
     position: Any, q: float, upper: str, lower: str
 ) -> None:
-    """Near its end a joint, however slow, is held by its position limit."""
+    """Near its end a joint is limited by its position limit at every velocity."""
     one = np.ones(1)
     force = LimitsInForce(-9 * one, 9 * one, 0.5 * one, -one, one, 10 * one)
     state = JointState(q * one, 0 * one, 0 * one)
@@ -147,7 +150,7 @@ def random_force(rng: np.random.Generator, n: int) -> LimitsInForce:
 @given(seeds, st.integers(1, 8), st.sampled_from(["viability", "off"]), st.just(0.0) | st.floats(1, 1e4))
 @settings(max_examples=100)
 def test_rows_that_can_be_met_need_no_slack(seed: int, N: int, position: Any, approach: float) -> None:
-    """For a robot inside its bounds and strong enough to follow them the least slack is zero."""
+    """For a robot inside its bounds with enough torque to stay there, the least slack is zero."""
     rng = np.random.default_rng(seed)
     n, T_s = 5, 1e-3
     M_bar = 10 ** rng.uniform(-3, 0, n)
@@ -156,7 +159,7 @@ def test_rows_that_can_be_met_need_no_slack(seed: int, N: int, position: Any, ap
     low, high = viability_bounds(q, force.q_lower, force.q_upper, force.v_limit, force.a_max, 0.06)
     state = JointState(q, 0.9 * rng.uniform(low, high), rng.normal(0, 5, n))
     tau_0 = 0.5 * rng.uniform(force.tau_lower, force.tau_upper)
-    # Strong enough to cancel q̈ and to brake at 200 1/s times the velocity left.
+    # Enough torque to cancel q̈ and to brake with 200 1/s times the remaining velocity.
     strong = np.maximum(force.tau_upper, 2 * np.abs(tau_0) + 1e3 * (1 + np.abs(state.v) + np.abs(state.a)))
     force = LimitsInForce(-strong, strong, force.v_limit, force.q_lower, force.q_upper, force.a_max)
     limits = Limits(position=position, velocity_approach=approach)
@@ -180,7 +183,7 @@ FIELDS = ("tau_lower", "tau_upper", "v_limit", "q_lower", "q_upper")
 
 
 def settled(now: LimitsInForce, goal: LimitsInForce, tau: float, q: float, v: float) -> list[LimitsInForce]:
-    """What is in force tick by tick while the robot stays where it is, until the goal is reached."""
+    """Returns the limits in force at each tick, at a constant state, until they reach the goal."""
     path = [now]
     for _ in range(20_000):
         if path[-1] is goal:
@@ -190,7 +193,7 @@ def settled(now: LimitsInForce, goal: LimitsInForce, tau: float, q: float, v: fl
 
 
 def test_loosened_limits_hold_at_once() -> None:
-    """Nothing is ever violated by more room, so there is no wait."""
+    """Wider limits cannot be violated, so they are in force at the next tick."""
     wide = force_of(tau=20.0, v=4.0, q_low=-2.0, q_high=2.0)
     assert len(settled(force_of(), wide, 9.0, 0.5, 1.0)) == 2
 
@@ -198,13 +201,14 @@ def test_loosened_limits_hold_at_once() -> None:
 @given(st.floats(-10, 10), st.floats(-1, 1), st.floats(-2, 2))
 @settings(max_examples=15)
 def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) -> None:
-    """Never past the present value in one tick, never wider again, and there in the end."""
+    """Tightened limits never exclude the present value within one tick, never become wider again, and reach
+    the goal."""
     goal = force_of(tau=3.0, v=0.5, q_low=-0.2, q_high=0.3)
     path = settled(force_of(), goal, tau, q, v)
     seconds = 1e-3 * len(path)
     assert seconds <= 6.0
     first = path[1]
-    # The first bounds contain the present state but for one tick's share of closing in.
+    # The first bounds contain the present state, except for the amount by which they shrink in one tick.
     share = 10.0 * 1e-3 / 0.5
     assert first.tau_upper[0] >= max(abs(tau), 3.0) - 10 * share
     assert first.tau_lower[0] <= -max(abs(tau), 3.0) + 10 * share
@@ -221,11 +225,11 @@ def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) ->
 
 
 def test_limits_switched_on_start_from_the_present() -> None:
-    """From no limits at all the first bound is the present value, not the limit itself."""
+    """When limits are switched on, the first bound is the present value and not the limit itself."""
     nothing = force_of(tau=np.inf, v=np.inf, q_low=-np.inf, q_high=np.inf)
     first = ramp(nothing, force_of(), np.array([15.0]), np.array([1.4]), np.array([-3.0]), 1e-3)
     assert first.tau_upper[0] == pytest.approx(15.0, abs=0.05)
-    # Both sides of a torque bound are tightened together.
+    # Both sides of a torque bound are tightened by the same amount.
     assert first.tau_lower[0] == -first.tau_upper[0]
     assert first.v_limit[0] == pytest.approx(3.0, abs=0.01)
     assert first.q_upper[0] == pytest.approx(1.4, abs=0.01)
@@ -249,7 +253,7 @@ def test_limits_switched_on_start_from_the_present() -> None:
     ],
 )
 def test_impossible_limits_are_refused(field: str, value: Any) -> None:
-    """One sentence that names the field."""
+    """The message is one sentence that names the field."""
     with pytest.raises(InputError, match=field):
         Limits(**{field: value})
 

@@ -1,4 +1,5 @@
-"""Missions: planned motion is continuous and keeps its speed; the manager shows the right tasks in time."""
+"""Missions: planned motion is continuous and keeps its speed; the task manager shows the right tasks at the
+right time."""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ paths = st.builds(
 
 @given(path=paths, t=st.floats(-10, 60))
 def test_a_path_keeps_to_its_cruise_speed(path: Path, t: float) -> None:
-    """The velocity told stays within the cruise speed, and so does the motion between two moments."""
+    """The velocity of the preview and the motion between two times stay within the cruise speed."""
     T_s, N = 0.01, 20
     preview = path.preview(t, T_s, N)
     assert np.linalg.norm(preview.velocity, axis=1).max() <= path.cruise * (1 + 1e-9)
@@ -43,7 +44,7 @@ def test_a_path_keeps_to_its_cruise_speed(path: Path, t: float) -> None:
 
 @given(path=paths)
 def test_a_path_runs_from_its_first_to_its_last_point_and_stays(path: Path) -> None:
-    """Before the start and after the end it stands still, on its end points."""
+    """Before the start and after the end the path is constant at its end points."""
     for t, end in ((path.start - 1.0, 0), (path.start, 0), (path.start + path.duration, -1), (1e4, -1)):
         preview = path.preview(t, 1e-9, 1)
         np.testing.assert_allclose(preview.value, path.points[end], atol=1e-6)
@@ -63,7 +64,7 @@ def test_the_velocity_of_a_path_is_that_of_its_motion(path: Path, part: float) -
 
 
 def test_a_quintic_segment_starts_and_ends_softly() -> None:
-    """At rest with no acceleration at both ends; exactly the cruise speed in the middle."""
+    """Velocity and acceleration are zero at both ends, and the speed in the middle is the cruise speed."""
     path = segment(np.zeros(2), np.array([3.0, 4.0]), cruise=0.5)
     for t in (0.0, path.duration):
         preview = path.preview(t, 0.1, 0)
@@ -74,7 +75,7 @@ def test_a_quintic_segment_starts_and_ends_softly() -> None:
 
 
 def test_a_straight_path_takes_length_over_speed() -> None:
-    """5 m at 0.5 m/s, and a corner does not slow it down."""
+    """5 m at 0.5 m/s take 10 s, and corners need no additional time."""
     assert segment(np.zeros(2), np.array([3.0, 4.0]), 0.5, "straight").duration == pytest.approx(10.0)
     bent = Path(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]]), 0.5, "straight")
     assert bent.duration == pytest.approx(6.0)
@@ -93,13 +94,13 @@ def test_a_straight_path_takes_length_over_speed() -> None:
 def test_a_path_that_cannot_be_is_refused(
     points: list[list[float]], cruise: float, law: Law, says: str
 ) -> None:
-    """One sentence names what is wrong."""
+    """The message is one sentence that names the fault."""
     with pytest.raises(InputError, match=says):
         Path(np.array(points), cruise, law)
 
 
 def test_a_square_wave_switches_on_time_and_is_seen_coming() -> None:
-    """Peak, then valley; the preview shows the step before it happens."""
+    """The wave has its peak, then its valley; the preview shows the step before it happens."""
     wave = SquareWave(np.array([1.0, 2.0]), np.zeros(2), half_period=8.0, waves=1)
     ahead = wave.preview(7.5, 0.1, 10)
     np.testing.assert_array_equal(ahead.value, [1.0, 2.0])
@@ -131,7 +132,7 @@ def at(ee: float, base: float) -> Mapping[str, Array]:
 
 
 def delivery(hold: float | None = 0.0, tolerance: float = 0.1) -> tuple[MissionTask, ...]:
-    """Base to 1, EE to 2, base to 3, EE to 4."""
+    """Returns a mission: base to 1, EE to 2, base to 3, EE to 4."""
     return tuple(
         MissionTask(f"{role}{goal}", role, Go((goal,)), tolerance, hold)
         for role, goal in (("base", 1.0), ("ee", 2.0), ("base", 3.0), ("ee", 4.0))
@@ -143,7 +144,7 @@ def names(progress: Progress) -> list[str]:
 
 
 def test_a_completed_task_hands_over_to_the_next() -> None:
-    """The window starts at the first task that is not done, holds L of them, and shrinks at the end."""
+    """The window starts at the first task that is not done, contains L tasks, and shrinks at the end."""
     progress = advanced(Progress(delivery()), 2, 0.0, at(0, 0), STILL)
     assert names(progress) == ["base1.0", "ee2.0"]
     progress = advanced(progress, 2, 1.0, at(0, 0.95), STILL)
@@ -161,7 +162,8 @@ def test_a_completed_task_hands_over_to_the_next() -> None:
     steps=st.lists(st.tuples(st.sampled_from("eb"), st.integers(0, 5)), max_size=40),
 )
 def test_whatever_the_robot_does_the_window_is_the_next_L_tasks(L: int, steps: list[tuple[str, int]]) -> None:
-    """Tasks are completed in order, one by one and never taken back; no task is shown twice or skipped."""
+    """Tasks are completed in order, one by one, and stay completed; no task is skipped or in the window
+    twice."""
     mission = delivery()
     progress, ee, base = Progress(mission), 0.0, 0.0
     for k, (who, where) in enumerate(steps):
@@ -176,7 +178,7 @@ def test_whatever_the_robot_does_the_window_is_the_next_L_tasks(L: int, steps: l
 
 
 def test_a_hold_counts_from_arrival_and_starts_again_when_the_point_leaves() -> None:
-    """0.5 s within tolerance, in one piece, as the first task."""
+    """The hold is 0.5 s within the tolerance without interruption, while the task is first."""
     mission = (MissionTask("ee", "ee", Go((1.0,)), 0.1, hold=0.5), MissionTask("end", "base", Go((9.0,))))
     progress = Progress(mission)
     history = [(0.0, 1.0), (0.4, 1.05), (0.45, 1.2), (0.5, 1.0), (0.9, 1.0), (1.0, 1.0)]
@@ -188,7 +190,7 @@ def test_a_hold_counts_from_arrival_and_starts_again_when_the_point_leaves() -> 
 
 
 def test_being_at_the_goal_early_does_not_count_as_holding() -> None:
-    """The EE waits at its goal while the base task is still first: its hold begins when it is first."""
+    """The EE is at its goal while the base task is still first: its hold begins when its task is first."""
     mission = (MissionTask("base", "base", Go((1.0,))), MissionTask("ee", "ee", Go((2.0,)), hold=1.0))
     progress = advanced(Progress(mission), 2, 0.0, at(2, 0), STILL)
     progress = advanced(progress, 2, 5.0, at(2, 1), STILL)
@@ -198,7 +200,7 @@ def test_being_at_the_goal_early_does_not_count_as_holding() -> None:
 
 
 def test_a_full_stop_is_a_full_stop() -> None:
-    """A task with `rest` is not completed in passing."""
+    """A task with `rest` is not completed while the point passes its goal."""
     progress = Progress((MissionTask("base", "base", Go((1.0,)), 0.05, rest=0.01),))
     progress = advanced(progress, 1, 0.0, at(0, 1), {"ee": 0.0, "base": 0.5})
     assert not progress.done
@@ -206,7 +208,8 @@ def test_a_full_stop_is_a_full_stop() -> None:
 
 
 def test_a_hold_of_unknown_length_ends_with_its_release() -> None:
-    """However long it takes; a release before the arrival lets the task pass when it arrives."""
+    """A task without a time of hold waits until it is released; after a release before the arrival, it is
+    completed on arrival."""
     progress = Progress(delivery(hold=None)[:2])
     progress = advanced(progress, 2, 100.0, at(0, 1), STILL)
     assert progress.place == 0
@@ -218,7 +221,8 @@ def test_a_hold_of_unknown_length_ends_with_its_release() -> None:
 
 
 def test_a_task_is_planned_from_where_its_point_is_when_it_enters() -> None:
-    """Not from the start of the mission, and it keeps its plan while it stays in the window."""
+    """The plan starts at the present position and not at that of the start of the mission; it is kept while
+    the task stays in the window."""
     mission = (
         MissionTask("base", "base", Go((1.0,))),
         MissionTask("ee", "ee", Go((2.0,))),
@@ -232,7 +236,8 @@ def test_a_task_is_planned_from_where_its_point_is_when_it_enters() -> None:
 
 
 def test_a_moved_task_is_planned_again_at_the_next_step() -> None:
-    """From where the robot is, towards the new goal; the other task in the window keeps its plan."""
+    """The new plan starts at the present position and ends at the new goal; the other task in the window
+    keeps its plan."""
     mission = (
         MissionTask("base", "base", Go((5.0,), cruise=0.5)),
         MissionTask("ee", "ee", Go((6.0,), cruise=0.5)),
@@ -246,7 +251,8 @@ def test_a_moved_task_is_planned_again_at_the_next_step() -> None:
 
 
 def test_a_task_inserted_before_the_running_one_comes_first() -> None:
-    """It is taken up at the next step; one inserted at the end comes last, also when all were done."""
+    """A task inserted before the running one is first at the next step; one inserted at the end is last, also
+    after all tasks were done."""
     progress = advanced(Progress(delivery()), 2, 0.0, at(0, 0), STILL)
     new = MissionTask("visit", "base", Go((-1.0,)), 0.1)
     first = advanced(insert(progress, new, before="base1.0"), 2, 0.1, at(0, 0), STILL)
@@ -259,7 +265,7 @@ def test_a_task_inserted_before_the_running_one_comes_first() -> None:
 
 
 def test_priorities_are_swapped_without_planning_anew() -> None:
-    """The first two tasks change places; each keeps the plan it had."""
+    """The first two tasks change places; each keeps its plan."""
     progress = advanced(Progress(delivery()), 2, 0.0, at(0, 0), STILL)
     swapped = advanced(reorder(progress, "ee2.0", 0), 2, 0.1, at(0, 0), STILL)
     assert names(swapped) == ["ee2.0", "base1.0"]
@@ -269,7 +275,7 @@ def test_priorities_are_swapped_without_planning_anew() -> None:
 
 
 def test_a_trajectory_is_completed_at_its_end_not_in_passing() -> None:
-    """A closed trajectory starts at its goal."""
+    """A closed trajectory is at its goal already at its start."""
     wave = SquareWave(np.array([1.0]), np.array([0.0]), half_period=1.0, waves=1)
     progress = Progress((MissionTask("wave", "base", Follow(wave, duration=2.0)),))
     for t, base, done in ((0.0, 1.0, False), (1.5, 0.0, False), (2.0, 0.5, False), (2.1, 0.0, True)):
@@ -280,7 +286,7 @@ def test_a_trajectory_is_completed_at_its_end_not_in_passing() -> None:
 
 
 def test_a_held_orientation_is_turned_and_goes_on_being_held() -> None:
-    """A quarter turn about z; of any length, and nothing else is taken."""
+    """A quaternion of any length for a quarter turn about z is accepted; other values are refused."""
     turn = MissionTask("turn", "ee", Follow(Hold(np.eye(3))), hold=None)
     progress = advanced(Progress((turn,)), 1, 0.0, {"ee": np.eye(3)}, STILL)
     moved = advanced(move(progress, "turn", (0.0, 0.0, 2.0, 2.0)), 1, 0.1, {"ee": np.eye(3)}, STILL)
@@ -293,7 +299,7 @@ def test_a_held_orientation_is_turned_and_goes_on_being_held() -> None:
 
 
 def test_what_cannot_be_done_to_a_mission_is_refused_in_a_sentence() -> None:
-    """Unknown or completed tasks, twin names, goals that do not fit."""
+    """Unknown or completed tasks, duplicate names, and goals that do not fit are refused in one sentence."""
     progress = advanced(Progress(delivery()), 2, 0.0, at(0, 1), STILL)
     assert progress.place == 1
     wave = MissionTask("wave", "base", Follow(SquareWave(np.ones(1), np.zeros(1))))

@@ -1,4 +1,5 @@
-"""Both routes against a third evaluation of (32) to (34): `benchmarks.exact`, to many more digits."""
+"""Both routes are compared with `benchmarks.exact`, a third evaluation of (32) to (34) with many more
+digits."""
 
 from __future__ import annotations
 
@@ -22,10 +23,10 @@ Array = NDArray[np.float64]
 
 @pytest.mark.parametrize("robot", CATALOG)
 def test_random_stacks_on_a_robot_have_the_optimum(robot: str) -> None:
-    """Weights over five decades, R on the torque or on the acceleration: the explicit route is right to 1e-6
-    N·m wherever there is an optimum. So is the compiled one, but for levels that it says it gave up, and for
-    corners of nearly dependent rows, where the 1e-9 N·m that it takes for met are worth more.
-    `python -m benchmarks.oracle` does it for 200 stacks; `docs/results.md` has the table."""
+    """With weights over five decades, and R on the torque or on the acceleration, the explicit route is
+    accurate to 1e-6 N·m at every level that has an optimum. The compiled route is less accurate at nearly
+    dependent rows, where its tolerance of 1e-9 N·m for rows has a larger effect, and reports levels without a
+    verified optimum. `python -m benchmarks.oracle` checks 200 stacks; `docs/results.md` has the table."""
     found = [level for stack in stacks(5, 0, 8, (robot,)) for level in judged(stack) or ()]
     assert len(found) >= 10
     assert max(1.0 if level.explicit is None else level.explicit for level in found) <= 1e-6
@@ -34,7 +35,8 @@ def test_random_stacks_on_a_robot_have_the_optimum(robot: str) -> None:
 
 
 def test_where_nothing_binds_it_is_the_closed_form() -> None:
-    """Base and wrist of a mobile manipulator, 10⁴ apart in M̄: H has a condition of 10¹³ and more."""
+    """The entries of M̄ of base and wrist of a mobile manipulator differ by 10⁴: H has a condition number of
+    10¹³ and more."""
     compared = 0
     for seed in range(40):
         stack = random_stack("ridgeback-ur10", seed, 3)
@@ -56,7 +58,8 @@ def test_where_nothing_binds_it_is_the_closed_form() -> None:
 
 
 def by_fractions(problem: LevelProblem) -> Array:
-    """The optimum of a level alone and without bounds, by Gaussian elimination of rational numbers."""
+    """Returns the optimum of a level alone and without bounds, by Gaussian elimination with rational
+    numbers."""
     exact: Any = np.frompyfunc(Fraction, 1, 1)
     (N, m, n), K = problem.B.shape, problem.knots
     B, C, R = exact(problem.B), exact(problem.C), exact(problem.R)
@@ -83,8 +86,8 @@ def by_fractions(problem: LevelProblem) -> Array:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_judge_needs_no_good_guess(seed: int) -> None:
-    """Without a row that binds and with one that does not it comes to the same point, and no neighbour within
-    the bounds beats it."""
+    """`benchmarks.exact` finds the same point from a guess with a wrong row and without a right one, and no
+    neighbour within the bounds has a lower cost."""
     hierarchy = random_hierarchy(seed, 4, 3, 1)
     solution = hierarchy.solve()[0]
     (exact,) = exact_increments(hierarchy, [solution])
@@ -104,9 +107,9 @@ def test_the_judge_needs_no_good_guess(seed: int) -> None:
 
 
 def test_the_judge_decides_where_rows_nearly_depend() -> None:
-    """A row of level 3 is independent of those held by 1e-10 of its length: the optimum is found, and bounds
-    hold it. The explicit route is right to 1e-5 N·m there; the compiled one exceeds the row by less than
-    1e-10 N·m, which is worth 0.04 N·m."""
+    """A row of level 3 is independent of the active rows by only 1e-10 of its length: the optimum is found,
+    with active bounds. The explicit route is accurate to 1e-5 N·m there; the compiled one exceeds the row by
+    less than 1e-10 N·m, which changes the optimum by 0.04 N·m."""
     stack = random_stack("baxter", 163, 30)
     assert stack is not None
     levels = judged(stack)
@@ -129,8 +132,8 @@ def test_the_judge_decides_where_rows_nearly_depend() -> None:
 def test_a_level_below_one_that_used_up_nearly_all_freedom_is_solved(
     seed: int, n: int, N: int, levels: int, position_rows: bool, room: float
 ) -> None:
-    """Where U_{i−1} is all but the only point that the bounds admit, a solver takes rounding for a
-    contradiction: of 49,095 such hierarchies the explicit route once left 210 without a point."""
+    """If U_{i−1} is almost the only feasible point, rounding errors can look like a contradiction: of 49,095
+    such hierarchies an earlier explicit route left 210 without a point."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
     explicit = hierarchy.solve("explicit")
     assert all(solution.fallback == "solve" for solution in explicit)

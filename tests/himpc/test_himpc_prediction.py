@@ -20,7 +20,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def printed_task_system(m: int, T_s: float) -> tuple[Array, Array]:
-    """A₁ of (15), (6m, 6m), and what multiplies J M̄⁻¹Δτ in B₁, (6m, m)."""
+    """Returns A₁ of (15), (6m, 6m), and the factor of J M̄⁻¹Δτ in B₁, (6m, m)."""
     eye, zero = np.eye(m), np.zeros((m, m))
     A_11 = np.block([[eye, T_s * eye, zero], [zero, 2 * eye, zero], [zero, zero, eye]])
     A_12 = np.block([[zero, zero, zero], [zero, -eye, zero], [zero, zero, zero]])
@@ -29,7 +29,7 @@ def printed_task_system(m: int, T_s: float) -> tuple[Array, Array]:
 
 
 def printed_joint_system(n: int, T_s: float, M_bar: Array) -> tuple[Array, Array]:
-    """A₂ and B₂ of (18), (4n, 4n) and (4n, n), with M̄⁻¹ where (17) misprints M̄."""
+    """Returns A₂ and B₂ of (18), (4n, 4n) and (4n, n), with M̄⁻¹ where (17) misprints M̄."""
     eye, zero = np.eye(n), np.zeros((n, n))
     A_21 = np.block([[eye, T_s * eye], [zero, 2 * eye]])
     A_22 = np.block([[zero, zero], [zero, -eye]])
@@ -40,11 +40,11 @@ def printed_joint_system(n: int, T_s: float, M_bar: Array) -> tuple[Array, Array
 def printed_residuals(
     x: Array, v: Array, a: Array, pushes: Array, K_p: Array, K_v: Array, x_d: Array, T_s: float
 ) -> Array:
-    """e of (28) at knots 1 … N. pushes: (N, m) J M̄⁻¹Δτ; x_d: (N+1, 3, m) with its derivatives."""
+    """Returns e of (28) at knots 1 … N. pushes: (N, m) J M̄⁻¹Δτ; x_d: (N+1, 3, m) with its derivatives."""
     N, m = pushes.shape
     A_1, into = printed_task_system(m, T_s)
     K = np.hstack([np.diag(K_p), np.diag(K_v), np.eye(m)])
-    # The backward difference makes ẋ(k−1) = ẋ(k) − T_s ẍ(k); x and ẍ at k−1 do not enter A₁.
+    # By the backward difference ẋ(k−1) = ẋ(k) − T_s ẍ(k); x and ẍ at k−1 do not enter A₁.
     state = np.concatenate([x, v, a, np.zeros(m), v - T_s * a, np.zeros(m)])
     found = np.empty((N, m))
     for j in range(N):
@@ -59,7 +59,7 @@ def printed_residuals(
 @given(seed=seeds, N=horizons, m=st.integers(1, 4), n=st.integers(1, 7), T_s=periods)
 @settings(max_examples=80)
 def test_residuals_equal_the_printed_system(seed: int, N: int, m: int, n: int, T_s: float) -> None:
-    """The scalar effects c_l give the same e as powers of the printed A₁, whatever the gains."""
+    """For all gains, the scalar effects c_l give the same e as powers of the printed A₁."""
     rng = np.random.default_rng(seed)
     K_p, K_v = rng.uniform(0, 500, m), rng.uniform(0, 50, m)
     x, v, a = rng.normal(0, [[1], [3], [10]], (3, m))
@@ -81,7 +81,7 @@ def test_residuals_equal_the_printed_system(seed: int, N: int, m: int, n: int, T
 @given(seed=seeds, N=horizons, n=st.integers(1, 9), T_s=periods)
 @settings(max_examples=80)
 def test_joint_predictions_equal_the_printed_system(seed: int, N: int, n: int, T_s: float) -> None:
-    """q and q̇ over the horizon are those of the printed A₂ and B₂."""
+    """q and q̇ over the horizon equal those of the printed A₂ and B₂."""
     rng = np.random.default_rng(seed)
     q, v, a = rng.normal(0, [[1], [3], [30]], (3, n))
     M_bar, U = 10 ** rng.uniform(-3.5, 1, n), rng.normal(0, 1, (N, n))
@@ -124,7 +124,8 @@ def test_cost_is_the_printed_sum(seed: int, N: int, m: int, n: int, shorter: int
 
 
 def test_position_at_the_first_knot_has_no_input() -> None:
-    """The printed Euler step: Δτ₀ reaches q only at knot 2, so N = 1 sees no K_p through its input."""
+    """In the printed Euler step, Δτ₀ changes q only at knot 2, so with N = 1 the effect of the input does not
+    contain K_p."""
     state = JointState(np.zeros(2), np.ones(2), np.zeros(2))
     U = np.array([[1.0, -1.0], [0.0, 0.0]])
     np.testing.assert_array_equal(predict_positions(state, U, np.ones(2), 1e-3)[1], 1e-3 * np.ones(2))

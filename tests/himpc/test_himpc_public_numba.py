@@ -1,4 +1,5 @@
-"""Everything runs on what Numba documents, with our own tool chain off, and gives the same numbers."""
+"""All functions also run with Numba's documented interface alone, without our own tool chain, and give the
+same numbers."""
 
 from __future__ import annotations
 
@@ -52,8 +53,8 @@ if __name__ == "__main__":
 
 
 def on_numba_alone(folder: Path, *arguments: str, **environment: str) -> None:
-    """Runs a program with the switch on, its code in a folder of the test's; nothing of the other tool chain
-    is loaded."""
+    """Runs a program with the public tool chain and its code in a folder of the test; no module of the other
+    tool chain is loaded."""
     done = subprocess.run(
         [sys.executable, "-c", NO_PRIVATE, *arguments],
         env={**os.environ, SWITCH: "public", "NUMBA_CACHE_DIR": str(folder / "cache"), **environment},
@@ -65,7 +66,8 @@ def on_numba_alone(folder: Path, *arguments: str, **environment: str) -> None:
     assert done.stdout.split() == []
 
 
-# Interpreted, since to compile the cascade that way takes a minute; OSF's kinematics and HTMPC are compiled.
+# HIMPC runs interpreted, because the compilation of its cascade by this tool chain takes a minute; OSF's
+# kinematics and HTMPC are compiled.
 @pytest.mark.parametrize(
     ("names", "environment"), [(("osf", "htmpc"), {}), (("himpc",), {"NUMBA_DISABLE_JIT": "1"})]
 )

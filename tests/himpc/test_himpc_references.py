@@ -1,4 +1,5 @@
-"""References: derivatives that fit, previews that come true, a dragged target within its caps."""
+"""References: consistent derivatives, previews that agree with the later motion, and a dragged target within
+its caps."""
 
 from __future__ import annotations
 
@@ -68,13 +69,14 @@ def test_derivatives_are_those_of_the_motion(name: str, seed: int, t: float) -> 
         np.testing.assert_allclose(preview.value + preview.displacement[j], at(now), atol=1e-12)
         np.testing.assert_allclose(preview.velocity[j], (at(now + h) - at(now - h)) / (2 * h), atol=2e-4)
         second = (at(now + h) - 2 * at(now) + at(now - h)) / h**2
-        # A quintic's jerk jumps at a waypoint, so its ẍ_d is exact to jerk · h.
+        # A quintic's jerk jumps at a waypoint, so the error of its ẍ_d is of the order jerk · h.
         np.testing.assert_allclose(preview.acceleration[j], second, atol=2e-1)
     assert not preview.displacement[0].any()
 
 
 def test_waypoints_are_met_at_rest() -> None:
-    """Every point is reached at its time with zero velocity and acceleration; then the reference stays."""
+    """Every point is reached at its time with zero velocity and acceleration; after the last one the
+    reference is constant."""
     points = np.random.default_rng(1).normal(0, 1, (3, 2))
     reference = Waypoints(points, np.array([1.0, 2.0, 4.0]))
     for time, point in ((0.0, 0), (1.0, 0), (2.0, 1), (4.0, 2), (9.0, 2)):
@@ -98,7 +100,8 @@ def test_an_eased_phase_rests_at_both_ends_of_a_turn() -> None:
 @given(seeds, st.booleans(), st.integers(1, 12))
 @settings(max_examples=30)
 def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: int) -> None:
-    """A target that is read without objects goes the same way to the last bit, through rest and moves."""
+    """A target that is read by `show` moves bitwise as one that is read by `preview`, also through rest and
+    new targets."""
     rng = np.random.default_rng(seed)
     start = np.eye(3) if turns else np.zeros(3)
     one, other = Target(start), Target(start)
@@ -128,7 +131,7 @@ def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: i
 
 
 def drive(target: Target, ticks: int, hand: Callable[[int], Array | None], N: int = 5) -> list[Preview]:
-    """The previews of `ticks` control periods; `hand(k)` may move the raw target before tick k."""
+    """Returns the previews of `ticks` control periods; `hand(k)` may move the raw target before tick k."""
     previews = []
     for k in range(ticks):
         moved = hand(k)
@@ -139,7 +142,8 @@ def drive(target: Target, ticks: int, hand: Callable[[int], Array | None], N: in
 
 
 def assert_consistent(previews: list[Preview], caps: Caps, hand_moved: set[int]) -> None:
-    """Caps hold, x_d moves by T_s(ẋ + ẋ')/2 and ẋ_d by T_s ẍ' per tick, and the preview comes true."""
+    """Checks that caps hold, x_d moves by T_s(ẋ + ẋ')/2 and ẋ_d by T_s ẍ' per tick, and the preview agrees
+    with the later motion."""
     for k, preview in enumerate(previews):
         v, a, d = preview.velocity, preview.acceleration, preview.displacement
         assert np.linalg.norm(v, axis=1).max() <= caps.speed * (1 + 1e-9)
@@ -164,7 +168,8 @@ def step_between(one: Array, other: Array) -> Array:
 @given(seed=seeds, caps=st.sampled_from([POSITION_CAPS, ROTATION_CAPS, JOINT_CAPS]))
 @settings(max_examples=12)
 def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Caps) -> None:
-    """Speed, acceleration and jerk stay within their caps however the hand moves, and derivatives fit."""
+    """For all motions of the hand, speed, acceleration and jerk stay within their caps, and derivatives are
+    consistent."""
     rng = np.random.default_rng(seed)
     target = Target(rng.normal(0, 1, 3), caps)
     moves = {int(k): rng.normal(0, 10 ** rng.uniform(-3, 0.3), 3) for k in rng.integers(0, 400, 5)}
@@ -178,7 +183,7 @@ def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Cap
 @given(seed=seeds, angle=st.floats(0.01, np.pi))
 @settings(max_examples=8)
 def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: float) -> None:
-    """The same on SO(3), for any turn up to half a revolution, and the preview's vectors are world axes."""
+    """A dragged target on SO(3) keeps its caps and previews, for rotations of up to 180°, in world axes."""
     rng = np.random.default_rng(seed)
     axis = rng.normal(0, 1, 3)
     start = exp3(rng.normal(0, 1, 3))
@@ -195,7 +200,7 @@ def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: fl
 
 @pytest.mark.parametrize("distance", [1e-10, 1e-3, 0.1, 1.0])
 def test_it_arrives_and_rests_exactly(distance: float) -> None:
-    """The filtered target ends on the hand to the bit, at rest, and never drifts again."""
+    """The filtered target ends bitwise at the raw target, at rest, and does not drift afterwards."""
     target = Target(np.zeros(3))
     goal = distance * np.array([0.6, 0.0, 0.8])
     last = drive(target, 8000, lambda k: goal if k == 3 else None)[-1]
@@ -207,7 +212,7 @@ def test_it_arrives_and_rests_exactly(distance: float) -> None:
 
 @pytest.mark.parametrize("angle", [1e-3, 1.0, 3.0, np.pi])
 def test_a_rotation_arrives_and_rests_exactly(angle: float) -> None:
-    """Half a turn has two shortest ways: one is taken to the end."""
+    """For a rotation of 180° there are two shortest paths; the target follows one of them to the end."""
     goal = exp3(np.array([0.0, angle, 0.0]))
     target = Target(np.eye(3))
     previews = drive(target, 9000, lambda k: goal if k == 0 else None)
@@ -218,7 +223,7 @@ def test_a_rotation_arrives_and_rests_exactly(angle: float) -> None:
 
 
 def test_a_hand_moved_in_mid_motion_leaves_no_jump() -> None:
-    """A new raw target bends the motion; value and velocity go on from where they are."""
+    """A new raw target changes the acceleration; value and velocity are continuous."""
     target = Target(np.zeros(3))
     hand = {0: np.array([0.4, 0, 0]), 350: np.array([-0.3, 0.5, 0.1]), 700: np.array([0.0, 0.0, 1.0])}
     previews = drive(target, 1000, lambda k: hand.get(k))
@@ -248,7 +253,7 @@ def test_changed_horizon_and_period_go_on_smoothly() -> None:
 
 
 def test_asking_twice_at_one_time_changes_nothing() -> None:
-    """A preview may be asked for again at the same tick, for instance by the page."""
+    """A second call of `preview` at the same tick, for instance by the page, gives the same result."""
     target = Target(np.zeros(2))
     target.move(np.array([0.5, 0.2]))
     for k in range(50):
@@ -269,7 +274,8 @@ def test_jump_rests_at_the_new_value() -> None:
 
 
 def test_a_rotation_turns_about_all_axes() -> None:
-    """Its preview has all of ω_d, whatever axes a task controls; one at rest may be as wide as the task."""
+    """The preview of a rotation has all components of ω_d, also for a task on fewer axes; one at rest may
+    have only the task's components."""
     target = Target(np.eye(3))
     target.move(exp3(np.array([0.0, 0.0, 0.5])))
     preview = drive(target, 50, lambda k: None)[-1]
@@ -281,7 +287,7 @@ def test_a_rotation_turns_about_all_axes() -> None:
 @given(seed=seeds)
 @settings(max_examples=40)
 def test_quaternions_and_matrices_go_back_and_forth(seed: int) -> None:
-    """A quaternion of any length gives the same matrix; its own has w ≥ 0."""
+    """Quaternions of any length give the same matrix; the quaternion of a matrix has w ≥ 0."""
     rng = np.random.default_rng(seed)
     R = exp3(rng.normal(0, 2, 3))
     q = quaternion(R)

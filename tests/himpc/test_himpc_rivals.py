@@ -1,4 +1,5 @@
-"""OSF, TDEOSF and HQP against independent evaluations of their laws, and under rough treatment."""
+"""OSF, TDEOSF and HQP: comparison with independent evaluations of their laws, and robustness to invalid
+input."""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ def settings(**changes: Any) -> Settings:
 
 
 class Moment(NamedTuple):
-    """A regular state of the iiwa in motion, and references that are moving too."""
+    """A regular state of the moving iiwa, and moving references."""
 
     q: Array
     v: Array
@@ -73,7 +74,8 @@ def moment(seed: int) -> Moment:
 
 
 def demands(at: Moment) -> list[tuple[Array, Array]]:
-    """J_i and ẍ_id − K_v ẋ̃ − K_p x̃ − J̇_i q̇ of the three levels, J̇q̇ from Pinocchio's forward kinematics."""
+    """Returns J_i and ẍ_id − K_v ẋ̃ − K_p x̃ − J̇_i q̇ of the three levels, with J̇q̇ from Pinocchio's
+    forward kinematics."""
     model, data = robot().model, robot().model.createData()
     index, axes = robot().frame_id(robot().tip), pin.LOCAL_WORLD_ALIGNED
     pin.forwardKinematics(model, data, at.q, at.v, np.zeros(7))
@@ -100,7 +102,7 @@ def demands(at: Moment) -> list[tuple[Array, Array]]:
 
 
 def operational_space(M: Array, levels: list[tuple[Array, Array]]) -> list[Array]:
-    """Σ_p J_{p|prec}ᵀ Λ_{p|prec} (…) with explicit inverses, as the references print it."""
+    """Returns Σ_p J_{p|prec}ᵀ Λ_{p|prec} (…) with explicit inverses, as the references print it."""
     n = len(M)
     inverse = np.linalg.inv(M)
     N, tau, found = np.eye(n), np.zeros(n), []
@@ -118,7 +120,8 @@ def operational_space(M: Array, levels: list[tuple[Array, Array]]) -> list[Array
 
 @pytest.mark.parametrize("seed", range(5))
 def test_osf_is_the_operational_space_law(seed: int) -> None:
-    """Level by level the torque of the printed recursion with explicit Λ and null-space projectors."""
+    """The torque of every level equals that of the printed recursion with explicit Λ and null-space
+    projectors."""
     at = moment(seed)
     nominal = NominalSettings(inertia_scale=0.8, armature=0.1, damping=0.2)
     plan = make_controller("osf", robot(), settings(nominal=nominal)).step(
@@ -152,7 +155,8 @@ def test_tdeosf_is_the_same_law_with_time_delay_estimation(seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["osf", "hqp"])
 def test_an_exact_model_gives_the_accelerations_asked_for(name: str) -> None:
-    """On the exact model all levels of a regular arm get what (4) asks; a small R of HQP costs nothing."""
+    """With the exact model, all levels of a regular arm have the acceleration that (4) demands; the effect of
+    a small R in HQP is negligible."""
     at = moment(1)
     R = 1e-6 if name == "hqp" else 10.0
     levels = tuple(replace(level, R=R) for level in stack())
@@ -167,7 +171,7 @@ def test_an_exact_model_gives_the_accelerations_asked_for(name: str) -> None:
 
 @pytest.mark.parametrize("name", RIVALS)
 def test_lower_levels_leave_the_first_alone(name: str) -> None:
-    """In the controller's own model level 1 accelerates the same whatever the levels below ask for."""
+    """In the controller's own model the acceleration of level 1 does not depend on the levels below."""
     at = moment(2)
     wild = dict(at.previews)
     wild["orientation"] = Preview(
@@ -187,7 +191,8 @@ def test_lower_levels_leave_the_first_alone(name: str) -> None:
     ("solver", "share"), [("daqp", 1.0), ("daqp", 0.1), ("daqp", 0.04), ("proxqp", 1.0), ("proxqp", 0.1)]
 )
 def test_hqp_meets_its_kkt_conditions(solver: Any, share: float) -> None:
-    """In the full torque space: gradient + multipliers of the bounds ∈ row space of the levels above."""
+    """The KKT conditions hold in the full torque space: gradient + multipliers of the bounds ∈ row space of
+    the levels above."""
     at = moment(3)
     chosen = settings(limits=Limits(torque_scale=share), solver=solver)
     controller = make_controller("hqp", robot(), chosen)
@@ -217,14 +222,15 @@ def test_hqp_meets_its_kkt_conditions(solver: Any, share: float) -> None:
     assert (bound > 0) == (share < 1.0)
 
 
-# ------------------------------------------------------------------ what they read
+# ------------------------------------------------------------------ the models that they use
 
 
 # ------------------------------------------------------------------ singular, failing, not finite
 
 
 def test_a_failing_qp_is_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No verified point: level 1 brakes within the bounds, the others inherit it; never an exception."""
+    """Without a verified point level 1 brakes within the bounds and the other levels inherit its torque; no
+    exception is raised."""
     nothing = QPSolution(np.full(7, np.nan), np.zeros(7), float("inf"), "no idea", 1.0)
     monkeypatch.setattr(hqp, "solve_qp", lambda *_: nothing)
     at = moment(4)
@@ -238,7 +244,8 @@ def test_a_failing_qp_is_data(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("name", RIVALS)
 def test_an_unusable_state_holds_the_torque(name: str) -> None:
-    """NaN, infinite or absurd states and references: the last torque stays; the next good tick goes on."""
+    """For NaN, infinite or huge states and references the last torque is held; the controller continues at
+    the next valid tick."""
     at = moment(5)
     controller = make_controller(name, robot(), settings())
     good = controller.step(at.q, at.v, at.previews)
@@ -283,7 +290,8 @@ BAD: dict[str, Callable[[], Settings]] = {
 @pytest.mark.parametrize("name", RIVALS)
 @pytest.mark.parametrize("message", BAD)
 def test_wrong_settings_are_refused_and_change_nothing(name: str, message: str) -> None:
-    """InputError naming the field, and the next torque is that of a twin that was left alone."""
+    """An InputError names the field, and the next torque equals that of a second controller that was not
+    changed."""
     at = moment(7)
     controller, twin = (make_controller(name, robot(), settings()) for _ in range(2))
     for each in (controller, twin):
@@ -316,14 +324,14 @@ def change(which: str) -> Settings:
 
 
 def next_torques(controller: Controller, at: Moment, ticks: int) -> Array:
-    """Torques of a controller whose measured state stays where it is."""
+    """Returns the torques of a controller whose measured state is constant."""
     return np.array([controller.step(at.q, at.v, at.previews).tau for _ in range(ticks)])
 
 
 @pytest.mark.parametrize("which", ["stiffer", "one level off", "nominal"])
 @pytest.mark.parametrize("name", ["osf", "hqp"])
 def test_a_change_of_settings_does_not_jump(name: str, which: str) -> None:
-    """The torque goes on from where it is and reaches the new law's after half a second."""
+    """The torque is continuous and reaches that of the new settings after half a second."""
     at = moment(8)
     controller = make_controller(name, robot(), settings())
     start = controller.step(at.q, at.v, at.previews).tau
@@ -337,7 +345,7 @@ def test_a_change_of_settings_does_not_jump(name: str, which: str) -> None:
 
 
 def test_a_change_of_settings_does_not_jump_under_time_delay_estimation() -> None:
-    """The acceleration that TDEOSF asks for goes on from where it is; its torque is then continuous too."""
+    """The acceleration that TDEOSF demands is continuous, and so is its torque."""
     at = moment(8)
     controller = make_controller("tdeosf", robot(), settings())
     tau_0 = np.zeros(7)
@@ -352,7 +360,8 @@ def test_a_change_of_settings_does_not_jump_under_time_delay_estimation() -> Non
 
 @pytest.mark.parametrize("name", RIVALS)
 def test_levels_that_are_off_are_still_measured(name: str) -> None:
-    """With all levels off damping runs alone, errors of the tasks are still there, and they can come back."""
+    """With all levels off, only damping runs; the errors of the tasks are still measured, and the levels can
+    be enabled again."""
     at = moment(9)
     off = tuple(replace(level, enabled=False) for level in stack())
     controller = make_controller(name, robot(), settings(stack=off))

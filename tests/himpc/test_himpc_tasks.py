@@ -1,4 +1,4 @@
-"""Every kind of task: its Jacobian is the derivative of its value, and its rows reach the torque."""
+"""Every kind of task: its Jacobian is the derivative of its value, and the torque depends on its rows."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def robot_of(name: str) -> Robot:
 
 
 def tasks_of(robot: Robot, rng: np.random.Generator) -> list[Task]:
-    """One task of every class, on links that are drawn at random."""
+    """Returns one task of every class, on randomly chosen links."""
     frame, root = (str(each) for each in rng.choice(robot.frames, 2, replace=False))
     axes = str(rng.choice(["xyz", "xy", "z"]))
     normal = tuple(rng.normal(size=3).tolist())
@@ -58,13 +58,13 @@ def tasks_of(robot: Robot, rng: np.random.Generator) -> list[Task]:
 
 
 def test_every_class_is_among_them() -> None:
-    """A kind of task that comes along is to be listed above."""
+    """The list above must contain every class of task."""
     made = {type(task) for task in tasks_of(robot_of("iiwa14"), np.random.default_rng(0))}
     assert made == {kind for each in KINDS.values() for kind in each.makes}
 
 
 def change(after: Array, before: Array) -> Array:
-    """after ⊖ before, of coordinates or of rotations."""
+    """Returns after ⊖ before, for coordinates or rotations."""
     return pin.log3(after @ before.T) if after.ndim == 2 else after - before
 
 
@@ -72,7 +72,8 @@ def change(after: Array, before: Array) -> Array:
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_jacobians_are_derivatives(name: str, seed: int) -> None:
-    """Central differences of every kind's value along every joint, at the measured state and at a knot."""
+    """The Jacobian equals central differences of the value along every joint, at the measured state and at a
+    knot."""
     robot, rng = robot_of(name), np.random.default_rng(seed)
     data, n = robot.model.createData(), robot.n
     q, knot = rng.uniform(-1.5, 1.5, (2, n))
@@ -90,7 +91,7 @@ def test_jacobians_are_derivatives(name: str, seed: int) -> None:
         for place, where in enumerate((q, knot)):
             value = task.value(at(where))
             if isinstance(task, Pointing) and np.linalg.norm(value) > 3.0:
-                continue  # next to the opposite direction there is no derivative
+                continue  # near the opposite direction the value is not differentiable
             for joint, nudge in enumerate(H * np.eye(n)):
                 moved = change(task.value(at(where + nudge)), task.value(at(where - nudge))) / (2 * H)
                 if moved.size != m:
@@ -104,7 +105,8 @@ def test_jacobians_are_derivatives(name: str, seed: int) -> None:
 
 
 def test_the_centre_of_mass_is_that_of_what_moves() -> None:
-    """Baxter's torso and head, 36.3 kg, are fixed to the world and left out, as the task says."""
+    """The centre of mass does not include Baxter's torso and head, 36.3 kg, which are fixed to the world; the
+    task's docstring says so."""
     robot = robot_of("baxter")
     model, data = robot.model, robot.model.createData()
     assert model.inertias[0].mass == pytest.approx(36.3, abs=0.05)
@@ -117,7 +119,8 @@ def test_the_centre_of_mass_is_that_of_what_moves() -> None:
 
 
 def test_pointing_is_told_by_its_angle() -> None:
-    """‖x‖ is the angle between axis and point; it is zero where the target starts, and finite everywhere."""
+    """‖x‖ is the angle between axis and direction to the point; it is zero at the initial target, and finite
+    everywhere."""
     robot = robot_of("iiwa14")
     task, data = Pointing(name="look"), robot.model.createData()
     here = Configuration(robot, data, robot.home, np.zeros(7))
@@ -157,4 +160,4 @@ def test_every_kind_says_what_it_is() -> None:
         assert len(kind.makes) == len(kind.suffixes)
 
 
-# ------------------------------------------------------------------ rows that the kernel does not know
+# ------------------------------------------------------------------ rows that are not built into the kernel

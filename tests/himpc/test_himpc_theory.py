@@ -1,4 +1,4 @@
-"""The equations run without a compiler: what is printed needs nothing that is compiled."""
+"""The printed equations run without Numba."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ print(layout_of(robot, settings.stack).size)
 
 
 def test_a_cascade_is_solved_where_numba_is_not_installed() -> None:
-    """Tasks, references, limits, prediction, cascade, missions and rows of telemetry."""
+    """Tasks, references, limits, prediction, cascade, missions and rows of telemetry work without Numba."""
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_NUMBA], capture_output=True, text=True, cwd=HERE.parents[1]
     )
@@ -68,7 +68,7 @@ def test_a_cascade_is_solved_where_numba_is_not_installed() -> None:
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.integers(1, 12))
 @settings(max_examples=20)
 def test_the_compiled_filter_of_a_target_is_the_printed_one(seed: int, rotates: bool, N: int) -> None:
-    """The same motion to rounding, wherever the hand goes, and the same rest."""
+    """Both filters give the same motion up to rounding, and come to rest at the same time."""
     rng = np.random.default_rng(seed)
     caps = Caps(*rng.uniform((0.1, 0.5, 10.0), (2.0, 8.0, 200.0)))
     start = exp3(rng.normal(0, 1, 3)) if rotates else rng.normal(0, 1, 3)

@@ -1,4 +1,5 @@
-"""The compiled tick: its kinematics are Pinocchio's, and its torques those of the printed route."""
+"""The compiled tick: its kinematics agree with Pinocchio's, and its torques with those of the printed
+route."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def random_tree(seed: int) -> Robot:
-    """A tree of revolute and prismatic joints about any axis, each on any link before it; read in this
-    process, since it is no stranger's."""
+    """Returns a tree of revolute and prismatic joints about random axes, each on a random earlier link. It is
+    read in this process, because the file is not from an untrusted source."""
     rng = np.random.default_rng(seed)
 
     def joint(number: int) -> str:
@@ -87,7 +88,7 @@ def test_kinematics_are_pinocchio_s(seed: int) -> None:
     assert controller.kernel is not None
     np.testing.assert_allclose(controller.kernel.arena.f["B"][0, :6], J, atol=1e-12)
     away = pin.log3(place.rotation @ turn.T)
-    if np.linalg.norm(away) < np.pi - 0.02:  # Pinocchio's own formula loses digits next to π
+    if np.linalg.norm(away) < np.pi - 0.02:  # Pinocchio's own formula is inaccurate near π
         np.testing.assert_allclose(plan.errors["orientation"], away, atol=1e-12)
     np.testing.assert_allclose(pin.exp3(plan.errors["orientation"]), place.rotation @ turn.T, atol=1e-12)
 
@@ -105,7 +106,8 @@ def a_tick_later(hierarchy: Hierarchy, seed: int) -> Hierarchy:
 @given(seeds, st.integers(2, 9), st.integers(1, 8), st.integers(1, 4), st.sampled_from([1.0, 5.0, 30.0]))
 @settings(max_examples=150)
 def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels: int, room: float) -> None:
-    """With last tick's active rows the optimum meets the literal KKT conditions and the explicit route."""
+    """With the active rows of the previous tick, the optimum satisfies the literal KKT conditions and agrees
+    with the explicit route."""
     hierarchy = random_hierarchy(seed, n, N, levels, room=room, even=True)
     before = {solution.name: solution for solution in hierarchy.solve()}
     later = a_tick_later(hierarchy, seed)
@@ -116,7 +118,8 @@ def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_optimum_does_not_depend_on_where_it_started(seed: int) -> None:
-    """From last tick's rows, from none and from rows that press the wrong way the increments are the same."""
+    """The increments are the same with the active rows of the previous tick, with none, and with multipliers
+    of the wrong sign."""
     hierarchy = random_hierarchy(seed, 7, 6, 3, even=True)
     cold = hierarchy.solve()
     warm = {solution.name: solution for solution in cold}
@@ -132,7 +135,7 @@ def test_the_optimum_does_not_depend_on_where_it_started(seed: int) -> None:
 @given(seeds)
 @settings(max_examples=20)
 def test_the_kernel_s_references_are_the_printed_ones(law: Literal["uniform", "eased"], seed: int) -> None:
-    """A curve that the kernel evaluates is the one that previews itself, at any time, phase and period."""
+    """A curve that the kernel evaluates agrees with its own preview, at all times, phases and periods."""
     rng = np.random.default_rng(seed)
     robot = load_robot("planar3")
     stack = (Level((FramePosition(name="position", axes="xy"),)), Level((Posture(name="posture"),)))

@@ -1,4 +1,4 @@
-"""HIQP, NHIMPC and the weighted controller: what each puts in the place of a part of HIMPC."""
+"""HIQP, NHIMPC and the weighted controller: their differences from HIMPC."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ VARIANTS = {"hiqp": HIQP, "nhimpc": NHIMPC, "weighted": Weighted}
 
 
 def moved(robot: Robot, N: int) -> dict[str, Preview]:
-    """A target 5 cm away that moves at 0.3 m/s: the first plan is far from the prediction before it."""
+    """Returns a target 5 cm away that moves at 0.3 m/s: the first plan then differs strongly from the
+    prediction before it."""
     previews = holds(robot, N)
     there = previews["position"]
     velocity = np.tile([0.0, 0.3, -0.1], (N + 1, 1))
@@ -48,7 +49,7 @@ def first_plan(controller: HIMPC, previews: dict[str, Preview]) -> Plan:
 
 
 def alone(settings: Settings, levels: int) -> Settings:
-    """The settings with the first levels on, and no damping level."""
+    """Returns the settings with only the first levels enabled, and no damping level."""
     stack = tuple(replace(level, enabled=place < levels) for place, level in enumerate(settings.stack))
     return replace(settings, stack=stack, damping=False)
 
@@ -61,7 +62,7 @@ def test_a_variant_is_made_by_its_name(iiwa: Robot, name: str) -> None:
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(iiwa: Robot, name: str) -> None:
-    """As for HIMPC: no exception, no NaN, no torque beyond its bound."""
+    """For any state the variants raise no exception, and no torque is NaN or beyond its bound."""
     controller = make_controller(name, iiwa, iiwa_settings(iiwa))
     rng = np.random.default_rng(0)
     for size in (0.1, 10.0, 1e4, 1e12, np.nan, 1.0):
@@ -74,7 +75,8 @@ def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(iiwa: Robot, name:
 
 
 def test_hiqp_is_himpc_with_one_knot(iiwa: Robot) -> None:
-    """To the bit, over many ticks, whatever horizon the settings name, also after a change of it."""
+    """The torques are bitwise equal over many ticks for every horizon of the settings, also after a change of
+    it."""
     one = HIMPC(iiwa, iiwa_settings(iiwa, horizon=1))
     hiqp = HIQP(iiwa, iiwa_settings(iiwa, horizon=5))
     v = np.linspace(0.6, -0.6, 7)
@@ -93,7 +95,8 @@ def test_hiqp_is_himpc_with_one_knot(iiwa: Robot) -> None:
 
 
 def own_leak(robot: Robot, settings: Settings, plan: Plan) -> float:
-    """‖J_p(q_{k+j|k}) M̄⁻¹(Δτ_i − Δτ_p)‖∞: (33) with the Jacobians along the plan's own prediction."""
+    """Returns ‖J_p(q_{k+j|k}) M̄⁻¹(Δτ_i − Δτ_p)‖∞: (33) with the Jacobians along the plan's own
+    prediction."""
     along = Configuration(robot, robot.model.createData(), plan.q[0], plan.q[0], plan.q[1:-1])
     leak = 0.0
     for p, level in enumerate(settings.stack[:-1]):
@@ -105,7 +108,8 @@ def own_leak(robot: Robot, settings: Settings, plan: Plan) -> float:
 
 
 def test_nhimpc_keeps_the_priorities_along_its_own_prediction(iiwa: Robot) -> None:
-    """(33) holds with the Jacobians of the plan itself; HIMPC's, of the plan before, break it there."""
+    """(33) holds with the Jacobians along the plan itself; HIMPC, which uses those of the previous plan,
+    violates it."""
     settings = iiwa_settings(iiwa, horizon=20)
     previews = moved(iiwa, 20)
     nonlinear, linear = (
@@ -127,7 +131,7 @@ def test_one_iteration_of_nhimpc_is_himpc(iiwa: Robot) -> None:
 
 
 def test_the_tolerance_of_nhimpc_is_kept(iiwa: Robot) -> None:
-    """A loose tolerance saves iterations; what it leaves is of its size."""
+    """A loose tolerance needs fewer iterations; its error is at most the tolerance."""
     settings, previews = iiwa_settings(iiwa, horizon=20), moved(iiwa, 20)
     exact = first_plan(NHIMPC(iiwa, settings, tolerance=1e-12), previews)
     loose = first_plan(NHIMPC(iiwa, settings, tolerance=1e-2), previews)
@@ -139,7 +143,7 @@ def test_the_tolerance_of_nhimpc_is_kept(iiwa: Robot) -> None:
 
 
 def test_a_level_fades_in_as_fast_as_under_himpc(iiwa: Robot) -> None:
-    """Iterations are no time: a level switched on has the same weight at every tick."""
+    """The weight of a level that was just enabled grows with each tick, not with each iteration."""
     settings = iiwa_settings(iiwa)
     plans = []
     for kind in (HIMPC, NHIMPC):
@@ -159,7 +163,7 @@ def test_a_level_fades_in_as_fast_as_under_himpc(iiwa: Robot) -> None:
 
 @given(seed=st.integers(0, 10_000), levels=st.integers(1, 4))
 def test_the_weighted_problem_is_the_sum_of_the_costs(seed: int, levels: int) -> None:
-    """H and f of the one problem are the sums of the levels', and so is its value at any U."""
+    """H and f of the combined problem are the sums over the levels, and so is its cost at every U."""
     hierarchy = random_hierarchy(seed, n=5, N=4, levels=levels, even=True)
     one = sum_of_costs(hierarchy.problems)
     H, f = quadratic(one)
@@ -172,7 +176,7 @@ def test_the_weighted_problem_is_the_sum_of_the_costs(seed: int, levels: int) ->
 
 @given(seed=st.integers(0, 10_000))
 def test_a_level_with_a_horizon_of_its_own_sees_no_further(seed: int) -> None:
-    """Under one problem its residual beyond that horizon counts nothing, by either route."""
+    """In the combined problem, the level's residual beyond its own horizon has no effect, on both routes."""
     hierarchy = random_hierarchy(seed, n=5, N=4, levels=2, even=True)
     first, second = hierarchy.problems
     short = second._replace(knots=2, weighted_C=second.weighted_C[:2, :, :2])
@@ -202,7 +206,8 @@ def test_under_weights_the_order_of_the_levels_is_nothing(iiwa: Robot) -> None:
 
 
 def test_the_weighted_evidence_is_that_of_the_levels_above_alone(iiwa: Robot) -> None:
-    """Entry p is what this very controller does with the levels below p off: so its leak is honest."""
+    """Entry p equals the result of this controller with the levels below p disabled, as the documented leak
+    assumes."""
     settings, previews = iiwa_settings(iiwa), moved(iiwa, 5)
     plan = first_plan(Weighted(iiwa, settings), previews)
     for levels in (1, 2, 3):
@@ -216,7 +221,7 @@ def test_the_weighted_evidence_is_that_of_the_levels_above_alone(iiwa: Robot) ->
 
 
 def test_a_heavier_level_comes_closer_to_a_strict_one(iiwa: Robot) -> None:
-    """Level 1's cost under the common increments falls towards its optimum as its Q grows."""
+    """Level 1's cost under the common increments approaches its optimum as its Q grows."""
     previews, excess = moved(iiwa, 5), []
     for factor in (1.0, 1e2, 1e4):
         settings = iiwa_settings(iiwa)

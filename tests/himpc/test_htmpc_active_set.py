@@ -1,4 +1,5 @@
-"""The compiled dual method against a QP solver: same points, same multipliers, from cold and from warm."""
+"""The compiled dual method compared with a QP solver: the same points and multipliers, with and without a
+warm start."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ def rows_of(A: Array, lower: Array, upper: Array) -> ConstraintRows:
 def problem(
     rng: np.random.Generator, n: int, count: int, equal: int
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """A feasible QP with rows on both sides, some of them equal to others, some equalities."""
+    """Returns a feasible QP with bounds on both sides, some duplicate rows and some equalities."""
     root = rng.normal(size=(n, n))
     A = rng.normal(size=(count, n)) * 10.0 ** rng.uniform(-2, 1, (count, 1))
     A[: count // 4] = A[count // 2 : count // 2 + count // 4]
@@ -54,7 +55,7 @@ def test_points_and_residuals_are_those_of_a_solver(seed: int, n: int, count: in
 @settings(max_examples=40)
 @given(seed=st.integers(0, 10**6))
 def test_a_warm_start_ends_where_a_cold_one_does(seed: int) -> None:
-    """The same rows with other bounds, another gradient, and other rows at the end."""
+    """The next QPs have other bounds, another gradient, and other rows at the end."""
     rng = np.random.default_rng(seed)
     H, g, A, lower, upper = problem(rng, 12, 40, 1)
     warm, cold = ActiveSetSolver(), ActiveSetSolver()

@@ -1,4 +1,4 @@
-"""Closed-form clearances: by hand, against finite differences and against a collision library."""
+"""Closed-form clearances: compared with values by hand, finite differences and a collision library."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_gradients_of_the_distances(robot: Robot) -> None:
 
 
 def test_distances_by_hand(robot: Robot) -> None:
-    """A ball beside the tool, the floor below it, and a ball around it."""
+    """The tool's distances to a ball next to it, to the floor and to a ball around it are as expected."""
     at = point(robot, robot.home)
     radius = next(sphere.radius for sphere in covering_spheres(robot) if sphere.link == "tool")
     x, y, z = at
@@ -90,7 +90,7 @@ def test_other_robots_are_covered_along_their_links() -> None:
     assert model.clearances(arm.home[None], 10.0).distance.min() > 0.5
 
 
-# ------------------------------------------------------------------ the library as oracle
+# ------------------------------------------------------------------ comparison with the library
 
 
 places = st.tuples(*3 * [st.floats(-2.0, 2.0)])
@@ -114,7 +114,7 @@ def test_clearances_are_those_of_the_collision_library(
     height: float,
     within: float,
 ) -> None:
-    """Distances, signs and pairs, near, touching and deep inside."""
+    """Distances, signs and pairs agree, for separate, touching and deeply penetrating shapes."""
     robot = load_robot(name)
     obstacles = (
         Floor("floor", height),

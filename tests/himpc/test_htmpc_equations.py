@@ -1,4 +1,5 @@
-"""The parts of HTMPC against independent evaluation: prediction (4), costs (8) and (10), rows (7d), (12)."""
+"""The parts of HTMPC compared with independent evaluations: prediction (4), costs (8) and (10), rows (7d),
+(12)."""
 
 from __future__ import annotations
 
@@ -77,7 +78,7 @@ def tick_of(robot: Robot, **changes: object) -> SharedStep:
 
 
 def slopes(at: Iterate, level: Tracking) -> Array:
-    """∂e_k/∂u, (N, m, N·n)."""
+    """Returns ∂e_k/∂u, (N, m, N·n)."""
     J, T_q = at.jacobian(level), integrator(4, 0.1).T_q
     return np.einsum("ks,kmj->kmsj", T_q, J).reshape(*J.shape[:2], -1)
 
@@ -148,7 +149,7 @@ def test_a_joint_beyond_its_range_is_sent_back(robot: Robot) -> None:
 
 
 def test_motion_under_way_is_what_was_commanded(robot: Robot) -> None:
-    """Three plans, each followed for 0.1 s; over the last 0.17 s."""
+    """Three plans, each followed for 0.1 s; the motion over the last 0.17 s is computed."""
     rng = np.random.default_rng(4)
     plans, start = [], start_of(robot, 4)
     for _ in range(3):
@@ -181,7 +182,7 @@ def test_effort_is_the_sum_it_is_written_as(robot: Robot) -> None:
     numerical = numerical_gradient(lambda x: effort.relative(x.reshape(4, 9), plan)[0], U.ravel())
     np.testing.assert_allclose(slope, numerical, atol=1e-6)
     assert effort.relative(plan, plan)[0] == 0.0
-    # Both have the Hessian that is written down once.
+    # Both use the same Hessian.
     np.testing.assert_allclose(effort.hessian @ (U - plan).ravel(), slope, atol=1e-9)
 
 
@@ -271,7 +272,8 @@ def test_previews_of_positions_and_rotations_become_goals() -> None:
 
 
 def excess(start: Start, U: Array, dt: float, limits: MotionBounds) -> dict[str, float]:
-    """By how much inputs leave each kind of bound, worst joint and knot; measured on the motion itself."""
+    """Returns the largest violation of each kind of bound over joints and knots, computed from the motion
+    itself."""
     q, v = positions(start, U, dt), velocities(start, U, dt)
     change = np.diff(np.vstack([start.u, U]), axis=0)
     return {
@@ -283,7 +285,7 @@ def excess(start: Start, U: Array, dt: float, limits: MotionBounds) -> dict[str,
 
 
 def violation(rows: ConstraintRows, u: Array) -> float:
-    """By how much u leaves the bounds, largest row."""
+    """Returns the largest violation of the bounds by u over all rows."""
     value = rows.A @ u
     return max(0.0, float(np.maximum(rows.lower - value, value - rows.upper).max(initial=0.0)))
 
@@ -310,7 +312,7 @@ def test_rows_hold_exactly_where_the_motion_stays_inside(robot: Robot) -> None:
 
 
 def test_ramp_and_stop_rows_leave_a_way_on(robot: Robot) -> None:
-    """Inputs inside all rows can be continued by braking without leaving velocity or position bounds."""
+    """After inputs inside all rows, the robot can brake without leaving velocity or position bounds."""
     limits = bounds(robot, MotionLimits())
     rng, checked = np.random.default_rng(10), 0
     for case in range(400):
@@ -363,7 +365,7 @@ def test_guards_follow_12_and_11(robot: Robot) -> None:
 
 
 def test_guard_rows_always_contain_no_change(robot: Robot) -> None:
-    """Even where an intermediate level has used its tolerance, so that |e| > |e*|."""
+    """A zero step satisfies the guard rows, also if a level used its tolerance and |e| > |e*|."""
     tick = tick_of(robot)
     level = tracking(robot, tick.settings.stack[0], tick.settings)
     other = tracking(robot, tick.settings.stack[1], tick.settings)
@@ -376,7 +378,7 @@ def test_guard_rows_always_contain_no_change(robot: Robot) -> None:
         assert (rows.lower <= 0.0).all()
         assert (rows.upper >= 0.0).all()
         assert guard.gap(e) >= 0.0
-        # What a step took beyond e* is asked back where it is to be led back.
+        # With strict rows, an error beyond e* must be removed again.
         assert (guard.gap(e, strict=True) < 0.0) == (scale < 1.0)
     below = Problem(tick, other, (Guard(level, e),), True)
     rows = below.rows(at)

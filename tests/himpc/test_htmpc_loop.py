@@ -1,4 +1,4 @@
-"""HTMPC in its loop: bounds, evidence, determinism, recovery, live changes, reach, and its relatives."""
+"""HTMPC in its loop: bounds, evidence, determinism, recovery, live changes, reach, and its variants."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from robots.collision import Ball, Floor
 
 Array = np.ndarray
 FAR = np.array([-0.6, -0.7])  # out of reach behind the robot
-SIDE = np.array([1.1, 2.25])  # out of reach at the end of a long way
+SIDE = np.array([1.1, 2.25])  # out of reach, and far away
 NEAR = np.array([-0.3, 0.4])
 
 
@@ -35,7 +35,8 @@ def robot() -> Robot:
 
 
 def worst_ratios(robot: Robot, plans: list[VelocityPlan], path: Array) -> dict[str, float]:
-    """Largest use of each bound by what was applied; jerk as the change of input per control period."""
+    """Returns the largest use of each bound by the applied motion; jerk is the change of input per control
+    period."""
     limits = plans[0].bounds
     v = np.array([plan.command for plan in plans])
     u = np.array([plan.u[0] for plan in plans])
@@ -62,7 +63,8 @@ def ee_errors(robot: Robot, path: Array) -> Array:
 
 
 def test_the_base_stops_where_the_arm_is_stretched(robot: Robot) -> None:
-    """An unreachable second level goes as far as the first one permits; a reachable one arrives."""
+    """The second level moves as far as the first one permits if its target is unreachable, and arrives at a
+    reachable target."""
     reach = 1.863  # m, checked against the geometry in tests/robots
     height_free = np.linalg.norm(FAR - point(robot, robot.home)[:2])
     assert height_free > reach
@@ -70,7 +72,7 @@ def test_the_base_stops_where_the_arm_is_stretched(robot: Robot) -> None:
     assert ee_errors(robot, path).max() < 5e-3
     stretched = np.linalg.norm(point(robot, robot.home)[:2] - path[-1, :2])
     assert reach - 0.05 < stretched < reach + 5e-3
-    # It stands on the line towards its goal as near as geometry lets it, and it stands.
+    # The base is at rest on the line towards its goal, as near as the geometry permits.
     assert np.linalg.norm(path[-1, :2] - FAR) < height_free - reach + 0.08
     assert np.abs(plans[-1].v[0, :2]).max() < 0.02
     plans, path = closed_loop(HTMPC(robot, mobile_settings()), at_home(robot, NEAR), robot.home, 6.0)
@@ -134,7 +136,8 @@ def test_same_input_same_output(robot: Robot) -> None:
 
 
 def test_formulation_of_the_paper_and_cost_constraint_run(robot: Robot) -> None:
-    """Softened bounds keep the motion near them, the command inside; (11) keeps the cost within its δ_J."""
+    """With softened bounds the motion stays near its bounds and the command inside them; (11) keeps the cost
+    within its δ_J."""
     for changes, least in (
         ({"formulation": "paper", "stack": mobile_stack(1.0)}, 0.3),
         ({"lexicographic": "cost"}, 0.1),
@@ -149,7 +152,7 @@ def test_formulation_of_the_paper_and_cost_constraint_run(robot: Robot) -> None:
         assert max(plan.kkt_residual for plan in plans) <= 1e-6
 
 
-# ------------------------------------------------------------------ rough treatment
+# ------------------------------------------------------------------ invalid and extreme input
 
 
 def test_a_start_outside_every_bound_recovers(robot: Robot) -> None:
@@ -185,7 +188,7 @@ def test_limits_tightened_while_moving_are_reached_by_braking(robot: Robot) -> N
 
 
 def test_every_setting_changes_live_without_a_jump(robot: Robot) -> None:
-    """Whatever is changed, velocities stay continuous and accelerations inside their bounds."""
+    """After every change velocities are continuous and accelerations inside their bounds."""
     first = mobile_settings()
     order = (
         replace(first, horizon=14),
@@ -255,7 +258,8 @@ def test_a_reference_that_is_not_finite_makes_it_brake(robot: Robot) -> None:
 
 
 def test_noise_and_wild_states_never_break_it(robot: Robot) -> None:
-    """Centimetres of noise, then states far outside every bound: finite plans, verified points."""
+    """With centimetres of noise, and with states far outside every bound, plans are finite and points
+    verified."""
     controller = HTMPC(robot, mobile_settings(obstacles=(Ball("ball", (1.0, 1.0, 0.8), 0.2),)))
     rng = np.random.default_rng(5)
     references = at_home(robot, SIDE)
@@ -276,7 +280,7 @@ def test_noise_and_wild_states_never_break_it(robot: Robot) -> None:
 
 
 def test_an_obstacle_in_the_way_is_not_entered(robot: Robot) -> None:
-    """The base drives past a ball that appears in front of it at full speed."""
+    """The base passes a ball that appears in front of it at full speed, without touching it."""
     ball = Ball("ball", (2.2, 0.0, 0.3), 0.2)
     goal = {
         "ee": Hold(point(robot, robot.home) + np.array([1.2, 0.0, 0.0])),
@@ -323,7 +327,8 @@ def test_the_arm_keeps_clear_of_its_base(robot: Robot) -> None:
 
 
 def test_delay_compensation_pays(robot: Robot) -> None:
-    """Servos with 50 ms of lag and measurement noise: with compensation the tool's error is much smaller."""
+    """With 50 ms of lag in the servos and measurement noise, compensation makes the tool's error much
+    smaller."""
     plant_settings = VelocityPlantSettings(mode="ideal", lag_ms=50.0, position_noise=1e-3)
     found = {}
     for delay in (0.0, 0.05):
@@ -366,11 +371,11 @@ def test_fixed_arms_position_then_orientation(name: str) -> None:
     assert sum(plan.unsolved for plan in plans) == 0
 
 
-# ------------------------------------------------------------------ relatives
+# ------------------------------------------------------------------ variants
 
 
 def test_without_preview_the_switch_comes_as_a_surprise(robot: Robot) -> None:
-    """Until the switch is seen HTMPC_WPT stays; HTMPC has left by then."""
+    """HTMPC_WPT does not move before the switch; HTMPC has started by then."""
     moved = []
     for kind in (HTMPC, HTMPC_WPT):
         controller = kind(robot, mobile_settings())
@@ -389,7 +394,8 @@ def test_single_task_ignores_lower_levels(robot: Robot) -> None:
 
 
 def test_htidkc_keeps_its_order_and_bounds(robot: Robot) -> None:
-    """Its first level may drift by regularisation near the singularity, but its QPs keep their order."""
+    """Near the singularity its first level may drift because of regularisation, but its QPs keep their
+    order."""
     settings = mobile_settings(rate_hz=50.0, horizon=1, dt=0.02)
     plans, path = closed_loop(HTIDKC(robot, settings), at_home(robot, FAR), robot.home, 6.0)
     ratios = worst_ratios(robot, plans, path)

@@ -1,4 +1,5 @@
-"""Lexicographic optimality: HTMPC run to convergence against Algorithm 1 solved by a general NLP solver."""
+"""Lexicographic optimality: HTMPC with many iterations, compared with Algorithm 1 solved by a general NLP
+solver."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ def mobile() -> Robot:
 
 
 def converged(settings: HTMPCSettings) -> HTMPCSettings:
-    """Nothing but (9) and (12), many iterations. From rest the proximal effort is the absolute one."""
+    """Returns settings with (9) and (12) alone and many iterations. From rest, the proximal effort equals the
+    absolute one."""
     return replace(
         settings,
         limits=FREE,
@@ -40,7 +42,8 @@ def converged(settings: HTMPCSettings) -> HTMPCSettings:
 
 
 def planar_problem(robot: Robot, y: float) -> tuple[HTMPCSettings, Oracle, dict[str, Hold]]:
-    """Level 1: the tip's x; level 2: its y, out of reach for a y far away."""
+    """Returns a problem in which level 1 controls the tip's x and level 2 its y, which is unreachable for a
+    large y."""
     stack = (
         Level((FramePosition(name="x", axes="x"),), Q=20.0),
         Level((FramePosition(name="y", axes="y"),), Q=20.0),
@@ -54,7 +57,8 @@ def planar_problem(robot: Robot, y: float) -> tuple[HTMPCSettings, Oracle, dict[
 
 @pytest.mark.parametrize("y", [0.35, 0.55, 0.9])
 def test_agrees_with_algorithm_1(planar: Robot, y: float) -> None:
-    """Level 1 is the oracle's; level 2 lies between the oracle's with the tolerance used and not used."""
+    """Level 1 agrees with the reference; level 2 is between the reference with and without use of the
+    tolerance."""
     settings, oracle, references = planar_problem(planar, y)
     plan = HTMPC(planar, settings).step(planar.home, np.zeros(3), previews(references, 0.0, settings))
     start = np.zeros((3, 3))
@@ -67,7 +71,7 @@ def test_agrees_with_algorithm_1(planar: Robot, y: float) -> None:
     assert best - 1e-6 * worst <= found <= worst * 1.01
     assert plan.leak is not None
     assert plan.leak <= DELTA + 1e-9
-    # The order matters at all: alone, level 2 would spoil level 1.
+    # The order has an effect: alone, level 2 would increase the error of level 1.
     alone = oracle.solve(10.0, start)[1]
     assert (np.abs(oracle.errors(0, alone)) - np.abs(oracle.errors(0, strict[0]))).max() > 5 * DELTA
 
@@ -112,7 +116,7 @@ def test_agrees_with_algorithm_1_on_the_mobile_manipulator(mobile: Robot) -> Non
 
 
 def test_an_unreachable_first_level_is_not_given_up_for_the_second(planar: Robot) -> None:
-    """Level 1 out of reach, so its errors are large: level 2 may still not add to them."""
+    """If level 1 is out of reach, its errors are large; level 2 does not increase them."""
     settings, _, _ = planar_problem(planar, 0.3)
     settings = replace(settings, delta_m=1e-4)
     references = {"x": Hold(np.array([3.0])), "y": Hold(np.array([0.9]))}
@@ -123,7 +127,7 @@ def test_an_unreachable_first_level_is_not_given_up_for_the_second(planar: Robot
 
 
 def test_three_levels_keep_their_order() -> None:
-    """Any number of levels: each one added leaves all above it within δ."""
+    """With three levels, each added level keeps all levels above it within δ."""
     arm = load_robot("panda")
     stack = (
         Level((FramePosition(name="tip"),), Q=10.0),

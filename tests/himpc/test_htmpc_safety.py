@@ -1,4 +1,4 @@
-"""Whatever is measured, at whatever tick: every command is finite and inside its bounds."""
+"""For every measurement at every tick, the command is finite and inside its bounds."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def robot() -> Robot:
 
 
 def assert_permitted(robot: Robot, plan: VelocityPlan, period: float) -> None:
-    """All velocities that the servos get in this period, and the acceleration between them."""
+    """Checks all velocities that the servos receive in this period, and the accelerations between them."""
     every = (plan.command, plan.u, plan.q, plan.v, *(level.final for level in plan.levels))
     assert all(np.isfinite(each).all() for each in every)
     for share in (0.01, 0.1, 0.5, 1.0):
@@ -52,7 +52,7 @@ def assert_permitted(robot: Robot, plan: VelocityPlan, period: float) -> None:
 
 @st.composite
 def measurements(draw: st.DrawFn) -> tuple[dict[int, float], dict[int, float]]:
-    """What is added to the positions and velocities of some joints."""
+    """Returns offsets for the measured positions and velocities of some joints."""
     wrong = st.dictionaries(st.integers(0, 8), st.sampled_from(HOSTILE), max_size=3)
     return draw(wrong), draw(wrong)
 
@@ -71,7 +71,8 @@ def measurements(draw: st.DrawFn) -> tuple[dict[int, float], dict[int, float]]:
 def test_bounds_hold_on_every_command(
     robot: Robot, kind: Any, readings: list[tuple[dict[int, float], dict[int, float]]], **changes: Any
 ) -> None:
-    """Calm ticks, hostile ones, and calm ones again."""
+    """Every command is within its bounds for valid measurements, for invalid ones, and for valid ones
+    again."""
     balls = (Ball("ball", (1.0, 1.0, 0.8), 0.2),) if changes.pop("obstacle") else ()
     controller = kind(robot, mobile_settings(horizon=5, obstacles=balls, **changes))
     references, period = at_home(robot, NEAR), controller.settings.period
@@ -84,7 +85,7 @@ def test_bounds_hold_on_every_command(
                 seen[joint] += value
         plan = controller.step(seen_q, seen_v, previews(references, tick * period, controller.settings))
         assert_permitted(robot, plan, period)
-        # The robot itself does what it is told, from where it is.
+        # The robot follows the command from its true state.
         q, v = q + 0.5 * period * (v + plan.command), plan.command
 
 
@@ -92,7 +93,8 @@ def test_bounds_hold_on_every_command(
 @pytest.mark.parametrize("speed", [1e200, 1e150, 1e6, 300.0])
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_huge_speed_is_forgotten_at_the_next_tick(robot: Robot, formulation: Any, speed: float) -> None:
-    """It poisoned every later command; now the robot stays within centimetres of one that never saw it."""
+    """In an earlier version one huge measured speed changed all later commands; now the robot stays within
+    centimetres of one without this measurement."""
     calm, hit = (HTMPC(robot, mobile_settings(formulation=formulation)) for _ in range(2))
     references = at_home(robot, NEAR)
     states = [(robot.home.copy(), np.zeros(9)) for _ in range(2)]
@@ -122,7 +124,7 @@ def test_hostile_references_leave_the_bounds_alone(robot: Robot, kind: Any, form
 
 
 def test_a_push_beyond_the_speed_limit_is_not_commanded_on(robot: Robot) -> None:
-    """The servos are told a speed inside the limit, whatever speed the push gave the robot."""
+    """The commanded speed is inside the limit although the robot was pushed to a higher speed."""
     controller = HTMPC(robot, mobile_settings())
     references = at_home(robot, NEAR)
     for speed in (0.0, 3.0, 0.0):
@@ -134,7 +136,8 @@ def test_a_push_beyond_the_speed_limit_is_not_commanded_on(robot: Robot) -> None
 
 @pytest.mark.parametrize(("before", "after"), [(50.0, 10.0), (10.0, 50.0)])
 def test_a_change_of_rate_is_not_taken_for_a_jump(robot: Robot, before: float, after: float) -> None:
-    """Without a usable state the robot is where the last plan led in the period of that time."""
+    """Without a usable state, the robot is assumed to have followed the last plan for the period that was set
+    then."""
     controller = HTMPC(robot, mobile_settings(rate_hz=before))
     references = at_home(robot, NEAR)
     plan = controller.step(robot.home, np.full(9, 0.1), previews(references, 0.0, controller.settings))

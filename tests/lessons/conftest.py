@@ -1,4 +1,4 @@
-"""The scene most tests of the session start from, and all runs of the course."""
+"""The scene with which most tests of the session start, and all runs of the course."""
 
 from __future__ import annotations
 

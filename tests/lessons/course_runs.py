@@ -1,4 +1,4 @@
-"""Every run of the course, made once for all that is measured of it."""
+"""All runs of the course, computed once for all tests that measure them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lessons.teaching.measure import Measure, Signal
 
 
 class CourseRuns(NamedTuple):
-    """What the check says of all lessons, and the numbers of `QUOTED` and the interventions by run."""
+    """The check's verdicts of all lessons, and the values of `QUOTED` and of the interventions, by run."""
 
     verdicts: list[Verdict]
     values: dict[RunSpec, dict[Measure, float]]
@@ -28,7 +28,8 @@ END = Measure(Signal("t"))
 
 
 def course_runs() -> CourseRuns:
-    """Every run once, but for those that end early: the check stops there, and sentences tell of the rest."""
+    """Computes every run once. Runs that end early are computed again to their full duration, because the
+    check stops at their end and sentences quote later values."""
     wanted: dict[RunSpec, dict[Measure, None]] = {}
     for each in QUOTED:
         for spec in specs(each):
@@ -57,5 +58,6 @@ def course_runs() -> CourseRuns:
 
 
 def whole(spec: RunSpec, end: float) -> bool:
-    """Whether a run's last period, which begins at `end` (s), is the last one of its duration."""
+    """Whether a run was completed: its last period, which begins at `end` (s), is the last one of its
+    duration."""
     return spec.duration is not None and end > spec.duration - 1.5 * spec.prepared().settings.T_s

@@ -1,7 +1,7 @@
-"""Every sentence that gives a reason, wherever a user reads one, with the place where it stands.
+"""Finds every sentence that gives a reason, in all texts that users read, with its place.
 
-`passages` walks what the page, the command line and the site say; `causal` picks the sentences that give a
-reason.
+`passages` yields the texts of the page, the command line and the site; `causal` selects the sentences that
+give a reason.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ DOCUMENTS = {
     "gallery": "docs/lessons/README.md",
     **{name: f"docs/{name}.md" for name in _IN_DOCS},
 }
-"""Name of a document in a place: its file. The changelog is none of them: it says what changed."""
+"""Name of a document in a place: its file. The changelog is not included, because it lists changes only."""
 
 CAUSE = re.compile(
     r"""
@@ -44,10 +44,10 @@ CAUSE = re.compile(
     """,
     re.VERBOSE | re.IGNORECASE,
 )
-"""Words that give a reason. *For* and a colon do so, too, and mean too much else."""
+"""Words that give a reason. *For* and a colon are not included, because they have many other meanings."""
 
 GIVEN = re.compile(r"\bgiven, not\b|\(given\b", re.IGNORECASE)
-"""How a sentence says that nobody here measured it."""
+"""Marks a sentence whose reason was not measured here."""
 
 _PROGRAM = re.compile(r"```.*?```|\$\$.*?\$\$", re.DOTALL)
 _LABEL = re.compile(r"\*\*(?:Likely cause|Our evidence|See it)\.\*\*")
@@ -64,21 +64,23 @@ _END = re.compile(
 
 
 def sentences(text: str) -> list[str]:
-    """Of a text in Markdown, each in one line; formulas and programs of their own lines are left out."""
+    """Returns the sentences of a Markdown text, each in one line; displayed formulas and programs are left
+    out."""
     plain = _LABEL.sub("\n\n", _PROGRAM.sub(" … ", text))
     found = (" ".join(each.split()).strip("| ") for each in _END.split(plain) if each)
     return [each for each in found if each]
 
 
 def causal(text: str) -> list[str]:
-    """Its sentences that give a reason: they do not ask for it, and do not say that it is given."""
+    """Returns the sentences that give a reason, without questions and without reasons that are marked as
+    given."""
     found = [each for each in sentences(text) if CAUSE.search(each) and not GIVEN.search(each)]
     return [each for each in found if not each.endswith("?")]
 
 
 def of_step(step: Step) -> Iterator[str]:
-    """What a step says. What it offers as a prediction is not said; a claim's run under `fails_with` holds
-    what makes it false."""
+    """Yields the statements of a step. The options of a prediction are not statements; the run under a
+    claim's `fails_with` tests its reason."""
     yield from (step.text, step.do, step.why)
     if step.prediction is not None:
         yield step.prediction.question
@@ -87,8 +89,8 @@ def of_step(step: Step) -> Iterator[str]:
 
 
 def passages() -> Iterator[tuple[str, str]]:
-    """(place, text) of all that is told; places as in `interventions.Intervention.at`, "exercise/name", or a
-    file of the source."""
+    """Yields (place, text) of all texts. The place is as in `interventions.Intervention.at`, "exercise/name",
+    or a source file."""
     for name in COURSE:
         lesson, more = load_lesson(name), further(name)
         yield name, lesson.card.question
@@ -117,7 +119,7 @@ def passages() -> Iterator[tuple[str, str]]:
 
 
 def _sources() -> Iterator[tuple[str, str]]:
-    """Words on the page and the command line; docstrings where the site shows them."""
+    """Yields texts of the page and the command line, and the docstrings that the site shows."""
     for top in (*PACKAGES, "app", "examples"):
         for path in sorted((ROOT / top).rglob("*.py")):
             place = path.relative_to(ROOT).as_posix()

@@ -1,8 +1,7 @@
-"""Sentences with a *because*, a *so* or a *since* that no intervention holds, and what holds them instead.
+"""Sentences with a reason that no intervention tests, and the tests that hold them instead.
 
-A sentence is named by its place and how it begins. What says anything that could be wrong names the test that
-holds it; only these kinds name none: a definition, an instruction to the reader, and what a part of the
-program is for.
+A sentence is named by its place and its beginning. Each names the test that holds it, except for three kinds
+that cannot be false: a definition, an instruction to the reader, and the purpose of a part of the program.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ class Exempt:
             "mathematics" (it follows from equations), "measured" (a test of its own takes the cause away), or
             "software" (what the program does).
         held_by: "file::test" that holds them, "" for the first three kinds.
-        sentences: (place, how it begins).
+        sentences: (place, beginning of the sentence).
     """
 
     kind: Kind
@@ -38,7 +37,7 @@ LESSONS, FURTHER, HIMPC = (
 
 # fmt: off
 TEXTS = (
-    # ---------------------------------------- nothing that could be wrong
+    # ---------------------------------------- sentences that cannot be false
     Exempt("instruction", "", (
         ("no-model-needed/3", "So start small, go up in small steps"),
         ("further/no-model-needed", "That is why $\\bar M$ is raised in small steps"),
@@ -55,7 +54,7 @@ TEXTS = (
         ("lessons/papers/disagreements.py", "So a number that differs need not be wrong"),
         ("lessons/papers/disagreements.py", "Here is every row that does not agree"),
     )),
-    # ---------------------------------------- what follows from equations
+    # ---------------------------------------- consequences of equations
     Exempt("mathematics", FURTHER + "an_equation_holds", (
         ("further/no-model-needed", "If $M$ and $n$ have hardly changed meanwhile"),
         ("further/no-model-needed", "They are real, since $M^{-1} \\bar M$ is similar"),
@@ -129,7 +128,7 @@ TEXTS = (
         ("deliveries/1", "So the factor between the two ways of working depends on the rule"),
         ("deliveries/1", "Two tasks at a time under the first rule are 2.1 times as fast"),
     )),
-    # ---------------------------------------- what the program does
+    # ---------------------------------------- behaviour of the program
     Exempt("software", LESSONS + "grade_attacks.py::test_a_table_of_grades_is_no_program_of_a_spreadsheet", (
         ("instructors", "A file that is not UTF-8 gets an error message in the table"),
     )),

@@ -1,4 +1,4 @@
-"""The same as `explanations_exempt` for words in the source: the reference, and what the program says."""
+"""The same as `explanations_exempt` for texts in the source: the reference, and messages of the program."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ REFERENCE = (
     Exempt("definition", "", (
         ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
         ("himpc/cascade/polish.py", "From the rows that a solver's point says bind"),
-        ("himpc/controllers/nhimpc.py", "J_i(q_{k+j|k}) in place of"),
+        ("himpc/controllers/nhimpc.py", "The problem is then nonlinear, because"),
         ("himpc/controllers/null_space_control.py", "There is no QP, so the KKT residual is NaN."),
         ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
         ("himpc/limits/braking.py", "How far the state rows must give way"),
-        ("himpc/tasks/pointing.py", "s = Rᵀ(c − p) is the point as the frame sees it"),
+        ("himpc/tasks/pointing.py", "s = Rᵀ(c − p) is the point in the frame's coordinates"),
         ("lessons/own/files.py", "Where in the file an exception came from"),
         ("lessons/own/folder.py", "Whether a path leads to below the folder"),
         ("lessons/papers/reproduce.py", "*agrees*: the ratio is within 10 % of 1"),
@@ -25,12 +25,11 @@ REFERENCE = (
         ("lessons/session/session.py", "seed: seed of the run; all randomness comes from it"),
     )),
     Exempt("purpose", "", (
-        ("robots/capsules.py", "Vertices modelled along z"),
-        ("robots/capsules.py", "Caps and mantle with vertices of their own"),
-        ("robots/catalog.py", "Angles in degrees here"),
+        ("robots/capsules.py", "Returns vertices that are modelled along z"),
+        ("robots/capsules.py", "Returns the mesh with separate vertices for caps and mantle"),
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
-        ("himpc/references/square_wave.py", "s: a switch counts as reached this much early"),
+        ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
         ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
         ("lessons/own/deadline.py", "How long it waited is asked from the first alarm on"),
         ("lessons/papers/himpc_paper/ablations.py", "All tasks in one cost, one step ahead"),
@@ -38,7 +37,7 @@ REFERENCE = (
         ("lessons/settings/assignments.py", "The controller comes first"),
         ("lessons/settings/missions.py", "Scenes whose tasks last for the whole run"),
     )),
-    # ---------------------------------------- what follows from equations
+    # ---------------------------------------- sentences that follow from equations
     Exempt("mathematics", (
         LESSONS + "derivations.py::test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar"
     ), (
@@ -63,15 +62,7 @@ REFERENCE = (
         ("himpc/cascade/white.py", "An orthonormal basis of √R ∘ span Z"),
     )),
     Exempt("mathematics", HIMPC + "rivals.py::test_hqp_meets_its_kkt_conditions", (
-        ("himpc/controllers/hqp.py", "Multiplied out, as here, no product of Jacobians is inverted"),
-    )),
-    Exempt("mathematics", HIMPC + "variants.py::test_a_heavier_level_comes_closer_to_a_strict_one", (
-        ("himpc/controllers/weighted.py", "Model, weights, bounds and hand-over are HIMPC's"),
-    )),
-    Exempt("mathematics", HIMPC + (
-        "variants.py::test_the_weighted_evidence_is_that_of_the_levels_above_alone"
-    ), (
-        ("himpc/controllers/weighted.py", "The leak thus tells, as for HIMPC"),
+        ("himpc/controllers/hqp.py", "This form needs no inverse of a product of Jacobians"),
     )),
     Exempt("mathematics", HTMPC + "equations.py::test_the_shifted_plan_has_the_old_plans_velocities", (
         ("himpc/htmpc/continuing.py", "Each is the mean of the old input over the new interval"),
@@ -80,19 +71,19 @@ REFERENCE = (
         ("himpc/htmpc/prediction.py", "The input is constant between knots"),
     )),
     Exempt("mathematics", HTMPC + "equations.py::test_ramp_and_stop_rows_leave_a_way_on", (
-        ("himpc/htmpc/rows.py", "Two groups see past the horizon"),
+        ("himpc/htmpc/rows.py", "Two groups of rows are about the time beyond the horizon"),
     )),
     Exempt("mathematics", HTMPC + "loop.py::test_htidkc_first_step_by_hand", (
-        ("himpc/htmpc/htidkc.py", "Level 0 minimises the violation of the bounds"),
+        ("himpc/htmpc/htidkc.py", "They form a box, one interval per joint"),
     )),
     Exempt("mathematics", HIMPC + (
         "errors.py::test_what_controllers_take_for_its_derivative_is_the_errors_own"
     ), (
-        ("himpc/tasks/orientation.py", "On two or three it is so along x̃"),
+        ("himpc/tasks/orientation.py", "On two or three axes ẋ is the derivative along x̃"),
     )),
     Exempt("mathematics", HIMPC + "references.py::test_a_dragged_position_keeps_its_caps_and_its_promises", (
-        ("himpc/references/target.py", "A target that a hand drags"),
-        ("himpc/references/target.py", "Each step holds one acceleration a"),
+        ("himpc/references/target.py", "A dragged target: filtered so that"),
+        ("himpc/references/target.py", "The acceleration a is constant in each step"),
     )),
     Exempt("mathematics", LESSONS + "geometry.py::test_the_box_is_where_the_rows_hold", (
         ("lessons/geometry/plane.py", "In that cut the cost of a level is"),
@@ -100,15 +91,15 @@ REFERENCE = (
     Exempt("mathematics", LESSONS + "geometry.py::test_geometry_and_solver_find_the_same_points", (
         ("lessons/scenes/plane.py", "The wrist is where joint 3 sits"),
     )),
-    # ---------------------------------------- what the program does
+    # ---------------------------------------- sentences about the program
     Exempt("software", ROBOTS + "mobile.py::test_ideal_kinematics_are_the_double_integrator", (
         ("robots/servo.py", "mode: \"ideal\": the velocity moves linearly"),
     )),
     Exempt("software", ROBOTS + "signals.py::test_configure_keeps_the_state_and_the_memory", (
-        ("robots/signals.py", "The memory is kept in time"),
+        ("robots/signals.py", "Commands are stored with their times"),
     )),
     Exempt("software", ROBOTS + "shapes.py::test_simplified_surfaces_stay_where_they_were", (
-        ("robots/simplify.py", "Vertices in one cell of a grid"),
+        ("robots/simplify.py", "Vertices whose normals point to different sides"),
     )),
     Exempt("software", ROBOTS + "urdf.py::test_continuous_becomes_unbounded_with_one_coordinate", (
         ("robots/urdf/joints.py", "Rewrites every joint so that"),
@@ -131,16 +122,16 @@ REFERENCE = (
         ("himpc/cascade/polish.py", "A row that blocks the way depends on none of those held"),
     )),
     Exempt("software", HIMPC + "controller.py::test_the_controller_sees_no_mass", (
-        ("himpc/kinematics/configuration.py", "Only geometry is read, no inertia or gravity"),
+        ("himpc/kinematics/configuration.py", "Only geometry is used, no inertia or gravity"),
     )),
     Exempt("software", HTMPC + "active_set.py::test_rows_that_contradict_each_other_are_found_out", (
-        ("himpc/htmpc/active_set.py", "The rows held are kept as combinations"),
+        ("himpc/htmpc/active_set.py", "A row that depends on them does not enlarge this basis, so"),
     )),
     Exempt("software", HTMPC + "loop.py::test_every_setting_changes_live_without_a_jump", (
         ("himpc/htmpc/htmpc.py", "`configure` changes settings and keeps that plan"),
     )),
     Exempt("software", HTMPC + "equations.py::test_too_many_coordinates_are_explained", (
-        ("himpc/htmpc/tracking.py", "InputError: they do not, so that no freedom is left"),
+        ("himpc/htmpc/tracking.py", "InputError: the sum is not less, so that no freedom is left"),
         ("himpc/htmpc/tracking.py", "joints: their sum must be smaller"),
     )),
     Exempt("software", HIMPC + "limits.py::test_tightened_limits_close_in_and_arrive", (

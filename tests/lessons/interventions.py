@@ -1,9 +1,9 @@
-"""Explanations tested by intervention: the cause is taken away, and the effect has to go.
+"""Explanations tested by intervention: the cause is taken away, and the effect must disappear.
 
-Each row quotes a sentence, names a run that shows the effect, what takes the cause away, and what is measured
-with it and without. `interventions_all` has all of them: the course's are in `interventions_tasks`,
-`interventions_limits` and `interventions_mobile`, the documents' in `interventions_documents`,
-those of sentences that a reader had refuted in `interventions_reader`.
+Each row quotes a sentence, names a run that shows the effect, the assignments that take the cause away, and
+the measured values with and without it. `interventions_all` has all of them: the course's are in
+`interventions_tasks`, `interventions_limits` and `interventions_mobile`, the documents' in
+`interventions_documents`, and those that replace refuted sentences in `interventions_reader`.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Intervention:
-    """A sentence that says what causes what.
+    """A sentence that names a cause and its effect.
 
     Attributes:
-        at: where it stands: "lesson/place" for a step, "further/lesson" for what its page derives, or the
-            name of a document of `test_lessons_interventions.DOCUMENTS`.
+        at: its place: "lesson/place" for a step, "further/lesson" for a derivation on the lesson's page, or
+            the name of a document of `test_lessons_interventions.DOCUMENTS`.
         says: the sentence, or the part of it that names the cause, word for word.
         measure: the effect.
         there: its range with the cause, in the measure's unit.
         without: assignments that take the cause away.
         gone: its range then; it does not overlap `there`.
-        of: assignments of the run that shows the effect, on top of the step's.
+        of: assignments of the run that shows the effect, in addition to the step's.
         on: the step or scene that is run, if it is not the step of `at`.
-        seconds: how long, if not as long as the step.
-        stays: the sentence says that this is *not* the cause: the effect is there without it, too.
+        seconds: duration, if it is not that of the step.
+        stays: the sentence says that this is *not* the cause: the effect also exists without it.
     """
 
     at: str
@@ -50,7 +50,7 @@ class Intervention:
 
     @property
     def runs(self) -> tuple[RunSpec, RunSpec]:
-        """With the cause, and without it."""
+        """The runs with the cause, and without it."""
         base = _base(self.on or self.at)
         if self.seconds is not None:
             base = replace(base, duration=self.seconds)
@@ -74,5 +74,5 @@ def of(
     until: float = math.inf,
     column: int | None = None,
 ) -> Measure:
-    """A measure in few words."""
+    """Returns a measure; the function abbreviates the constructors."""
     return Measure(Signal(name, unit, column), statistic, after, until)

@@ -1,4 +1,4 @@
-"""Every row there is."""
+"""All rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the glossary, the page of disagreements and the results say of causes."""
+"""Interventions for the causes in the glossary, on the page of disagreements and in the results."""
 
 from __future__ import annotations
 

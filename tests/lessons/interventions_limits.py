@@ -1,4 +1,5 @@
-"""What the lessons on limits, horizon, time, sensors and models say of causes, in the order of the course."""
+"""Interventions for the causes in the lessons on limits, horizon, time, sensors and models, in the order of
+the course."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What the lessons on a mobile robot, and the one on your own, say of causes, in the order of the course."""
+"""Interventions for the causes in the lessons on a mobile robot and on a user's own robot, in the order of
+the course."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Sentences that stand where an independent reader had refuted another one by an experiment."""
+"""Interventions for sentences that replaced others which an independent reader had refuted by an
+experiment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What the lessons on tasks, priorities and singular poses say of causes, in the order of the course."""
+"""Interventions for the causes in the lessons on tasks, priorities and singular poses, in the order of the
+course."""
 
 from __future__ import annotations
 

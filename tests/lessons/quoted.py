@@ -1,7 +1,7 @@
-"""What the course says in numbers beside its claims: what such a number is, and the runs that give it.
+"""Numbers in the course's texts besides those of its claims, and the runs that measure them.
 
-A claim says "at most" or "at least"; a sentence like "it dips by a few millimetres" says both. `quoted_all`
-holds every such number of the steps' texts that a run gives; `course_runs` makes all the runs.
+A claim says "at most" or "at least"; a sentence like "it dips by a few millimetres" implies both bounds.
+`quoted_all` has every such number of the steps' texts that a run gives; `course_runs` computes all the runs.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ class Quoted:
 
     Attributes:
         step: "lesson/place" of the step.
-        phrase: of its texts, its question or its claims.
-        measure: what the phrase speaks of.
-        low, high: what the phrase says of it, in the measure's unit.
-        of: settings on top of the step's that it speaks of; None: the ghost's.
+        phrase: words of its texts, its question or its claims.
+        measure: the quantity that the phrase names.
+        low, high: the range that the phrase states, in the measure's unit.
+        of: settings of the run in addition to the step's; None: the ghost's.
     """
 
     step: str
@@ -40,7 +40,7 @@ def step_of(name: str) -> Step:
 
 
 def specs(quoted: Quoted) -> tuple[RunSpec, RunSpec | None]:
-    """Its run, and the ghost's if it compares."""
+    """Returns its run, and the ghost's if the measure compares with it."""
     step = step_of(quoted.step)
     own = load_lesson(quoted.step.split("/")[0]).run_of(step)
     ghost = None if step.ghost is None else own.but(*step.ghost.set)

@@ -1,4 +1,4 @@
-"""Right solutions of the exercises, each in three styles."""
+"""Correct solutions of the exercises, each in three styles."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ QP = (
 ONE = QP.replace("in now.levels:", "in now.levels[:1]:")
 RIGHT = {"joint-pd": PD, "null-space": OSF, "time-delay": TDE, "one-level-qp": ONE, "two-levels": QP}
 
-# The same laws as somebody else writes them.
+# The same laws in other styles of programming.
 _PD_CLASS = """
 class Controller:
     def torque(self, now):
@@ -184,4 +184,4 @@ STYLES: dict[str, tuple[str, ...]] = {
     "one-level-qp": (ONE, _QP_OF_TORQUES, _ONE_OF_ACCELERATIONS),
     "two-levels": (QP, _TWO_BY_BASIS, _TWO_BY_ELIMINATION),
 }
-"""Right solutions in three styles each."""
+"""Correct solutions in three styles each."""

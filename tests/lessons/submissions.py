@@ -1,4 +1,4 @@
-"""Submissions as students hand them in: right ones, known mistakes, and what misbehaves."""
+"""Submissions of students: correct ones, known mistakes, and misbehaving programs."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from right_laws import PD, RIGHT, TASK
 
 @dataclass(frozen=True)
 class Mistake:
-    """What is changed in a right solution, the marks it deserves, and words of what is to be said of it.
+    """A change of a correct solution, the points that the result deserves, and words that its feedback must
+    contain.
 
     Attributes:
-        good, bad: the lines that are there and that stand there instead; good "" for another text altogether.
-        most: points it may get.
-        words: that name the mistake.
+        good, bad: the lines that are replaced and their replacement; good "": `bad` is the whole text.
+        most: the largest allowed number of points.
+        words: words that name the mistake.
     """
 
     good: str
@@ -23,7 +24,7 @@ class Mistake:
     words: str
 
     def text(self, exercise: str) -> str:
-        """The submission."""
+        """Returns the submission."""
         if not self.good:
             return self.bad
         assert self.good in RIGHT[exercise], self.good
@@ -134,7 +135,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
 
 @dataclass(frozen=True)
 class Submission:
-    """A file, the points it deserves, and words of what is to be said about it."""
+    """A file, the points that it deserves, and words that its feedback must contain."""
 
     exercise: str
     text: str
@@ -147,7 +148,7 @@ class Submission:
 
 
 def _bad(line: str, points: int, words: str) -> Submission:
-    """A joint PD that is none, and does something else."""
+    """Returns a submission for the joint PD that executes the given line instead."""
     return Submission("joint-pd", f"def torque(now):\n    {line}\n    return now.gravity\n", points, words)
 
 
@@ -181,4 +182,4 @@ SUBMISSIONS: dict[str, Submission] = {
     "wrong_name": _bad("gravity(now)", 0, "line 3: NameError"),
     "wrong_endless": _bad("while True: pass", 0, "takes longer than 0.5 s"),
 }
-"""By the name of the file, without its suffix."""
+"""Submissions by the name of the file, without its suffix."""

@@ -1,6 +1,7 @@
-"""Two tasks at a time against one: nothing else differs, and the difference has the causes the lessons name.
+"""Two tasks at a time compared with one: nothing else differs, and the difference has the causes that the
+lessons name.
 
-Each cause that *Deliveries* and its neighbours name is taken away, and the effect goes.
+Each cause that *Deliveries* and related lessons name is taken away, and the effect disappears.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def of_step(
     events: tuple[tuple[float, Event], ...] | None = None,
     duration: float | None = None,
 ) -> Recording:
-    """A step's run, changed."""
+    """Returns the recording of a step's run with changed settings."""
     step = load_lesson(lesson).steps[place]
     spec = load_lesson(lesson).run_of(step).but(*assignments)
     spec = spec if events is None else replace(spec, events=events)
@@ -59,18 +60,18 @@ def of_step(
 
 
 def seconds(*assignments: str) -> float:
-    """One round to three people."""
+    """Returns the time of one round to three people, s."""
     progress = of_step("deliveries", 0, *assignments).session
     assert isinstance(progress, VelocitySession)
     return progress.progress.completed[-1][1]
 
 
-# ------------------------------------------------------------------ what differs
+# ------------------------------------------------------------------ differences
 
 
 @pytest.mark.parametrize("rule", [(), STRICT, ("base_tolerance=0.25",)])
 def test_all_architectures_have_one_mission(rule: tuple[str, ...]) -> None:
-    """The same tasks, goals, paths, holds and rules for when one is completed."""
+    """All architectures have the same tasks, goals, paths, holds and rules of completion."""
     missions = [
         [
             (task.name, task.role, task.motion, task.tolerance, task.hold, task.rest)
@@ -85,8 +86,8 @@ def test_all_architectures_have_one_mission(rule: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("rule", [(), STRICT])
 def test_waypoints_have_one_rule(rule: tuple[str, ...]) -> None:
-    """Fig. 8: the missions differ, as in the paper, but not in what counts as completed; the last task of two
-    at a time asks for nothing."""
+    """Fig. 8: the missions differ, as in the paper, but not the rules of completion; with two tasks at a
+    time, the last task has no condition."""
 
     def rules(architecture: str) -> dict[str, set[tuple[float, float | None, float]]]:
         options = scene_of("ridgeback-ur10-waypoints", f"architecture={architecture}", *rule).settings.options
@@ -103,7 +104,8 @@ def test_waypoints_have_one_rule(rule: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("name", ["ridgeback-ur10-delivery", "ridgeback-ur10-handover"])
 def test_nothing_but_the_architecture_differs(name: str) -> None:
-    """Settings, robot, start, script, and what the controller is told but for the levels in the window."""
+    """Settings, robot, start, script and the controller's settings are equal, except for the levels in the
+    window."""
     one, two = (scene_of(name, f"architecture={a}") for a in ("single_task", "hierarchical"))
     own, other = (scene.settings for scene in (one, two))
     assert [path for path in own.paths() if own.value_at(path) != other.value_at(path)] == ["architecture"]
@@ -126,7 +128,7 @@ def test_nothing_but_the_architecture_differs(name: str) -> None:
 
 
 def test_a_base_is_there_by_the_rule() -> None:
-    """Within the tolerance at any speed, or only once it is at rest, too."""
+    """The task is completed within the tolerance at any speed, or only at rest, according to the setting."""
     for rule, rest in (("false", np.inf), ("true", REST)):
         options = scene_of(
             "ridgeback-ur10-delivery", "base_tolerance=0.25", f"base_at_rest={rule}"
@@ -139,28 +141,29 @@ def test_a_base_is_there_by_the_rule() -> None:
 
 
 def test_the_factor_hangs_on_the_rule() -> None:
-    """One round: 1.6 where 80 cm are enough, 1.2 where the base has to stop, 2.1 with a rule for each."""
+    """The ratio of times for one round is 1.6 where 80 cm are enough, 1.2 where the base has to stop, and 2.1
+    with a different rule for each."""
     single = [seconds("architecture=single_task", *rule) for rule in ((), STRICT)]
     both = [seconds(*rule) for rule in ((), STRICT)]
     assert single[0] / both[0] == pytest.approx(1.6, abs=0.05)
     assert single[1] / both[1] == pytest.approx(1.2, abs=0.05)
     assert single[1] / both[0] == pytest.approx(2.1, abs=0.05)
-    # "more than half of that is the rule": of what is saved.
+    # The text says "more than half of that is the rule" about the saved time.
     assert (both[1] - both[0]) / (single[1] - both[0]) > 0.5
     assert single[1] - single[0] == pytest.approx(11.0, abs=0.6)
     assert both[1] - both[0] == pytest.approx(14.0, abs=0.6)
 
 
 def test_who_pays_for_effort_is_not_what_makes_the_factor() -> None:
-    """Formulation C's last level pays all effort, and the only one is the last: where every level pays it the
-    factors are much the same."""
+    """In formulation C only the last level has the full effort, and a single level is the last one. If every
+    level has the effort, the ratios are almost the same."""
     for rule, factor in (((), 1.55), (STRICT, 1.29)):
         single = seconds("architecture=single_task", "formulation=paper", *rule)
         assert single / seconds("formulation=paper", *rule) == pytest.approx(factor, abs=0.05)
 
 
 def test_each_half_of_the_overlap_saves_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second task is taken out of the window while the base is first, or while the hand is."""
+    """The second task is removed from the window while the base is first, or while the hand is first."""
     when: set[str] = set()
 
     def watched(
@@ -185,7 +188,8 @@ def test_each_half_of_the_overlap_saves_time(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_base_that_stays_behind_the_hand_drives_no_farther() -> None:
-    """One task at a time, but with the base at rest while the arm reaches: the way is as with two."""
+    """With one task at a time and the base at rest while the arm reaches, the base's path is as long as with
+    two tasks."""
     ways = {a: Measure(WAY).value(of_step("deliveries", 0, f"architecture={a}")) for a in ALL}
     assert ways["decoupled"] < 1.1 * ways["hierarchical"]
     assert ways["single_task"] > 1.5 * ways["hierarchical"]
@@ -198,21 +202,22 @@ def test_a_base_that_stays_behind_the_hand_drives_no_farther() -> None:
 
 
 def test_the_base_turns_because_the_goal_does() -> None:
-    """*People move*: without the move it waits where it is from 8 s on."""
+    """*People move*: without the movement of the goal the base stays in place after 8 s."""
     still = Measure(WAY, "range", after=8.0, until=14.0)
     moved = still.value(of_step("deliveries", 3, duration=14.2))
     assert moved > 0.1 and still.value(of_step("deliveries", 3, events=(), duration=14.2)) < 0.6 * moved
 
 
 def test_the_authors_gain_is_what_makes_the_last_stretch_long() -> None:
-    """*People move*: HTIDKC with gains of 3 and 1 1/s instead of 0.5 and 0.3 is there in time."""
+    """*People move*: HTIDKC with gains of 3 and 1 1/s instead of 0.5 and 0.3 arrives in time."""
     late = Measure(HAND, after=18.5, until=19.5)
     assert late.value(of_step("deliveries", 3, "controller=htidkc")) > 100.0
     assert late.value(of_step("deliveries", 3, "controller=htidkc", "gains=[3,1]")) < 5.0
 
 
 def test_it_is_effort_that_lets_the_hand_slip() -> None:
-    """*She takes her time*: with the paper's formulation and effort that counts a hundredth it does not."""
+    """*She takes her time*: with the paper's formulation the hand slips, and with a hundredth of the relative
+    effort it does not."""
     waiting = Measure(HAND, after=5.0, until=14.0)
     assert waiting.value(of_step("deliveries", 2, "formulation=paper", duration=14.0)) > 10.0
     light = of_step("deliveries", 2, "formulation=paper", "levels.ee.Q=1000", duration=14.0)
@@ -220,18 +225,18 @@ def test_it_is_effort_that_lets_the_hand_slip() -> None:
 
 
 def test_the_base_gets_there_because_the_arm_gives_way() -> None:
-    """*First hold, then reach*: with the arm's joints at rest the base does not reach its place."""
+    """*First hold, then reach*: if the arm's joints are held at rest, the base does not reach its place."""
     names = scene_of("ridgeback-ur10-drag").robot.joint_names[3:]
     last = Measure(Signal("error/base", "m"), "mean", after=5.0)
     assert last.value(of_step("first-hold-then-reach", 0)) < 0.01
     assert last.value(of_step("first-hold-then-reach", 0, f"hold={json.dumps(list(names))}")) > 0.4
 
 
-# ------------------------------------------------------------------ what the texts say of it
+# ------------------------------------------------------------------ the texts about it
 
 
 def test_the_papers_rule_is_quoted_and_not_printed() -> None:
-    """docs/disagreements.md quotes all that the paper has of it."""
+    """docs/disagreements.md quotes every statement of the paper about it."""
     text = " ".join((Path(__file__).parents[2] / "docs" / "disagreements.md").read_text().split())
     section = re.search(r"## Deliveries: .*?(?=## |$)", text)
     assert section is not None

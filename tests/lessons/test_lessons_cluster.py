@@ -1,4 +1,5 @@
-"""Sweeps on a Dask cluster of two workers: stopped, carried on, and with a worker that dies on the way."""
+"""Sweeps on a Dask cluster of two workers: stopped, continued, and with a worker that dies during the
+sweep."""
 
 from __future__ import annotations
 
@@ -28,8 +29,8 @@ CELLS = 8
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """A scheduler with two worker processes; work that kills one is given up after the second. Who is missing
-    15 s after a death would not be started again, though it may only have died once more."""
+    """A scheduler with two worker processes; an item that kills two workers is not tried again. With the
+    usual time limit of 15 s, a worker that is still missing after a death would not be started again."""
     from dask.config import set as configured
 
     with (
@@ -60,7 +61,7 @@ def lines(folder: Path) -> int:
 
 
 def begin(out: Path, *more: str) -> subprocess.Popen[bytes]:
-    """`himpc-lab sweep` of δ on the mobile manipulator's square, as a program of its own."""
+    """Starts `himpc-lab sweep` of δ on the mobile manipulator's square as a separate program."""
     what = [
         "ridgeback-ur10-square",
         "--over",
@@ -77,8 +78,8 @@ def begin(out: Path, *more: str) -> subprocess.Popen[bytes]:
 
 
 def test_a_sweep_of_htmpc_survives_a_kill_and_a_dead_worker(cluster: Any, tmp_path: Path) -> None:
-    """Killed after its first cell, carried on, one worker killed meanwhile: the results of local cores,
-    none lost, none computed twice."""
+    """A sweep is killed after its first cell and continued, and one worker is killed meanwhile: the results
+    equal those on local cores, and no cell is lost or computed twice."""
     local, out = tmp_path / "local", tmp_path / "cluster"
     scheduler = ("--scheduler", cluster.scheduler_address)
     assert begin(local).wait(300) == 0
@@ -103,7 +104,8 @@ def test_a_sweep_of_htmpc_survives_a_kill_and_a_dead_worker(cluster: Any, tmp_pa
 
 
 def test_a_worker_that_dies_costs_its_item_a_retry(cluster: Any, tmp_path: Path) -> None:
-    """Dead once: another worker does the item. Dead again and again: it fails, and the others do not."""
+    """If a worker dies once, another worker does its item. If workers die repeatedly with one item, it fails,
+    and the other items do not."""
     with on_cluster(cluster.scheduler_address) as spread:
         items = [(tmp_path / "once", value) for value in range(6)]
         assert dict(spread(_dies_once, items)) == {value: value for value in range(6)}
@@ -128,7 +130,7 @@ def _dies_at_one(value: int) -> int:
 
 @pytest.fixture
 def deserted() -> Iterator[Any]:
-    """A scheduler that nobody works for."""
+    """A scheduler without workers."""
     with distributed.LocalCluster(
         n_workers=0, processes=False, dashboard_address=None, protocol="tcp"
     ) as found:

@@ -1,4 +1,4 @@
-"""Sessions find compiled what they need."""
+"""Sessions need no compilation during a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lessons.session.torque import TorqueSession
 
 
 def test_no_setting_compiles_in_the_middle_of_a_run() -> None:
-    """Other horizons, levels, weights and controllers find what they need compiled."""
+    """Other horizons, levels, weights and controllers use functions that are already compiled."""
     compile_all(lambda *_: None)
     session = TorqueSession(torque_scene("iiwa14-hold"), seed=0)
     late: list[str] = []

@@ -1,4 +1,4 @@
-"""HIMPC in the sessions of scenes: any horizon, a full stack, and what binds."""
+"""HIMPC in the sessions of scenes: all horizons, a full stack, and active constraints."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robots import load_robot
 
 
 def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> None:
-    """A 6-DoF arm under 3+3+1 rows: level 3 has no freedom, changes nothing and breaks nothing."""
+    """A 6-DoF arm with 3+3+1 rows: level 3 has no freedom, changes nothing and raises no error."""
     robot = load_robot(example_urdf("ur_description/urdf/ur10_robot.urdf"))
     assert robot.n == 6
     scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
@@ -39,7 +39,8 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
 
 
 def test_binding_constraints_are_named(scene: TorqueScene) -> None:
-    """While a fast move presses on a velocity bound the plan names level, joint, kind, side and pressure."""
+    """During a fast move with an active velocity bound, the plan names level, joint, kind, side and
+    multiplier."""
     session = TorqueSession(scene)
     session.post(Set("limits.velocity_scale", 0.05))
     session.tick()

@@ -35,7 +35,7 @@ HAND = Signal("error/position", "mm")
 
 @pytest.mark.parametrize("name", COURSE)
 def test_everything_a_lesson_states_is_so(name: str, course_runs: CourseRuns) -> None:
-    """Claims hold and fail under their wrong setting; answers are measured; challenges can be solved."""
+    """Claims hold, and fail under their wrong setting; answers are measured; challenges can be solved."""
     own = [verdict for verdict in course_runs.verdicts if verdict.lesson == name]
     assert sum(bool(verdict.wrong) for verdict in own) == sum(
         len(step.claims) for step in load_lesson(name).steps
@@ -52,7 +52,7 @@ def texts(lesson: Lesson) -> Iterator[str]:
 
 
 def fields_of(scene: Scene) -> dict[str, slice]:
-    """What the telemetry of a scene records."""
+    """Returns the telemetry fields of a scene."""
     if isinstance(scene, TorqueScene):
         return layout_of(scene.robot, scene.settings.levels).fields
     return mobile_layout_of(scene.robot, scene.settings.levels).fields
@@ -60,7 +60,8 @@ def fields_of(scene: Scene) -> dict[str, slice]:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_a_card_is_complete(name: str) -> None:
-    """Name, question, time, what is needed, and two to four steps with one idea each."""
+    """A card has a name, a question, a duration, the prerequisites, and two to four steps with one idea
+    each."""
     lesson = load_lesson(name)
     assert lesson.name == name
     assert lesson.card.question.endswith("?")
@@ -75,7 +76,7 @@ def test_a_card_is_complete(name: str) -> None:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_equations_can_be_rendered(name: str) -> None:
-    """Dollar signs come in pairs, and what stands between them is LaTeX."""
+    """Dollar signs come in pairs, and the text between them is LaTeX."""
     for text in texts(load_lesson(name)):
         assert text.count("$") % 2 == 0, text
         for display, inline in re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", text, re.DOTALL):
@@ -86,7 +87,7 @@ def test_equations_can_be_rendered(name: str) -> None:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_no_text_is_shown_as_code(name: str) -> None:
-    """Markdown takes an indented paragraph for code: an equation in it would not be rendered."""
+    """Markdown interprets an indented paragraph as code, and an equation in it would not be rendered."""
     for step in load_lesson(name).steps:
         for text in (step.text, step.do, step.why):
             assert not any(line.startswith(" ") or "  " in line for line in text.splitlines())
@@ -94,7 +95,7 @@ def test_no_text_is_shown_as_code(name: str) -> None:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_controls_and_plots_exist_in_the_scene(name: str) -> None:
-    """Each control's path is a setting whose value the control can show; each signal is recorded."""
+    """Each control's path is a setting, and the control can show its value; each signal is recorded."""
     lesson = load_lesson(name)
     for step in lesson.steps:
         scene = lesson.run_of(step).prepared()
@@ -116,7 +117,7 @@ def assert_takes(scene: Scene, control: Control) -> None:
 
 
 def test_lessons_can_be_sent_to_another_process() -> None:
-    """Runs and measures are plain data: equal after pickling, and usable as keys."""
+    """Runs and measures are plain data: they are equal after pickling, and usable as keys."""
     for name in COURSE:
         lesson = load_lesson(name)
         runs = {lesson.run_of(step): step.claims[0].measure for step in lesson.steps}
@@ -148,7 +149,7 @@ MOVE = ((0.0, MoveTarget("position", (0.6, 0.2))),)
 
 
 def aside(claim: Claim, **changes: object) -> Step:
-    """Two tenths of a second in which the planar hand starts towards a target 10 cm away."""
+    """Returns a step of 0.2 s in which the planar arm's hand moves towards a target 10 cm away."""
     return Step("s", "t", "d", "w", (claim,), **{"events": MOVE, "duration": 0.2, **changes})  # pyright: ignore[reportArgumentType]
 
 
@@ -200,13 +201,14 @@ def test_a_sound_lesson_has_no_faults() -> None:
     ],
 )
 def test_the_check_finds(step: Step, fault: str) -> None:
-    """Each way a lesson can be unsound is a fault with its own sentence."""
+    """Each fault of a lesson is reported with its own sentence."""
     (found,) = faults(lesson_with(step))
     assert fault in found
 
 
 def test_the_check_judges_challenges() -> None:
-    """A start that passes, a solution that does not, and one that turns a knob that is none."""
+    """The check finds a challenge that passes at its start, a solution that does not pass, and a solution
+    that changes a setting which is no knob."""
     goal = Claim("Close.", Measure(HAND), "at most", 1e-3)
     knob = Control("horizon", "N", 1, 10)
     challenge = Challenge("?", (goal,), (knob,), Score(Measure(HAND), 1.0, 0.0), (("horizon=1",), OFF))
@@ -220,7 +222,8 @@ def test_the_check_judges_challenges() -> None:
 
 
 def test_claims_are_judged_on_a_run_half_done() -> None:
-    """Nothing to measure before the window begins; then true or false; NaN is never true."""
+    """Before the window begins there is no value; after that the claim is true or false; NaN is never
+    true."""
     rows = {"t": np.arange(10.0)[:, None] / 10, "error/position": np.arange(10.0)[:, None] * 1e-3}
     late = Claim("…", Measure(HAND, after=0.5), "at most", 7.0)
     assert math.isnan(late.measure.value({name: field[:4] for name, field in rows.items()}))
@@ -241,7 +244,7 @@ def test_claims_are_judged_on_a_run_half_done() -> None:
     ],
 )
 def test_statistics(statistic: str, value: float) -> None:
-    """Values 1, −2, −4, 0, NaN, of which the first lies before the window; NaN counts nowhere."""
+    """Values 1, −2, −4, 0, NaN; the first is before the window, and NaN is ignored."""
     rows = {"t": np.arange(5.0)[:, None], "v": np.array([[1.0], [-2.0], [-4.0], [0.0], [np.nan]])}
     measure = Measure(Signal("v"), statistic, after=1.0)  # pyright: ignore[reportArgumentType]
     assert measure.value(rows) == pytest.approx({"rms": math.sqrt(20 / 3)}.get(statistic, value))
@@ -257,7 +260,7 @@ def test_a_measure_over_the_ghost_is_a_ratio() -> None:
 
 
 def test_signals_of_missions() -> None:
-    """The base's way adds up along its path; time at work stands still when no task is left."""
+    """The base's path length is the sum along its path; the time at work is constant when no task is left."""
     x = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 4.0], [3.0, 3.0]])
     rows = {"t": np.arange(4.0)[:, None], "x/base": x, "left": np.array([[2.0], [1.0], [0.0], [0.0]])}
     way = Signal("way of the base", "m")

@@ -1,4 +1,4 @@
-"""Deadline mode: a late torque acts one tick later, and headless no clock decides what is late."""
+"""Deadline mode: a late torque acts one tick later, and a headless run never measures computing times."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ def with_settings(scene: TorqueScene, *assignments: str) -> TorqueScene:
     ("late", "applied"),
     [
         ([0, 0, 0], [1, 2, 3]),
-        ([1, 0, 0], [0, 2, 3]),  # held; the late torque is overtaken by the next one
+        ([1, 0, 0], [0, 2, 3]),  # held; the next torque replaces the late one
         ([0, 1, 0], [1, 1, 3]),
         ([0, 1, 1, 0], [1, 1, 2, 4]),  # the second late tick applies the first one's torque
         ([1, 1, 1, 1], [0, 1, 2, 3]),  # always late: one tick of delay
-        ([0, 1, 1, 0, 1], [1, 1, 2, 4, 4]),  # what waited was thrown away
+        ([0, 1, 1, 0, 1], [1, 1, 2, 4, 4]),  # the waiting torque is discarded
     ],
 )
 def test_a_queue_of_one(late: list[int], applied: list[int]) -> None:
-    """Tick k finds the torque k + 1; before the first tick the torque 0 acts."""
+    """Tick k computes the torque k + 1; before the first tick the torque 0 acts."""
     outbox = DelayedTorque()
     found = [
         float(outbox.applied(np.array([k + 1.0]), bool(missed), np.zeros(1))[0])
@@ -50,7 +50,7 @@ def test_a_queue_of_one(late: list[int], applied: list[int]) -> None:
 
 
 def test_always_late_is_one_tick_of_delay(planar: TorqueScene) -> None:
-    """The same torques to the last bit as from a plant whose motors get them 1 ms later."""
+    """The torques are bitwise equal to those with motors that receive commands 1 ms later."""
     late = run(with_settings(planar, "deadline_ms=1", "solve_ms_per_knot=0.3"), 0.2)
     delayed = run(with_settings(planar, "plant.delay_ms=1"), 0.2)
     assert late["late"].all()
@@ -60,14 +60,15 @@ def test_always_late_is_one_tick_of_delay(planar: TorqueScene) -> None:
 
 
 def test_in_time_is_lockstep(planar: TorqueScene) -> None:
-    """A deadline that is met exactly changes nothing."""
+    """A deadline that is just met changes nothing."""
     plain, met = run(planar, 0.2), run(with_settings(planar, "deadline_ms=0.5"), 0.2)
     assert not met["late"].any()
     np.testing.assert_array_equal(plain["tau"], met["tau"])
 
 
 def test_the_horizon_decides_what_is_late(planar: TorqueScene) -> None:
-    """A longer horizon set on the way misses the deadline from that tick on; back in time, it does not."""
+    """A longer horizon that is set during the run misses the deadline from that tick on; with the previous
+    horizon the deadline is met again."""
     session = TorqueSession(with_settings(planar, "deadline_ms=1"))
     late = []
     for horizon in (10, 11, 10):
@@ -94,7 +95,7 @@ def session_holding(scene: TorqueScene) -> np.ndarray:
 
 
 def test_the_clock_decides_only_if_asked_to(planar: TorqueScene) -> None:
-    """With no assumed time the measured one counts: more than a nanosecond, less than a second."""
+    """Without an assumed time the measured one is used: more than a nanosecond, less than a second."""
     measured = planar.settings.changed("solve_ms_per_knot", 0)
     assert replace(measured, deadline_ms=1e-6).is_late(0.5)
     assert not replace(measured, deadline_ms=1e3).is_late(0.5)

@@ -1,4 +1,4 @@
-"""The decoupled architecture of the delivery scene: the base drives or the arm reaches, never both."""
+"""The decoupled architecture of the delivery scene: either the base drives or the arm reaches, never both."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.velocity import VelocitySession
 
 SETTLED = 12
-"""Ticks after a new task in which what must rest may still be braking."""
+"""Number of ticks after a new task in which the part that must be at rest may still be braking."""
 
 
 def test_base_and_arm_take_turns() -> None:

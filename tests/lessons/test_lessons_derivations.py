@@ -1,6 +1,6 @@
-"""What the lessons derive, recomputed: the numbers and equations in their texts that no run can judge.
+"""Numbers and equations of the lessons' texts that no run can check, recomputed.
 
-The predictions (14), (15), (18), (28) with c_l are held against the printed matrices in
+The predictions (14), (15), (18), (28) with c_l are compared with the printed matrices in
 `test_himpc_prediction`, (31) to (35) in `test_himpc_cascade`, (8) to (13) of HTMPC in `test_htmpc_equations`.
 """
 
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def iiwa() -> tuple[Array, Array]:
-    """M at the start of `iiwa14-hold`, (7, 7), and the diagonal of its M̄."""
+    """Returns M at the start of `iiwa14-hold`, (7, 7), and the diagonal of its M̄."""
     scene = torque_scene("iiwa14-hold")
     plant = Plant(scene.robot, scene.settings.plant)
     plant.reset(scene.q_0)
@@ -42,7 +42,8 @@ def iiwa() -> tuple[Array, Array]:
 
 
 def test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar(iiwa: tuple[Array, Array]) -> None:
-    """(8), (12): with H_q from a millisecond ago and Δτ = M̄(wanted − q̈₀), (I − M⁻¹M̄)(q̈₀ − wanted) is left."""
+    """(8), (12): with H_q from a millisecond ago and Δτ = M̄(wanted − q̈₀), the error is (I − M⁻¹M̄)(q̈₀ −
+    wanted)."""
     rng = np.random.default_rng(0)
     M, M_bar = iiwa[0], np.diag(iiwa[1])
     forces, tau_0, wanted = rng.normal(size=(3, len(M)))
@@ -54,7 +55,7 @@ def test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar(iiwa: tup
 
 @pytest.mark.parametrize(("scale", "radius"), [(1.0, 0.985), (6.0, 0.91), (7.0, 1.21)])
 def test_the_gauge_of_no_model_needed(iiwa: tuple[Array, Array], scale: float, radius: float) -> None:
-    """Near 1 it may mean slow (an eigenvalue near +1) or nearly unstable (near −1)."""
+    """A radius near 1 can mean a slow mode (an eigenvalue near +1) or a nearly unstable one (near −1)."""
     assert convergence_gauge(iiwa[0], scale * iiwa[1])[1] == pytest.approx(radius, abs=0.01)
 
 
@@ -65,7 +66,7 @@ def test_at_six_times_M_bar_both_ends_of_the_spectrum_are_alike(iiwa: tuple[Arra
 
 
 def test_a_norm_below_1_is_enough_and_not_necessary(iiwa: tuple[Array, Array]) -> None:
-    """At 4 M̄ the norm of Remark 4 is 1.21: one step may grow, many steps vanish."""
+    """With 4 M̄ the norm of Remark 4 is 1.21: the error may grow in one step, but vanishes after many."""
     norm, radius = convergence_gauge(iiwa[0], 4.0 * iiwa[1])
     assert norm == pytest.approx(1.21, abs=0.02) and radius < 0.95
     left = np.eye(7) - np.linalg.solve(iiwa[0], np.diag(4.0 * iiwa[1]))
@@ -73,7 +74,7 @@ def test_a_norm_below_1_is_enough_and_not_necessary(iiwa: tuple[Array, Array]) -
 
 
 def test_remark_4_as_printed_is_for_a_diagonal_M(iiwa: tuple[Array, Array]) -> None:
-    """1 − M̄ᵢ/λᵢ(M) are the eigenvalues of I − M⁻¹M̄ if M is diagonal, and otherwise not."""
+    """1 − M̄ᵢ/λᵢ(M) are the eigenvalues of I − M⁻¹M̄ if M is diagonal, but not in general."""
     M, M_bar = iiwa
 
     def printed(M: Array) -> Array:
@@ -91,7 +92,7 @@ def test_remark_4_as_printed_is_for_a_diagonal_M(iiwa: tuple[Array, Array]) -> N
 
 
 def bound_at(degrees: float, reaction: float, margin: float) -> float:
-    """deg/s allowed so far before joint 2's limit on the planar arm."""
+    """Returns the allowed speed, deg/s, at this angle before the limit of joint 2 of the planar arm."""
     robot = load_robot("planar3")
     q = robot.q_upper - math.radians(degrees)
     force = in_force(robot, Limits(velocity=False))
@@ -102,7 +103,8 @@ def bound_at(degrees: float, reaction: float, margin: float) -> float:
 
 
 def test_the_speeds_of_stopping_takes_distance() -> None:
-    """5° before the limit: 106°/s for an exact model, 13.5°/s for ours; and the text prints what runs."""
+    """5° before the limit the bound is 106°/s with an exact model and 13.5°/s with our margins; the text
+    states the values in use."""
     reaction = 1e-3 + REACTION / Limits().velocity_approach
     assert bound_at(5.0, 1e-3, 0.0) == pytest.approx(105.9, abs=0.1)
     assert bound_at(5.0, reaction, POSITION_MARGIN) == pytest.approx(13.5, abs=0.1)
@@ -115,7 +117,7 @@ def test_the_speeds_of_stopping_takes_distance() -> None:
 @pytest.mark.parametrize("reaction", [1e-3, 0.1, 0.334])
 @pytest.mark.parametrize("room", [0.01, 0.1, 1.0])
 def test_from_the_viable_speed_the_joint_stops_at_the_limit(reaction: float, room: float) -> None:
-    """v·t + v²/2a = q_s − q is what the printed root solves."""
+    """The printed root solves v·t + v²/2a = q_s − q."""
     one, a = np.ones(1), 20.0
     v = viability_bounds(0.0 * one, -one, room * one, np.inf * one, a * one, reaction)[1, 0]
     assert v * reaction + v**2 / (2 * a) == pytest.approx(room, rel=1e-9)
@@ -125,7 +127,7 @@ def test_from_the_viable_speed_the_joint_stops_at_the_limit(reaction: float, roo
 
 
 def test_at_rest_the_residual_is_K_P_times_the_error() -> None:
-    """(28): what a weighted sum weighs is 200 m/s² for a metre and 50 rad/s² for a radian."""
+    """(28): a weighted sum weighs 200 m/s² per metre and 50 rad/s² per radian."""
     model = residual_model(np.array([200.0, 50.0]), np.array([10.0, 5.0]), 5, 1e-3)
     still = np.zeros((5, 2))
     e = model.free(np.ones(2), np.zeros(2), np.zeros(2), still, still, still)
@@ -133,7 +135,7 @@ def test_at_rest_the_residual_is_K_P_times_the_error() -> None:
 
 
 def test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand() -> None:
-    """J_{2|1} = J₂P₁ of *When tasks fight* vanishes at q₃ = 0 and nowhere near 90°."""
+    """J_{2|1} = J₂P₁ of *When tasks fight* vanishes at q₃ = 0, and does not near 90°."""
     robot = load_robot("planar3")
     plant = Plant(robot)
 
@@ -148,7 +150,7 @@ def test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand() -> No
 
 
 def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
-    """*One task under MPC*: Q‖J M̄⁻¹Δτ‖² and R‖Δτ‖² are alike for R of the order of 10⁵."""
+    """*One task under MPC*: Q‖J M̄⁻¹Δτ‖² and R‖Δτ‖² are of equal size for R of the order of 10⁵."""
     scene = torque_scene("planar3-hold")
     robot = scene.robot
     plant = Plant(robot)
@@ -163,8 +165,8 @@ def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
     [("limits.velocity=false", True), ("damping=true", False), ("limits.velocity=true", False)],
 )
 def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -> None:
-    """*What nobody asks for*: under a push Δτ has no part along the torques that move no task, unless a bound
-    or a level of its own asks for it."""
+    """*What nobody asks for*: under a push Δτ has no component along torques that move no task, unless a
+    bound or another level requires it."""
     lesson = load_lesson("one-task")
     assert "in that direction the torque stays what it is, as long as no bound changes it" in " ".join(
         lesson.steps[3].text.split()
@@ -185,7 +187,7 @@ def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -
 
 
 def test_RT4_asks_joint_1_for_more_than_its_data_sheet_allows() -> None:
-    """The page of disagreements: 141°/s, and the data sheet 85."""
+    """The page of disagreements says that the reference requires 141°/s, and the data sheet allows 85."""
     scene = torque_scene("iiwa14-circle-paper")
     q1 = scene.references(scene.robot, scene.settings.levels)["q1"]
     asked = np.abs(q1.preview(0.0, 1e-3, 4000).velocity).max()
@@ -200,7 +202,7 @@ def test_one_digit_of_a_coarse_encoder_is_almost_3_newton_metres() -> None:
 
 
 def test_texts_that_name_a_step_time_name_the_readmes() -> None:
-    """*How far ahead* and *Deadlines* quote what `benchmarks/` measured and the README prints."""
+    """*How far ahead* and *Deadlines* quote the results of `benchmarks/` that the README prints."""
     text = load_lesson("how-far-ahead").steps[0].text
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     quoted = re.findall(r"0\.\d\d", text)

@@ -1,4 +1,4 @@
-"""Events: data in a mailbox, refused in one sentence or obeyed at their tick."""
+"""Events are data in a mailbox; at their tick they take effect or are refused in one sentence."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ EVENTS: list[Event] = [
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: type(event).__name__)
 def test_events_survive_json(event: Event) -> None:
-    """An event is data: what a recording stores is what happened."""
+    """An event that was stored as JSON is equal to the original."""
     assert from_data(json.loads(json.dumps(as_data(event)))) == event
 
 
@@ -39,7 +39,7 @@ def test_what_is_no_event_is_refused(data: dict[str, Any]) -> None:
 
 
 def test_an_event_waits_for_the_next_tick(session: TorqueSession) -> None:
-    """Nothing changes until the tick that drains the mailbox; then it is in the log with its time."""
+    """Nothing changes before the tick that reads the mailbox; then the event is in the log with its time."""
     session.tick()
     session.post(Set("horizon", 8))
     assert session.settings.horizon == 5
@@ -51,7 +51,7 @@ def test_an_event_waits_for_the_next_tick(session: TorqueSession) -> None:
 
 
 def test_names_stay_when_the_order_changes(session: TorqueSession) -> None:
-    """Levels and tasks are told by name, wherever they stand."""
+    """Levels and tasks are identified by name in every order."""
     session.post(MoveLevel("posture", 0))
     session.post(Set("levels.position.Q", 7))
     session.post(Set("tasks.orientation.K_p", 33))
@@ -89,7 +89,7 @@ REFUSED: list[Event] = [
 
 @pytest.mark.parametrize("event", REFUSED, ids=str)
 def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: TorqueScene, event: Event) -> None:
-    """The learner reads one sentence; settings, plant and the motion are as if it had not been."""
+    """The learner reads one sentence; settings, plant and motion are the same as without the event."""
     session, quiet = TorqueSession(scene), TorqueSession(scene)
     session.tick()
     quiet.tick()
@@ -111,7 +111,7 @@ def test_a_fixed_motion_cannot_be_dragged() -> None:
 
 
 def test_reset_goes_back_to_the_start_and_keeps_the_settings(session: TorqueSession) -> None:
-    """The same first rows again, under the settings of now."""
+    """After a reset the first rows are the same again, with the present settings."""
     session.post(Set("horizon", 3))
     first = session.tick().copy()
     session.post(MoveTarget("position", (0.5, 0.3, 0.5)))
@@ -131,7 +131,7 @@ def test_reset_goes_back_to_the_start_and_keeps_the_settings(session: TorqueSess
 
 
 def test_a_push_ends(session: TorqueSession) -> None:
-    """The force acts for its time and no longer."""
+    """The force acts for its duration and then ends."""
     session.tick()
     session.post(Push(session.robot.joint_names[3], force=(0.0, 20.0, 0.0), seconds=0.05))
     speeds = [np.abs(value(session, session.tick(), "v")).max() for _ in range(1500)]
@@ -140,7 +140,7 @@ def test_a_push_ends(session: TorqueSession) -> None:
 
 
 def test_pushes_of_two_lengths_do_not_add_up(session: TorqueSession) -> None:
-    """A new push replaces the one before, its end included."""
+    """A new push replaces the previous one and its duration."""
     session.tick()
     session.post(Push(session.robot.joint_names[3], force=(0.0, 5.0, 0.0), seconds=10.0))
     session.tick()
@@ -153,7 +153,7 @@ def test_pushes_of_two_lengths_do_not_add_up(session: TorqueSession) -> None:
 
 
 def test_scripted_events_come_in_their_time(scene: TorqueScene) -> None:
-    """A scene's own events take effect at the tick of their time, and again after a reset."""
+    """A scene's own events take effect at the tick of their time, also after a reset."""
     scripted = replace(scene, events=((0.005, Set("horizon", 2)), (0.01, Set("horizon", 3))))
     session = TorqueSession(scripted)
     horizons = []

@@ -1,4 +1,4 @@
-"""Every kind of task on every robot of the catalog is held, and dragged to where it can be had."""
+"""Every kind of task on every robot of the catalog is held, and dragged to a reachable target."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from benchmarks.every_task import CONTROLLERS, measured
 from himpc.tasks import KINDS
 
 ROBOTS = {"planar3": 2.0, "iiwa14": 1.3, "panda": 1.5, "baxter": 1.5, "ridgeback-ur10": 1.1}
-"""s after which a target that was dragged is reached. HQP does not know the motors of the planar arm."""
+"""s within which a dragged target is reached. HQP's model does not contain the motors of the planar arm."""
 
 
 @pytest.mark.parametrize("first", range(len(ROBOTS)), ids=list(ROBOTS))
 def test_every_kind_of_task_settles(first: int) -> None:
-    """Within 1 mm or 0.1°; each kind meets each controller. `python -m benchmarks.every_task` has the whole
-    product."""
+    """Errors are within 1 mm or 0.1°; each kind of task runs under each controller on some robot. `python -m
+    benchmarks.every_task` tests all combinations."""
     robot, seconds = list(ROBOTS.items())[first]
     for place, kind in enumerate(KINDS):
         found = measured(robot, kind, CONTROLLERS[(first + place) % 2], seconds=seconds)

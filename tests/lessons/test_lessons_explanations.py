@@ -1,5 +1,5 @@
-"""No text gives a reason that nothing holds: every such sentence is quoted by an intervention, says that it
-is given, or is exempt by name, with the test that holds it instead."""
+"""Every sentence that gives a reason is tested: an intervention quotes it, it says that the reason is given,
+or it is exempt by name, with the test that holds it instead."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ Told = list[tuple[str, str]]
 
 @cache
 def walked() -> Told:
-    """(place, text) of all that is told."""
+    """Returns (place, text) of all texts."""
     return list(passages())
 
 
 @cache
 def told() -> Told:
-    """(place, sentence) of all that give a reason."""
+    """Returns (place, sentence) of all sentences that give a reason."""
     return list(dict.fromkeys((place, each) for place, text in walked() for each in causal(text)))
 
 
 def left(found: Told, rows: Iterable[Intervention], exempt: Iterable[Exempt]) -> Told:
-    """Of these sentences those that nothing holds."""
+    """Returns the sentences that no row quotes and no exemption names."""
     quoted: dict[str, list[str]] = {}
     for row in rows:
         quoted.setdefault(row.at, []).append(row.says)
@@ -53,7 +53,7 @@ def test_every_reason_is_held() -> None:
 
 
 def test_a_reason_whose_row_is_missing_is_found() -> None:
-    """For every row that holds a sentence alone."""
+    """If the only row that quotes a sentence is removed, the sentence is found."""
     says = "16 mm instead of 10, since level 2 has moved joint 1 meanwhile"
     (lost,) = left(told(), [row for row in ROWS if row.says != says], EXEMPT)
     assert lost[0] == "torque-has-a-limit/2" and says in lost[1]
@@ -62,7 +62,7 @@ def test_a_reason_whose_row_is_missing_is_found() -> None:
 
 
 def test_no_exemption_is_left_over() -> None:
-    """Each names a sentence that is there and that no row quotes."""
+    """Each exemption names an existing sentence that no row quotes."""
     named = [each for group in EXEMPT for each in group.sentences]
     assert len(set(named)) == len(named)
     unheld = left(told(), ROWS, ())
@@ -88,7 +88,7 @@ def test_an_exemption_names_the_test_that_holds_it() -> None:
 
 
 def test_every_step_is_measured_beyond_its_claims() -> None:
-    """A row of the interventions, a number that is quoted, or a test of its own."""
+    """Each step has a row of the interventions, a number that is quoted, or a test of its own."""
     named = {at for group in EXEMPT if group.held_by for at, _ in group.sentences}
     held = named | {row.at for row in ROWS} | {each.step for each in QUOTED}
     steps = {f"{name}/{k}" for name in COURSE for k in range(len(load_lesson(name).steps))}
@@ -96,7 +96,8 @@ def test_every_step_is_measured_beyond_its_claims() -> None:
 
 
 def test_every_likely_cause_is_held_or_not_known() -> None:
-    """The page of disagreements: what it calls a cause has a run, or it says that nobody knows."""
+    """On the page of disagreements, each likely cause is tested by a run, or the text says that it is not
+    known."""
     own = ("(41) weighs a measured acceleration", "The rule.", "How wrong the paper's identified model was")
     for name, topic in topics().items():
         cause = " ".join(topic.cause.split())
@@ -105,7 +106,7 @@ def test_every_likely_cause_is_held_or_not_known() -> None:
 
 
 def test_the_walk_reaches_every_page_of_the_site() -> None:
-    """Its documents, and the words that give a reason in each of these ways."""
+    """The texts include the site's documents, and each of these words counts as a reason."""
     assert set(texts.IN_DOCS) <= set(DOCUMENTS)
     assert all((ROOT / file).exists() for file in DOCUMENTS.values())
     places = {place.split("/")[0] for place, _ in walked()}

@@ -1,4 +1,5 @@
-"""Whatever a run needs is there before its first tick: a robot that moves waits for no import."""
+"""All modules and compiled functions are loaded before the first tick, so that a moving robot waits for no
+import."""
 
 from __future__ import annotations
 
@@ -47,8 +48,8 @@ for name in sys.argv[1:]:
 
 
 def test_no_tick_imports_or_loads_anything() -> None:
-    """The first tick of each controller, and those in which a hand first moves targets; one process for all:
-    whoever comes first would be told."""
+    """No import happens in the first tick of each controller, or when targets are first dragged. One process
+    runs all, because the first run would show a late import."""
     done = subprocess.run(
         [sys.executable, "-c", LOOK, *RUNS], capture_output=True, text=True, timeout=300, check=True
     )

@@ -1,4 +1,4 @@
-"""The picture of a tick's QPs agrees with what the solver found."""
+"""The picture of a tick's QPs agrees with the solver's results."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WITHOUT = TorqueBox(np.full(2, -np.inf), np.full(2, np.inf), ((None, None), (Non
 def running(
     *assignments: str, ticks: int = 30, by: float = 0.1, scene: str = "planar3-plane"
 ) -> TorqueSession:
-    """A session in the middle of a motion: its target has just been dragged aside."""
+    """Returns a session in the middle of a motion, after its target was dragged aside."""
     session = TorqueSession(prepared(torque_scene(scene), None, assignments))
     name = session.layout.tasks[0].name
     target = session.target(name)
@@ -52,7 +52,7 @@ def test_geometry_and_solver_find_the_same_points(assignments: tuple[str, ...]) 
         assert plane.apart < 1e-6
         _, second, third = plane.levels
         assert max(level.apart for level in plane.levels) < 1e-9
-        # Joint 3 belongs to level 3 alone: what levels 1 and 2 decided is what is applied.
+        # Only level 3 uses joint 3: the result of levels 1 and 2 is applied.
         assert np.allclose(second.solved, third.solved, atol=1e-9)
         assert [level.name for level in plane.levels] == ["reach", "pose", "wrist"]
 
@@ -61,7 +61,7 @@ def test_geometry_and_solver_find_the_same_points(assignments: tuple[str, ...]) 
     ("scene", "horizon"), [("planar3-hold", 1), ("iiwa14-hold", 1), ("planar3-circle", 1)]
 )
 def test_each_level_is_best_in_the_cut_through_its_own_solution(scene: str, horizon: int) -> None:
-    """Of any robot, whatever the other joints do."""
+    """In the plane of two joints, with the other joints at the level's solution, this solution is optimal."""
     session = TorqueSession(prepared(torque_scene(scene), None, (f"horizon={horizon}",)))
     for _ in range(200):
         session.advance()
@@ -73,7 +73,7 @@ def test_each_level_is_best_in_the_cut_through_its_own_solution(scene: str, hori
 
 
 def test_the_cost_is_the_solvers() -> None:
-    """P, c and least are those of (32a) and (34a), at any point of the plane and any horizon."""
+    """P, c and least are those of (32a) and (34a), at every point of the plane and for every horizon."""
     session = running("horizon=4", scene="iiwa14-hold")
     tick = tick_of(session)
     held = np.array(tick.strict[-1].U)
@@ -123,8 +123,8 @@ def test_swapping_levels_swaps_their_roles() -> None:
     after = plane_of(session, JOINTS, "applied")
     assert [level.name for level in after.levels[:2]] == ["pose", "reach"]
     pose, reach = after.levels[:2]
-    assert np.allclose(pose.solved, pose.centre, atol=1e-6)  # level 1 is where its cost is least
-    assert reach.allowed.span.shape == (2, 0)  # and two coordinates leave a point
+    assert np.allclose(pose.solved, pose.centre, atol=1e-6)  # level 1 has its least cost
+    assert reach.allowed.span.shape == (2, 0)  # with two coordinates, only a point is left
     assert np.allclose(reach.solved, pose.solved, atol=1e-6)
     was = before.levels[1]
     assert np.linalg.norm(was.solved - was.centre) > 0.05
@@ -132,7 +132,8 @@ def test_swapping_levels_swaps_their_roles() -> None:
 
 
 def test_a_torque_bound_cuts() -> None:
-    """Level 2 would go on along what level 1 leaves; the bound ends the way. Level 1 is served."""
+    """Level 2 would move further along the freedom that level 1 leaves, but the bound limits it. Level 1 is
+    not affected."""
     free, tight = (
         plane_of(running(*set_, ticks=150), JOINTS, "applied") for set_ in ((), ("limits.torque_scale=0.01",))
     )
@@ -171,7 +172,7 @@ def test_a_controller_without_such_a_qp_says_so() -> None:
     fresh.advance()
     fresh.post(Set("horizon", 2))
     fresh.drain()
-    with pytest.raises(InputError):  # nothing of the new settings was solved yet
+    with pytest.raises(InputError):  # the new settings have not been solved yet
         plane_of(fresh, JOINTS, "applied")
 
 
@@ -217,7 +218,8 @@ def test_a_cut_that_misses_what_is_allowed_says_so() -> None:
 
 
 def test_ellipsoids_hold_every_velocity_that_is_left() -> None:
-    """Joint speeds of unit length, projected off the levels above, lie in them and reach their ends."""
+    """Joint velocities of unit length, projected off the levels above, are inside the ellipsoids and reach
+    their boundary."""
     scene = torque_scene("iiwa14-hold")
     robot, stack = scene.robot, scene.settings.levels
     here = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))

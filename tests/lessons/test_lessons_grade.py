@@ -1,4 +1,4 @@
-"""Grading: who did it right gets all points, a known mistake misses the check that is about it."""
+"""Grading: a correct solution gets all points, and a known mistake fails the check for it."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ def file(tmp_path: Path):
 
 @pytest.fixture(scope="module")
 def marked() -> Iterator[Callable[..., Grade]]:
-    """`grade` or `grade_apart` in a process that has one thread, as a program has that grades: it imports
-    once what every grading needs."""
+    """Runs `grade` or `grade_apart` in a process with one thread, like the command; it imports the common
+    modules once."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         yield lambda grader, *args: pool.submit(grader, *args).result()
 
 
 @dataclass(frozen=True)
 class Graded:
-    """What came of a folder: its table, as it was returned and as it was written, and each file's grade."""
+    """The results of a folder: its table, as returned and as written, and each file's grade."""
 
     rows: list[Row]
     table: str
@@ -60,7 +60,7 @@ class Graded:
 
 @pytest.fixture(scope="module")
 def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
-    """All submissions, on all cores."""
+    """The grades of all submissions, on all cores."""
     place, shares, grades = tmp_path_factory.mktemp("thirty"), [], {}
 
     def kept(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
@@ -75,7 +75,7 @@ def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
 
 @dataclass(frozen=True)
 class Near:
-    """A submission in this process, which costs no other: for those that are only wrong."""
+    """A submission in this process without a new one, for submissions that are wrong but do not misbehave."""
 
     source: Source
 
@@ -96,7 +96,7 @@ class Near:
 
 
 def here(text: str, exercise: str, about: str = "") -> tuple[CheckResult, ...]:
-    """The lines of the checks about something, without the process of its own."""
+    """Returns the results of the checks whose text contains `about`, without a separate process."""
     whole = load_exercise(exercise)
     chosen = replace(whole, checks=lambda seed: tuple(c for c in whole.checks(seed) if about in c.text))
     return judged_by(chosen, Near(Source("mine.py", text)), 0)
@@ -113,7 +113,7 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_a_right_solution_in_any_style_gets_every_grade_point(exercise: str) -> None:
-    """There are three at least; the first is the one that `thirty` holds."""
+    """Each exercise has at least three styles; the first is the one in `thirty`."""
     first, *others = STYLES[exercise]
     assert SUBMISSIONS[f"right_{exercise.replace('-', '_')}"].text == first
     assert len(others) >= 2
@@ -129,13 +129,13 @@ def test_a_known_mistake_costs_grade_points_and_is_named(exercise: str, name: st
     whys = [line.why for line in lines if line.why]
     named = [why for why in whys if known.words in why]
     assert named, whys
-    # The others say where the code itself failed, e.g. with a number that is not finite.
+    # Other messages name a failure of the code itself, for example a number that is not finite.
     assert all(why.startswith("mine.py") for why in whys if why not in named), whys
 
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_every_grade_check_is_told_apart_by_a_mistake(exercise: str) -> None:
-    """There are eight mistakes at least, and what pushes the robot is there."""
+    """Each exercise has at least eight mistakes, and the events of its checks are accepted."""
     assert len(MISTAKES[exercise]) >= 8
     for check in load_exercise(exercise).checks(0):
         session = TorqueSession(as_torque_scene(check.run.prepared(), "it"))
@@ -177,7 +177,7 @@ def test_what_cannot_be_graded_is_a_sentence(what: str, file, marked) -> None:
         ("import subprocess; subprocess.run(['true'])", "may not do that"),
         ("import os; os.system('true')", "may not do that"),
         ("now.q[0] = 3", "read-only"),
-        ("print('x' * 10**5)", ""),  # more than a pipe holds
+        ("print('x' * 10**5)", ""),  # more than fits into a pipe
         ("[0] * 10**13", "memory"),
     ],
 )
@@ -217,7 +217,7 @@ def test_what_never_ends_is_ended_and_its_grade_is_a_sentence(
 
 
 def test_a_grade_needs_no_file_where_it_is_made(tmp_path: Path) -> None:
-    """A machine of a cluster has not the disk of whoever grades."""
+    """A worker of a cluster does not have the file system of the grading machine."""
     source = Source("far/away/mine.py", "def torque(now):\n    return now.q[:2]\n")
     found = grade_apart(Submission(source, "joint-pd"))
     assert found.file == "far/away/mine.py"
@@ -232,7 +232,7 @@ def folder_of(place: Path, names: Sequence[str]) -> Path:
 
 
 def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path: Path, marked) -> None:
-    """Nobody loses anything through a neighbour, and twice it is the same table."""
+    """No submission loses points because of another one, and a second grading gives the same table."""
     assert len(thirty.rows) == len(SUBMISSIONS)
     found = {row["file"].removesuffix(".py"): row for row in thirty.rows}
     assert {name: int(row["points"]) for name, row in found.items()} == {
@@ -253,7 +253,7 @@ def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path
 
 
 def test_grades_of_a_folder_are_carried_on(tmp_path: Path, marked) -> None:
-    """Stopped after its first file, and one is changed: what is done is not done again."""
+    """After an interruption and a change of one file, finished files are not graded again."""
     graded: list[str] = []
 
     def counted(function, items) -> Generator:

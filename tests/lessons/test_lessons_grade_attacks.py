@@ -1,4 +1,4 @@
-"""What a submission must not be able to do: with the system's own means, and where there are none."""
+"""Attacks by graded submissions are refused, with the protection of the operating system and without it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="Landlock and seccomp
 
 @pytest.fixture(scope="module")
 def now() -> View:
-    """What a controller is shown at the first tick of a scene."""
+    """Returns the view that a controller receives at the first tick of a scene."""
     seen: list[View] = []
     scene = torque_scene("planar3-hold")
 
@@ -58,7 +58,8 @@ def once(line: str) -> str:
 
 
 def said(text: str, now: View, kernel: bool = True, **limits) -> str:
-    """What is said of a submission, at its load or at its first tick; "" if it got through."""
+    """Returns the error message of a submission at its loading or at its first tick, or "" if there is
+    none."""
     try:
         with apart(text, kernel, **limits) as one:
             one.fresh()(now)
@@ -83,7 +84,7 @@ def test_a_grade_is_made_of_the_same_numbers_on_both_sides(now: View) -> None:
 
 
 def test_a_grade_needs_what_a_solution_may_use(now: View) -> None:
-    """Packages, the lab's QP, and the model at other places."""
+    """A graded submission may use packages, the lab's QP solver, and the model at other configurations."""
     text = """
 import dataclasses, pinocchio, scipy.linalg, scipy.optimize
 from himpc.qp import solve_qp
@@ -117,7 +118,7 @@ CHEATS = {
 
 @pytest.mark.parametrize("cheat", CHEATS)
 def test_a_grade_cannot_be_taken_from_the_grader(cheat: str, now: View) -> None:
-    """There is nothing of it in the process of a submission."""
+    """The process of a submission contains nothing of the grader."""
     refused = not CHEATS[cheat].startswith("def")
     assert ("is not there when it is graded" in said(CHEATS[cheat], now)) == refused
     assert refused or said(CHEATS[cheat], now) == ""
@@ -139,7 +140,7 @@ ATTACKS = {
 @pytest.mark.parametrize("kernel", [True, False])
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_a_grade_is_not_for_those_who_attack(attack: str, kernel: bool, now: View, tmp_path: Path) -> None:
-    """Whatever the thread: it is refused, and it is told."""
+    """An attack is refused from every thread, and the message names it."""
     (tmp_path / "theirs.txt").write_text("def torque")
     answer = said(ATTACKS[attack].format(tmp_path), now, kernel)
     assert "a submission may not do that" in answer
@@ -155,7 +156,7 @@ def spawn():
     return _posixsubprocess.fork_exec(
         line, name, True, (w,), None, None, *files, True, False, -1, None, None, None, -1, None, False)
 """
-"""What Python's hook is not asked about: only the system can refuse it."""
+"""A call for which Python raises no audit event; only the operating system can refuse it."""
 
 
 @linux
@@ -170,7 +171,7 @@ def test_a_grade_is_not_for_those_who_go_below_python(now: View) -> None:
 @linux
 @pytest.mark.parametrize("how", ["sleep 100", "setsid sleep 100"])
 def test_a_grade_leaves_no_process_behind_without_the_systems_help(how: str, now: View) -> None:
-    """Children, and those that moved to a session of their own."""
+    """Child processes are ended with the submission, also those that moved to a session of their own."""
     text = SPAWN.format(how) + once("spawn()")
     one = apart(text, kernel=False)
     try:
@@ -250,7 +251,8 @@ def test_a_grade_process_ends_with_the_lab(now: View) -> None:
 
 
 def test_a_table_of_grades_is_no_program_of_a_spreadsheet(tmp_path: Path) -> None:
-    """Nor does a file in another encoding, or with another name, end the run of a folder."""
+    """Cells of the table never begin with a sign of a formula. A submission in another encoding, or with a
+    file name that is not UTF-8, does not end the grading of a folder."""
     folder, out = tmp_path / "all", tmp_path / "grades.csv"
     folder.mkdir()
     for name in ("=1+cmd|calc", "+1", "-1", "@x"):

@@ -1,4 +1,4 @@
-"""Every kind of task in a loop: it holds, and a target that is dragged a little is reached."""
+"""Tasks of every kind hold a robot at rest in a closed loop, and reach a target that is dragged a little."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ KINDS: dict[str, tuple[dict[str, Any], float]] = {
     "pointing": ({"frame": "link_6"}, np.radians(0.1)),
     "plane_distance": ({"normal": [0.0, 0.6, 0.8]}, 1e-3),
 }
-"""Per kind its fields, and within what it must settle, m or rad."""
+"""Per kind: its fields, and the tolerance within which the error must settle, m or rad."""
 
 
 def dragged(raw: Array) -> tuple[float, ...]:
-    """A target some 2 cm or 3° away."""
+    """Returns a target that is about 2 cm or 3° away from the given one."""
     return tuple(quaternion(exp3(np.array([0.05, -0.03, 0.0])) @ raw) if raw.ndim == 2 else raw + 0.02)
 
 

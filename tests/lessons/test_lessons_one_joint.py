@@ -1,4 +1,4 @@
-"""A robot with a single moving joint is a robot: it loads, holds and follows a dragged target."""
+"""A robot with a single moving joint can be loaded, holds its position and follows a dragged target."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ KINDS = ("revolute", "prismatic")
 
 @cache
 def scene_of(kind: str) -> Scene:
-    """The robot is imported once: that takes a process of its own."""
+    """Returns the scene with the imported robot, cached, as each import starts a process."""
     return load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind))
 
 
@@ -42,7 +42,7 @@ def test_one_joint_holds_under_every_controller(controller: str, kind: str) -> N
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_joint_follows_a_dragged_target(kind: str) -> None:
-    """A target on the joint's path is reached; one beside it breaks nothing."""
+    """A target on the path of the joint is reached; a target beside the path leads to no error."""
     scene = scene_of(kind)
     there = (0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0.0) if kind == "revolute" else (0.3, 0.0, 0.4)
     moves = ((0.01, MoveTarget("position", there)),)

@@ -1,4 +1,4 @@
-"""Workers whose owner was killed end themselves, whatever they are doing."""
+"""Worker processes end themselves after their owner was killed, whether they sleep or compute."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if __name__ == "__main__":
 
 
 def work(task: tuple[str, str]) -> None:
-    """Says who it is and never comes back."""
+    """Writes a file with its process id and never returns."""
     folder, how = task
     Path(folder, f"{how}-{os.getpid()}").touch()
     while True:
@@ -36,7 +36,7 @@ def work(task: tuple[str, str]) -> None:
 
 
 def run(folder: str) -> None:
-    """The owner of two workers."""
+    """Runs the owner of two workers."""
     list(on_cores(work, [(folder, "asleep"), (folder, "busy")]))
 
 
@@ -77,7 +77,8 @@ def test_workers_end_with_their_owner(tmp_path: Path, number: signal.Signals) ->
 
 
 def test_a_worker_takes_sigterm(tmp_path: Path) -> None:
-    """It ends; its work is an outcome, and so is the work that was tried again."""
+    """A worker that receives SIGTERM ends, its work becomes an outcome, and the second attempt at this work
+    as well."""
     script = tmp_path / "owner.py"
     script.write_text(OWNER.format(paths=[str(HERE), str(HERE.parents[1])], folder=str(tmp_path)))
     owner = subprocess.Popen([sys.executable, str(script)], stderr=subprocess.DEVNULL)

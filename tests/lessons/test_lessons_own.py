@@ -1,4 +1,5 @@
-"""Files of one's own: what they define decides what they are, and what is wrong with them is one sentence."""
+"""A user's own file is a controller, a scene, a task or a lesson by what it defines; each error is one
+sentence."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ def test_own_file_is_what_it_defines(kind, file) -> None:
 
 
 def test_own_controller_sees_what_the_paper_names(file) -> None:
-    """Shapes, and the numbers that can be checked from outside."""
+    """The view of an own controller has the shapes of the paper, and numbers that agree with an independent
+    computation."""
     text = """
         import numpy as np
 
@@ -70,7 +72,8 @@ def test_own_controller_sees_what_the_paper_names(file) -> None:
 
 
 def test_own_rows_of_torques_tell_the_leak(file) -> None:
-    """One torque alone tells nothing about what each level wants: then there is no leak to be measured."""
+    """The leak is measured from one torque per level; a controller that returns a single torque has no leak
+    value."""
     rows = "def torque(now):\n    return [now.bias, now.bias + 0.1]\n"
     scene = load_scene("planar3-circle")
     assert summary(run(prepared(scene, file(rows), ()), 0.05))["priority_leak_max"] > 0.01
@@ -158,7 +161,8 @@ def test_own_controller_that_is_wrong_is_one_sentence(what: str, tmp_path: Path)
 
 
 def test_own_call_may_wait_for_a_core_but_not_sleep(file, monkeypatch) -> None:
-    """A busy machine makes no good controller a bad one."""
+    """The deadline of a call does not count the time in which the process waits for a core, but it counts
+    sleep."""
     from lessons.own import deadline
 
     scene = load_scene("planar3-hold")
@@ -192,7 +196,7 @@ def torque(now):
 
 @pytest.mark.parametrize("where", ["main", "thread"])
 def test_own_second_import_that_never_ends_is_ended(where: str, file, monkeypatch) -> None:
-    """The trial ended well, and what comes then is bounded, too."""
+    """The second import of a file is also limited in time, although the first import ended well."""
     from concurrent.futures import ThreadPoolExecutor
 
     from lessons.session import controllers
@@ -263,7 +267,7 @@ def test_own_code_that_is_saved_takes_over_without_a_bump(file) -> None:
 
 
 def test_own_files_are_run_only_where_the_command_line_says_so(file) -> None:
-    """A code, a setting or an event must not choose a file of the machine."""
+    """A state code, a setting or an event cannot choose a file of the computer."""
     path = file("import os\nos._exit(1)\n")
     scene = load_scene("planar3-hold")
     with pytest.raises(InputError, match=r"--controller FILE\.py"):
@@ -320,7 +324,7 @@ def test_own_lesson_is_named_after_its_file(file) -> None:
 
 
 def test_own_controller_is_made_afresh_for_every_robot(file) -> None:
-    """What a file keeps in globals is not shared between two runs."""
+    """Global variables of a file are not shared between two runs."""
     path = file("seen = []\ndef torque(now):\n    seen.append(1)\n    return now.bias + len(seen)\n")
     scene = prepared(torque_scene("planar3-hold"), path, ())
     first, second = run(scene, 0.05), run(scene, 0.05)

@@ -1,4 +1,4 @@
-"""The controllers that are shipped as examples: they are the lab's own, to a millionth of a N·m."""
+"""The example controllers that are shipped agree with the lab's own controllers to 1e-6 N·m."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ FOLDER = Path(next(iter(lessons.examples.__path__)))
 
 
 def beside(session: TorqueSession, name: str, ticks: int) -> float:
-    """The largest difference in torque, N·m, between a session's controller and an example that is shown the
-    same states."""
+    """Returns the largest difference in torque, N·m, between the controller of a session and an example that
+    receives the same states."""
     settings = prepared(session.scene, str(FOLDER / f"{name}.py"), ()).settings
     example = controller_of(settings, session.robot)
     example.reset(session.plant.tau)
@@ -42,7 +42,7 @@ def beside(session: TorqueSession, name: str, ticks: int) -> float:
     ("scene", "ticks"), [("planar3-conflict", 2500), ("iiwa14-circle", 1000), ("iiwa14-hold", 1000)]
 )
 def test_own_himpc_on_one_page_agrees_with_the_lab(scene: str, ticks: int) -> None:
-    """With bounds that bind, a target that jumps and a push."""
+    """The example agrees with active bounds, a target that jumps and a push."""
     session = TorqueSession(torque_scene(scene))
     if scene == "iiwa14-hold":
         position = session.references["position"].preview(0.0, 1e-3, 1).value

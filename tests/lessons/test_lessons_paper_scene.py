@@ -1,4 +1,4 @@
-"""`iiwa14-circle-paper`: its start, the figures of the paper that it gives back, and Tables V to VIII."""
+"""`iiwa14-circle-paper`: its start, the results of the paper that it reproduces, and Tables V to VIII."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 NAME = "iiwa14-circle-paper"
 TABLE_V = "[0.8,0.8,1.2,1.2,0.8,1.2,1.2]"
-"""Diagonal elements down or up by 20 % in the order − − + + − + +."""
+"""Factors of the diagonal elements: 20 % lower or higher, in the order − − + + − + +."""
 
 
 @lru_cache(maxsize=32)
@@ -38,7 +38,7 @@ def result(*assignments: str, controller: str = "himpc") -> dict[str, Any]:
 
 
 def test_it_starts_on_the_reference() -> None:
-    """Position and velocity of levels 1 and 2 are the reference's, and no joint accelerates."""
+    """At the start, position and velocity of levels 1 and 2 equal the reference, and no joint accelerates."""
     session = TorqueSession(torque_scene(NAME))
     row = session.tick()
     at = session.layout.fields
@@ -52,7 +52,7 @@ def test_it_starts_on_the_reference() -> None:
 
 
 def test_what_the_paper_left_open_is_switchable() -> None:
-    """Gravity, velocity limits, barrier and position rows are settings, and a run takes them."""
+    """Gravity, velocity limits, barrier and position rows are settings of the scene, and a run uses them."""
     choices = (
         "plant.gravity=true",
         "limits.velocity=true",
@@ -66,7 +66,8 @@ def test_what_the_paper_left_open_is_switchable() -> None:
 
 
 def test_the_paper_run_is_sound_and_near_the_printed_figures() -> None:
-    """q₁ within 0.5 % of 8.773° (over the whole run); a few position rows give way near the limits."""
+    """The RMSE of q₁ over the whole run is within 0.5 % of 8.773°; a few position rows are softened near the
+    limits."""
     found = result()
     assert found["diverged"] is False
     assert 1 <= found["solver"]["unsolved"] <= 10
@@ -82,26 +83,28 @@ def test_the_paper_run_is_sound_and_near_the_printed_figures() -> None:
 @pytest.mark.parametrize("reading", ["inertia_scale", "diagonal_scale"])
 @pytest.mark.parametrize("scene", [NAME, "iiwa14-circle"])
 def test_table_5_a_disturbed_inertia_costs_little(scene: str, reading: str) -> None:
-    """Links of other inertia, or diag M(q) altered in the dynamics: no level-1 RMSE is 10 % worse."""
+    """With scaled link inertias, or a scaled diagonal of M(q) in the dynamics, no RMSE of level 1 increases
+    by 10 %."""
     nominal = summary(record(scene))
     disturbed = summary(record(scene, f"plant.{reading}={TABLE_V}"))
     for key in ("rmse", "rmse_after_1s"):
         ratio = np.array(disturbed["tasks"][0][key]) / np.array(nominal["tasks"][0][key])
         assert ratio.max() <= 1.10
-        assert np.abs(ratio - 1).max() > 1e-4  # the plant did change
-    # Printed position rows, which only the paper's scene has, give way a few times.
+        assert np.abs(ratio - 1).max() > 1e-4  # the disturbance has an effect
+    # The position rows as printed, which only the paper's scene has, are softened a few times.
     assert disturbed["solver"]["unsolved"] <= (10 if scene == NAME else 0)
 
 
 def test_a_speed_from_which_one_can_stop_leaves_no_qp_unsolved() -> None:
-    """The lab's own position limits cost q₁ 4 % of the paper's figure, and every QP has a solution."""
+    """With the lab's own position limits the RMSE of q₁ is 4 % above the paper's value, and every QP has a
+    solution."""
     found = result("limits.position=viability")
     assert found["solver"]["unsolved"] == 0
     assert found["tasks"][2]["rmse"][0] == pytest.approx(9.15, rel=0.01)
 
 
 def test_table_6_a_longer_horizon_does_not_hurt_if_R_weighs_accelerations() -> None:
-    """With R on M̄⁻¹Δτ the RMSE of x falls from N = 5 to 10 to 20 by the paper's share, ± 5 %."""
+    """With R on M̄⁻¹Δτ the RMSE of x decreases from N = 5 to 10 to 20 by the paper's ratios, ± 5 %."""
     soft = ("R_on=acceleration", "limits.position=viability")
     errors = [result(f"horizon={N}", *soft)["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
     for before, after in pairwise(errors):
@@ -111,14 +114,15 @@ def test_table_6_a_longer_horizon_does_not_hurt_if_R_weighs_accelerations() -> N
 
 
 def test_table_6_with_R_as_printed_a_longer_horizon_helps_a_little() -> None:
-    """Over the whole run, position rows as printed: by 3 to 6 %, a third of the paper's 8 to 17 %."""
+    """Over the whole run, with position rows as printed, the RMSE decreases by 3 to 6 %, a third of the
+    paper's 8 to 17 %."""
     errors = [result(f"horizon={N}")["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
     assert errors[2] < errors[1] < errors[0]
     assert 0.93 < errors[2] / errors[0] < 0.97
 
 
 def test_table_6_new_jacobians_change_next_to_nothing() -> None:
-    """NHIMPC iterates, and its errors are HIMPC's to 1 %, as the paper finds."""
+    """NHIMPC iterates, and its errors agree with those of HIMPC to 1 %, as in the paper."""
     linear, nonlinear = result(), result(controller="nhimpc")
     assert 1 < nonlinear["solver"]["iterations"]["mean"] < 4
     for one, other in zip(linear["tasks"], nonlinear["tasks"], strict=True):
@@ -126,7 +130,8 @@ def test_table_6_new_jacobians_change_next_to_nothing() -> None:
 
 
 def test_strict_against_weighted_is_one_switch() -> None:
-    """The same scene, weights and bounds: without priorities level 3 gains and level 1 pays."""
+    """With the same scene, weights and bounds, but without priorities, the error of level 3 falls and that of
+    level 1 rises."""
     strict, weighted = (
         result("limits.position=viability", controller=each) for each in ("himpc", "weighted")
     )
@@ -138,12 +143,13 @@ def test_strict_against_weighted_is_one_switch() -> None:
 
 
 def smoothness(torque: Array, benchmark: Array) -> float:
-    """S of section VI-D, N·m."""
+    """Returns S of section VI-D, N·m."""
     return float(np.sqrt(((torque - benchmark) ** 2).sum(axis=1).mean()))
 
 
 def test_table_8_coarser_encoders_make_the_torque_rougher() -> None:
-    """S rises with every step and is within 30 % of the paper's five values, no state bound being active."""
+    """S increases with every step of the resolution and is within 30 % of the paper's five values, without
+    state bounds."""
     printed = {0.5: 0.93, 1.0: 2.20, 2.0: 4.54, 5.0: 11.62, 10.0: 22.81}
 
     def torque(thousandths: float) -> Array:

@@ -1,4 +1,5 @@
-"""The reproduction: every item can be asked for, failures are data, what is written is what was measured."""
+"""The reproduction: every item can be run, failed runs are data, and the reports contain the measured
+values."""
 
 from __future__ import annotations
 
@@ -32,13 +33,13 @@ QUICK = (False, True)
 
 
 def failed(jobs: Iterable[Work]) -> Results:
-    """A run for every job, all failed."""
+    """Returns a failed result for every job."""
     return {job: JobResult(job, {}, {}, "there was no time") for job in jobs}
 
 
 @pytest.fixture(scope="module")
 def short() -> dict[str, JobResult]:
-    """A second and a bit of RT1 for two controllers."""
+    """Runs of 1.2 s of RT1 with two controllers."""
     jobs = {name: Job(RunSpec("planar3-circle", controller=name, duration=1.2)) for name in ("himpc", "osf")}
     found = perform_all(jobs.values())
     return {name: found[job] for name, job in jobs.items()}
@@ -48,7 +49,7 @@ def short() -> dict[str, JobResult]:
 
 
 def test_the_papers_tables_and_figures_are_there() -> None:
-    """Everything the paper reports as a table or plot, by the name one would guess."""
+    """Every table and plot of the paper is an item, under the expected name."""
     tables = {f"himpc-table-{number}" for number in range(1, 9)}
     figures = {f"himpc-fig-{number}" for number in (*range(3, 16), *range(17, 22))}
     assert tables | figures | {"himpc-accuracy", "himpc-ablations", "himpc-value"} <= set(ITEMS)
@@ -56,14 +57,15 @@ def test_the_papers_tables_and_figures_are_there() -> None:
 
 @pytest.fixture(scope="module")
 def prepared() -> dict[RunSpec, Scene]:
-    """Every scene that some item runs, once."""
+    """Every scene that an item runs, prepared once."""
     jobs = (job for item in ITEMS.values() for quick in QUICK for job in item.jobs(quick))
     return {spec: spec.prepared() for spec in dict.fromkeys(job.spec for job in jobs)}
 
 
 @pytest.mark.parametrize("quick", QUICK)
 def test_no_two_jobs_compute_the_same(quick: bool, prepared: dict[RunSpec, Scene]) -> None:
-    """A setting that a scene has anyway makes another key of the same run: it would be run twice."""
+    """Two jobs with different keys never describe the same run, for example by a setting that equals the
+    scene's own; such a run would be computed twice."""
     seen: dict[str, Work] = {}
     for job in dict.fromkeys(job for item in ITEMS.values() for job in item.jobs(quick)):
         scene, spec = prepared[job.spec], job.spec
@@ -85,7 +87,8 @@ def test_no_two_jobs_compute_the_same(quick: bool, prepared: dict[RunSpec, Scene
 @pytest.mark.parametrize("quick", QUICK)
 @pytest.mark.parametrize("name", ITEMS)
 def test_every_job_can_be_set_up(name: str, quick: bool, prepared: dict[RunSpec, Scene]) -> None:
-    """Scene, controller and every assignment exist, so that no item fails for a typo."""
+    """The scene, the controller and every assigned setting exist; thus no item fails because of a misspelled
+    name."""
     for job in ITEMS[name].jobs(quick):
         scene = prepared[job.spec]
         assert scene.settings.controller == job.spec.controller
@@ -95,7 +98,7 @@ def test_every_job_can_be_set_up(name: str, quick: bool, prepared: dict[RunSpec,
 @pytest.mark.parametrize("quick", QUICK)
 @pytest.mark.parametrize("name", ITEMS)
 def test_failed_runs_do_not_stop_a_report(name: str, quick: bool, tmp_path: Path) -> None:
-    """With every run failed there is still a report: no number of ours, no check that holds."""
+    """If every run failed, there is still a report, without computed numbers and without a passed check."""
     item = ITEMS[name]
     jobs = item.jobs(quick)
     section = item.report(failed(jobs), quick)
@@ -108,7 +111,7 @@ def test_failed_runs_do_not_stop_a_report(name: str, quick: bool, tmp_path: Path
 
 @pytest.mark.parametrize("name", ITEMS)
 def test_quick_runs_are_no_longer_than_the_others(name: str, prepared: dict[RunSpec, Scene]) -> None:
-    """--quick is never more work."""
+    """With --quick an item simulates no more seconds than without it."""
 
     def seconds(quick: bool) -> float:
         return sum(prepared[job.spec].duration for job in set(ITEMS[name].jobs(quick)))
@@ -129,7 +132,7 @@ def test_every_table_has_its_printed_values(number: int) -> None:
 
 
 def test_printed_values_are_what_the_paper_prints() -> None:
-    """One number per table, read from the paper a second time."""
+    """One number per table equals the value that was read from the paper a second time."""
     assert printed("himpc_table_2")["hqp"] == {"x": 3.11e-3, "y": 2.39e-3, "q1": 1.05}
     assert printed("himpc_table_3")["Input constraints"]["hqp"] is True
     assert printed("himpc_table_5")["disturbed"]["orientation"] == [3.388e-2, 2.290e-2, 2.122e-1]
@@ -142,7 +145,7 @@ def test_printed_values_are_what_the_paper_prints() -> None:
 
 
 def fake(job: Job, error: float, torque: float, speed: float, lost: float | None = None) -> JobResult:
-    """A run with a level-1 error (m), and shares of the bounds."""
+    """Returns a result with a given error of level 1 (m) and given ratios to the bounds."""
     task = {"name": "position", "rmse_after_1s": [error, error / 2], "rmse": [error, error / 2]}
     limits = {"torque": {"max_ratio": torque}, "velocity": {"max_ratio": speed}}
     data: dict[str, Any] = {"diverged": lost is not None, "diverged_at_s": lost, "tasks": [task]}
@@ -150,13 +153,13 @@ def fake(job: Job, error: float, torque: float, speed: float, lost: float | None
 
 
 def ticks(error: float, torque: float, speed: float, lost: float | None = None) -> dict[str, bool | None]:
-    """The verdicts if all three runs end alike."""
+    """Returns the verdicts for three runs with equal results."""
     runs = {make("himpc"): fake(make("himpc"), error, torque, speed, lost) for make in (rt1, rt2, rt3)}
     return {name: verdict.holds for name, verdict in verdicts(runs, "himpc").items()}
 
 
 def test_ticks_are_decided_by_the_runs() -> None:
-    """Each property turns with its own number, and none is decided by a run that failed."""
+    """Each property changes with its own number, and a failed run decides none of them."""
     assert ticks(1e-5, 1.0, 1.0) == dict.fromkeys(CRITERIA, True)
     assert ticks(1e-3, 1.0, 1.0)["High accuracy"] is False
     assert ticks(0.05, 1.0, 1.0)["Singularity-free"] is False
@@ -192,7 +195,8 @@ def test_nothing_measured_is_no_check_passed() -> None:
 
 
 def test_jobs_run_anywhere_give_the_same_numbers(short: dict[str, JobResult]) -> None:
-    """A spawned process and this one agree to the bit, and the arrays are as long as the run."""
+    """A spawned process and this process compute bitwise equal results, and the arrays have one row per
+    tick."""
     run = short["himpc"]
     again = run.job.do()
     assert np.array_equal(run["tau"], again["tau"])
@@ -210,21 +214,22 @@ def test_a_job_that_cannot_be_done_is_a_run_with_a_sentence() -> None:
 
 
 def test_the_incremental_model_is_better_than_a_model_20_percent_off(short: dict[str, JobResult]) -> None:
-    """Section III-B on its own definitions: γ of (21) at least ten times δ of (25)."""
+    """Section III-B by its own definitions: γ of (21) is at least ten times as large as δ of (25)."""
     errors = model_errors(short["himpc"])
     assert errors.gamma > 10 * errors.delta > 0
     assert errors.beta > 10 * errors.epsilon > 0
 
 
 def test_an_exact_nominal_model_has_no_error() -> None:
-    """γ vanishes when nominal model and plant agree: the definition measures the model, nothing else."""
+    """γ vanishes if the nominal model agrees with the plant; thus its definition measures only the error of
+    the model."""
     exact = tuple(
         f"nominal.{key}" for key in ("mass_scale=1", "inertia_scale=1", "armature=[0.05,0.05,0.03]")
     )
     bare = ("plant.friction=0", "plant.damping=0")
     job = Job(RunSpec("planar3-circle", controller="himpc", set=(*exact, *bare), duration=1.2))
     wrong = Job(RunSpec("planar3-circle", controller="himpc", set=bare, duration=1.2))
-    # What is left is the change of M and C within a tick.
+    # The remainder is the change of M and C within a tick.
     assert model_errors(job.do()).gamma < 0.01 * model_errors(wrong.do()).gamma
 
 
@@ -236,7 +241,8 @@ def test_smoothness_is_the_rms_distance() -> None:
 
 
 def test_the_decrease_of_the_value_function_is_measured() -> None:
-    """A geometric decay has its rate; one tick that rises far from the reference spoils it."""
+    """A geometric decay yields its rate; a single tick that rises far from the reference makes the rate
+    negative."""
     t = np.array([1e-3 * k for k in range(2000)])
     V = np.maximum(100.0 * 0.9 ** np.arange(len(t)), 1e-3)
     epsilon, alpha = decrease(V, t)
@@ -247,7 +253,8 @@ def test_the_decrease_of_the_value_function_is_measured() -> None:
 
 
 def test_weighing_the_torque_costs_accuracy_where_gravity_pulls() -> None:
-    """Section IV-C: at rest ‖Δτ‖² has no bias whatever the weight, ‖τ‖² has, and the more the larger R."""
+    """Section IV-C: at rest the weight on ‖Δτ‖² leads to no error for any R; the weight on ‖τ‖² leads to an
+    error that increases with R."""
     still = EffortJob(
         RunSpec("iiwa14-circle", controller="himpc", duration=1.2),
         hold_deg=(0.0, 90.0, 0.0, 10.0, 0.0, 10.0, 0.0),
@@ -277,7 +284,7 @@ def picture(name: str) -> Picture:
 
 
 def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
-    """report.md, results.json and the picture agree with the section, and NaN becomes null."""
+    """report.md, results.json and the picture agree with the section, and NaN is written as null."""
     section = Section(
         notes=("A note.",),
         rows=(Row("x", "m", 2.0, 4.0, "differs | because"), Row("y", "m", None, math.nan, "none")),
@@ -312,7 +319,7 @@ def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
 
 
 def test_items_share_their_runs(short: dict[str, JobResult]) -> None:
-    """Two items that need the same job get the same run."""
+    """Two items that need the same job receive the same result."""
     job = Job(replace(short["himpc"].job.spec, duration=0.01))
     seen: list[JobResult] = []
 

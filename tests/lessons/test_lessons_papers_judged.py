@@ -1,4 +1,5 @@
-"""Judging without running: verdicts, two-sided checks, a mutation test of every printed number, the page."""
+"""Judgement without runs: verdicts, two-sided checks, mutations of every printed number, and the generated
+page."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ from lessons.papers.topics import Quoted, Topic, topics
 ROOT = Path(__file__).parents[2]
 VALUES = ROOT / "lessons" / "papers" / "values"
 TIMES = ("himpc_table_7", "htmpc_text.htmpc_step_ms", "htmpc_text.htidkc_step_ms")
-"""Computing times: another machine may be ten times slower, so a factor of two is not seen."""
+"""Computing times are judged with a wide tolerance, as another machine may be ten times slower; a factor of
+two is therefore not detected."""
 
 
 @pytest.mark.parametrize(
@@ -52,7 +54,8 @@ def test_a_row_has_a_verdict(row: Row, verdict: str) -> None:
 
 
 def test_a_number_is_held_against_the_stored_one_on_both_sides() -> None:
-    """Better or worse by more than the band, missing, new or turned: each fails, and nothing else does."""
+    """A number that is better or worse than the stored one by more than the tolerance, missing, new or of the
+    opposite verdict fails, and nothing else does."""
     row = Row("x", "m", 2.0, 4.0, topic="chatter")
     check = between("y", 1.0, 0.0, 10.0)
     section = Section(rows=(row,), checks=(check,))
@@ -78,7 +81,7 @@ def test_a_number_is_held_against_the_stored_one_on_both_sides() -> None:
 
 
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The places of all numbers, truth values and sides in a values file."""
+    """Yields the paths of all numbers, truth values and sides in a values file."""
     if isinstance(value, dict):
         for key, each in value.items():
             yield from leaves(each, (*path, key))
@@ -103,7 +106,7 @@ def at(data: Any, path: tuple[Any, ...]) -> Any:
 
 
 def turned(name: str, path: tuple[Any, ...], value: Any) -> list[Any]:
-    """What a printed value could be misread as."""
+    """Returns the wrong values that a misreading of a printed value could give."""
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, str):
@@ -124,7 +127,7 @@ def faults(quick: bool, items: dict[str, Item], memory: dict[str, StoredItem]) -
 
 
 def test_what_is_stored_is_sound() -> None:
-    """Every stored check held, every row is as stored, and every item with numbers was stored once."""
+    """Every stored check passed, every row equals the stored one, and every item with numbers is stored."""
     for quick in (True, False):
         assert not faults(quick, ITEMS, stored(quick))
         for name, memory in stored(quick).items():
@@ -136,7 +139,8 @@ def test_what_is_stored_is_sound() -> None:
 
 
 def with_values(patch: pytest.MonkeyPatch, name: str, data: Any, seen: list[str] | None = None) -> None:
-    """From here on the file `name` reads as `data`; what is read is noted in `seen`."""
+    """Replaces the content of file `name` by `data` for the rest of the test, and notes in `seen` the files
+    that are read."""
 
     def read(table: str) -> Any:
         if seen is not None:
@@ -148,7 +152,7 @@ def with_values(patch: pytest.MonkeyPatch, name: str, data: Any, seen: list[str]
 
 @pytest.mark.parametrize("name", sorted({name for name, _ in PRINTED}))
 def test_no_printed_number_can_be_turned_around_unnoticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negated, doubled, halved, flipped: some check fails, whichever printed value it is."""
+    """If any printed value is negated, doubled, halved or inverted, some check fails."""
     text = (VALUES / f"{name}.toml").read_text(encoding="utf-8")
     whole, quick = stored(False), stored(True)
     memory = {item: (kept, item not in whole) for item, kept in {**quick, **whole}.items()}
@@ -181,7 +185,7 @@ def test_no_printed_number_can_be_turned_around_unnoticed(name: str, monkeypatch
 
 
 def test_every_disagreement_is_explained_and_can_be_seen() -> None:
-    """Each topic has its texts, and its setting can be prepared."""
+    """Each topic has its texts, and its state can be prepared."""
     for topic in topics().values():
         assert topic.title and topic.evidence and topic.cause and topic.look
         if topic.state is not None:
@@ -189,7 +193,8 @@ def test_every_disagreement_is_explained_and_can_be_seen() -> None:
 
 
 def test_every_number_in_a_topic_is_measured_or_said_to_be_given() -> None:
-    """What a text quotes of ours is a stored row; other numbers are listed: a paper's, or a setting's."""
+    """A number of ours in a text refers to a stored row; other numbers, of a paper or of a setting, are
+    listed as given."""
     memory = stored(False)
     for topic in topics().values():
         texts = topic.evidence + topic.cause
@@ -205,7 +210,8 @@ def test_every_number_in_a_topic_is_measured_or_said_to_be_given() -> None:
 
 
 def test_a_measured_number_is_written_into_its_text() -> None:
-    """As the row has it now, not as it was stored; one that is missing is a dash."""
+    """A text contains the present number of its row, not the stored one; a missing number is written as a
+    dash."""
     numbers = {"a": Quoted("i", "r", scale=1e3), "b": Quoted("i", "r", ratio=True, less=1.0, form="+.0%")}
     topic = Topic("t", "", "{a} mm, {b}", "no number", "", numbers=numbers)
     assert topic.told({("i", "r"): (2e-3, 0.9)}).evidence == "2 mm, −10 %"
@@ -217,7 +223,8 @@ def test_a_measured_number_is_written_into_its_text() -> None:
 
 
 def test_what_needs_hardly_a_run_is_measured_again() -> None:
-    """Q against R and M̄ against M from the settings; and when OSF loses RT4's singular start."""
+    """The ratios of Q to R and of M̄ to M follow from the settings, and OSF loses control at the stored time
+    on RT4."""
     kept = stored(False)
     for row in ITEMS["himpc-weights"].report({}, False).rows:
         assert row.ours == pytest.approx(kept["himpc-weights"].rows[row.quantity][0], rel=1e-4), row.quantity
@@ -231,7 +238,7 @@ def test_every_topic_is_needed() -> None:
 
 
 def test_the_page_is_fresh(tmp_path: Path) -> None:
-    """docs/disagreements.md is what the stored numbers give: `himpc-lab reproduce --stored --out docs`."""
+    """docs/disagreements.md equals the output of `himpc-lab reproduce --stored --out docs`."""
     write_page(recalled(list(ITEMS.values())), tmp_path)
     made = (tmp_path / "disagreements.md").read_text(encoding="utf-8")
     assert made == (ROOT / "docs" / "disagreements.md").read_text(encoding="utf-8")

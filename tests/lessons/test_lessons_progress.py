@@ -1,4 +1,5 @@
-"""What a learner hands in: read as it was written, judged by its signature, and refused if it is damaged."""
+"""A learner's submission of progress is read back as it was written, checked by its signature, and refused if
+damaged."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ def test_a_signature_is_of_one_key() -> None:
 
 
 def test_what_was_changed_is_not_signed() -> None:
-    """A better score under the seal of a worse one; and every single sign that is another."""
+    """A better score with the signature of a worse one is not accepted, nor is any change of a single
+    character."""
     better = HandedIn(HANDED.name, HANDED.at, DONE.with_points("deadlines", 100.0))
     seal = written(HANDED, KEY)[-64:]
     assert read_handed_in(written(better, KEY)[:-64] + seal, KEY)[1] == "signed with another key"

@@ -1,7 +1,7 @@
-"""Numbers that stand in a lesson's sentences, beside its claims: each is measured, to the digits it has.
+"""Every number in a sentence of a lesson is measured, to the number of digits that the sentence gives.
 
-`quoted_all.QUOTED` holds those that a run gives. Those that follow from settings alone are at the end, or in
-`test_lessons_derivations`.
+`quoted_all.QUOTED` contains the numbers that runs give. Numbers that follow from settings alone are tested at
+the end of this file, or in `test_lessons_derivations`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from robots import Plant
 
 
 def texts(step: Step) -> str:
-    """All that a step tells, in one line."""
+    """Returns all text of a step, in one line."""
     question = "" if step.prediction is None else step.prediction.question
     options = [each.text for each in getattr(step.prediction, "options", ())]
     claims = [word for claim in step.claims for word in (claim.text, claim.because)]
@@ -55,13 +55,13 @@ def test_a_number_in_a_sentence_is_measured(quoted: Quoted, course_runs: CourseR
 
 WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
 LOOSE = re.compile(rf"(?<![\w.−-])−?\d+(?:\.\d+)?|\b(?:{WORDS})\b")
-"""Digits, and words that are numbers."""
+"""Digits, and words that denote numbers."""
 REFERENCE = re.compile(
     r"\(\d+\w?\)|(?:[Ll]evels?|[Jj]oints?|links|Remark|Part|Table|Theorem|Lemma|task|disc) "
     r"[\dIVX]+(?: and \d)?"
 )
 GIVEN: dict[str, tuple[str, ...]] = {
-    # Of the step's own text and script.
+    # Numbers of the step's own text and script.
     "a-redundant-arm/1": ("60",),
     "when-tasks-fight/2": ("2",),
     "seeing-ahead/2": ("8", "0.3", "1", "42"),  # and the paper's improvement
@@ -70,13 +70,13 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "sensors-are-coarse/0": ("4",),
     "inside-the-qp/0": ("2",),
     "inside-the-qp/2": ("tenth",),
-    "first-hold-then-reach/2": ("1.63",),  # of the step before
-    # The edge of stability.
+    "first-hold-then-reach/2": ("1.63",),  # a number of the step before
+    # Numbers of the edge of stability.
     "no-model-needed/1": ("1", "1", "−1"),
     "no-model-needed/2": ("1",),
-    "no-model-needed/3": ("−1", "0.91", "−0.89"),  # eigenvalues: below
+    "no-model-needed/3": ("−1", "0.91", "−0.89"),  # eigenvalues: tested below
     "the-model-is-wrong/2": ("1", "0.01", "1"),  # and a setting
-    # What follows from settings and equations: below.
+    # Numbers that follow from settings and equations, which are tested below.
     "two-tasks/1": ("200", "50"),
     "stretched-out/0": ("0.06", "million"),
     "torque-has-a-limit/1": ("60",),  # settings
@@ -84,20 +84,20 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "stopping-takes-distance/0": ("57", "0.3", "100", "35", "38"),
     "stopping-takes-distance/1": ("50",),
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
-    "inside-the-qp/3": ("10", "14", "half"),  # of the first step
-    # Every other torque counts, or is computed.
+    "inside-the-qp/3": ("10", "14", "half"),  # numbers of the first step
+    # Counts of torques, or computed numbers.
     "deadlines/0": ("2",),
     "deadlines/1": ("half", "half", "1", "8"),  # and the paper's period and step time
     "deadlines/2": ("half",),
-    # The papers': below.
+    # Numbers of the papers, which are tested below.
     "how-far-ahead/0": ("17", "4", "third", "1.2"),
     "how-strict-is-strict/1": ("tenth", "3", "1"),
     "how-strict-is-strict/2": ("3.07", "3.42", "3.24", "6.25"),
-    # Of several runs: test_lessons_architectures; and the paper's 2.3.
+    # Numbers of several runs, which are tested in test_lessons_architectures; and the paper's 2.3.
     "deliveries/0": ("9", "31", "7", "half", "11"),
     "deliveries/1": ("11", "14", "80", "half", "tenth", "1.6", "1.2", "2.1", "half", "2.3"),
 }
-"""Numbers in explanations that no run of the step gives, per step, in their order."""
+"""Numbers in explanations that no run of the step gives, per step, in the order of the text."""
 
 
 def test_every_number_in_an_explanation_is_measured_or_said_to_be_given() -> None:
@@ -125,7 +125,7 @@ def test_numbers_of_the_papers_are_printed_there() -> None:
 
 
 def test_a_longer_horizon_gains_a_third_of_what_the_paper_prints() -> None:
-    """*How far ahead*: Table VI, 17 %, and ours over the whole 4 s."""
+    """*How far ahead*: the improvement in Table VI is 17 %; ours over the whole 4 s is a third of it."""
     rows = stored(False)["himpc-table-6"].rows
     near, far = (rows[f"R on Δτ, as printed: HIMPC, N = {N}"] for N in (5, 30))
     ours = 1.0 - far[0] / near[0]
@@ -135,13 +135,14 @@ def test_a_longer_horizon_gains_a_third_of_what_the_paper_prints() -> None:
 
 
 def test_joint_3_swings_a_little_more_than_once_a_second() -> None:
-    """*When tasks fight*, third step."""
+    """*When tasks fight*, third step: joint 3 oscillates a little more than once a second."""
     assert "a little more than once a second" in texts(step_of("when-tasks-fight/2"))
     assert 1.0 < stored(False)["himpc-conflict"].rows["RT2, 2 to 6 s: how often joint 3 swings"][0] < 1.3
 
 
 def test_a_printed_bound_on_speed_is_overrun() -> None:
-    """docs/house.md, and what `Limits` says of itself: 17 %, and 0.2 % with a barrier."""
+    """docs/house.md and the docstring of `Limits` are right: the speed exceeds its bound by 17 %, with a
+    barrier by 0.2 %."""
     house = (Path(__file__).parents[2] / "docs/house.md").read_text(encoding="utf-8")
     assert "with 0, as printed, the limit is overrun by 17 %" in " ".join(house.split())
     told = " ".join((Limits.__doc__ or "").split())
@@ -156,7 +157,8 @@ def test_a_printed_bound_on_speed_is_overrun() -> None:
 
 
 def test_a_gentler_bound_on_speed_helps_level_1_under_conflict() -> None:
-    """`CONFLICT_LIMITS`: the approach that the scene has, against the default and the printed one."""
+    """`CONFLICT_LIMITS`: the velocity approach of the scene gives half the error of the printed one; the
+    default, more."""
     rows = stored(False)["himpc-table-3"].rows
     of = {
         rate: next(row[0] for name, row in rows.items() if f"velocity_approach = {rate}," in name)
@@ -167,7 +169,7 @@ def test_a_gentler_bound_on_speed_helps_level_1_under_conflict() -> None:
 
 
 def test_the_inverse_of_a_straight_arm_magnifies_many_million_times() -> None:
-    """*Stretched out*: J M⁻¹ Jᵀ where it begins."""
+    """*Stretched out*: the condition number of J M⁻¹ Jᵀ at the start exceeds 1e7."""
     scene = torque_scene("planar3-singular")
     plant = Plant(scene.robot, scene.settings.plant)
     plant.reset(scene.q_0)
@@ -178,7 +180,8 @@ def test_the_inverse_of_a_straight_arm_magnifies_many_million_times() -> None:
 
 
 def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
-    """*Stopping takes distance*: 57°/s within what 5 ms see takes 100 rad/s²; the motor gives 35."""
+    """*Stopping takes distance*: a stop from 57°/s within the path of 5 ms needs 100 rad/s², and the motor
+    yields 35."""
     v = math.radians(57.0)
     d = 5e-3 * v
     assert math.degrees(d) == pytest.approx(0.3, abs=0.02)

@@ -1,4 +1,5 @@
-"""A run's file alone tells how each torque came about: every tick recomputed with NumPy, nothing of ours."""
+"""The file of a run suffices to recompute every torque: NumPy alone repeats each tick, without code of the
+lab."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ TICKS = 300
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """RT1 with one knot and coarse encoders, as the command line writes it."""
+    """The file that the command line writes for RT1 with one knot and coarse encoders."""
     folder = tmp_path_factory.mktemp("replay")
     what = [
         "--set",
@@ -33,7 +34,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 def test_every_torque_follows_from_the_file(file: dict[str, Any]) -> None:
-    """(28), (31) and the null space (33) written out for the planar arm give each demanded torque."""
+    """(28), (31) and the null space (33), written out for the planar arm, give each demanded torque."""
     told = json.loads(str(file["settings"]))["in_force"]
     T, M_bar = told["T_s"], np.array(told["M_bar"]) * told["M_bar_scale"]
     q, v = file["q_measured"], file["v_measured"]
@@ -59,14 +60,14 @@ def test_every_torque_follows_from_the_file(file: dict[str, Any]) -> None:
 
 
 def test_what_acted_is_what_acts_next(file: dict[str, Any]) -> None:
-    """τ₀ of a tick is the torque applied at the one before; the first one has no tick before it."""
+    """τ₀ of a tick is the torque that was applied at the previous one; the first tick has a finite τ₀."""
     np.testing.assert_array_equal(file["tau_0"][1:], file["tau"][:-1])
     assert np.isfinite(file["tau_0"][0]).all()
 
 
 def test_no_bound_was_near(file: dict[str, Any]) -> None:
-    """The recomputation leaves bounds out: they have to be far away, the one on the way to a joint's limit,
-    rebuilt from the file's constants, too."""
+    """All bounds are far away, as the recomputation leaves them out; this includes the velocity bound near a
+    joint's limit, which is rebuilt from the constants in the file."""
     q, v, a, t = file["q_measured"], file["v_measured"], file["a_max"], float(file["position_reaction"])
     room = np.minimum(file["q_upper"] - q, q - file["q_lower"]) - float(file["position_margin"])
     reach = np.minimum(file["v_limit"], a * (np.sqrt(t**2 + 2 * room / a) - t))
@@ -75,7 +76,7 @@ def test_no_bound_was_near(file: dict[str, Any]) -> None:
 
 
 def test_a_file_names_what_else_it_stands_on(file: dict[str, Any]) -> None:
-    """The frame of tasks that name none, and the constants of the position bound."""
+    """The file contains the frame of tasks that name none, and the constants of the position bound."""
     assert str(file["tip"]) == "ee"
     assert float(file["position_reaction"]) == pytest.approx(1e-3 + 5 / 15)
     assert float(file["position_margin"]) > 0
@@ -83,7 +84,8 @@ def test_a_file_names_what_else_it_stands_on(file: dict[str, Any]) -> None:
 
 
 def test_at_velocity_level_too(tmp_path: Path) -> None:
-    """The command that acted before, and what was measured: with noise not the truth."""
+    """At velocity level τ₀ is the previous command, and the measured joint angles differ from the true ones
+    by the noise."""
     path = tmp_path / "run.npz"
     noisy = ["--set", "plant.position_noise=0.001", "--duration", "1"]
     what = ["run", "ridgeback-ur10-square", *noisy, "--npz", str(path), "--json", str(tmp_path / "run.json")]
@@ -96,7 +98,7 @@ def test_at_velocity_level_too(tmp_path: Path) -> None:
 
 
 def jacobian(q: np.ndarray) -> dict[str, np.ndarray]:
-    """Three links of 0.3 m in the plane, and joint 1."""
+    """Returns the Jacobians of the tip of three links of 0.3 m in the plane, and of joint 1."""
     angle = np.cumsum(q)
     x, y = 0.3 * np.cos(angle), 0.3 * np.sin(angle)
     hand = np.array([[-y[joint:].sum() for joint in range(3)], [x[joint:].sum() for joint in range(3)]])

@@ -1,4 +1,5 @@
-"""docs/results.md and house.md tell what `reproduce` measured: a number of ours in them is a stored one."""
+"""Every number of ours in docs/results.md and docs/house.md equals a number that `reproduce` measured and
+stored."""
 
 from __future__ import annotations
 
@@ -19,23 +20,23 @@ MEMORY = stored(False)
 
 
 def of(item: str, row: str) -> float:
-    """A stored number: of a row, or of a check."""
+    """Returns the stored number of a row or of a check."""
     memory = MEMORY[item]
     return memory.rows[row][0] if row in memory.rows else memory.checks[row][0]
 
 
 def factor(rule: str) -> float:
-    """By how much one task at a time takes longer than two."""
+    """Returns the ratio of the execution time with one task at a time to the time with two."""
     return of("htmpc-fig-9", f"ST/HT execution time, mean over the layouts completed, {rule}")
 
 
 def power(value: float) -> str:
-    """Two digits and the power of ten."""
+    """Returns a number with two digits and a power of ten."""
     return re.sub(r"e-0", "e-", f"{value:.1e}")
 
 
 def plain(value: float, digits: int) -> str:
-    """Without a zero before the point."""
+    """Returns a number with a given number of decimals, without a zero before the decimal point."""
     return f"{value:.{digits}f}".removeprefix("0")
 
 
@@ -49,7 +50,7 @@ def trend(what: str) -> str:
 
 
 def expected() -> dict[str, str]:
-    """Our column by the first one."""
+    """Returns the entries of our column by those of the first column."""
     fig_11, table_5 = "himpc-fig-11", "himpc-table-5"
     ratios = [of("himpc-table-2", f"{c} over HIMPC, {axis}") for c in ("OSF", "HQP") for axis in "xy"]
     own = of("himpc-table-3", "HIMPC, RT2, velocity_approach = 8, the scene's own: level-1 RMSE")
@@ -114,7 +115,7 @@ def test_the_table_is_what_was_measured() -> None:
 
 
 def test_the_payloads_are_what_was_measured() -> None:
-    """M̄ that adapts to the payload: the whole table, three digits each."""
+    """The table of M̄ adapted to the payload equals the stored numbers, to three digits each."""
 
     def cell(case: Case, words: str, what: str) -> str:
         value = of("himpc-adaptation", quantity(case, words, what))
@@ -126,7 +127,7 @@ def test_the_payloads_are_what_was_measured() -> None:
 
 
 def test_one_round_is_what_the_table_says() -> None:
-    """Deliveries: seconds by rule and architecture."""
+    """The table of the deliveries contains the measured seconds per rule and architecture."""
     rules = {"within 80 cm": (), "within 5 cm and at rest": ("base_tolerance=0.05", "base_at_rest=true")}
     for words, rule in rules.items():
         times = []
@@ -144,7 +145,7 @@ def test_one_round_is_what_the_table_says() -> None:
 
 
 def test_the_departures_from_the_printed_limits_are_the_ones_that_run() -> None:
-    """docs/house.md: the constants, and what they are for."""
+    """docs/house.md names the constants in use, and the violation of the limit that they prevent."""
     text = " ".join((DOCS / "house.md").read_text(encoding="utf-8").split())
     rate, T_s = Limits().velocity_approach, 1e-3
     over = of("himpc-limits", "nominal, as printed: largest velocity over its limit") - 1.0

@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 
 def straight(name: str, **changes: Any) -> Plan:
-    """One tick of the planar arm, straight, asked to pull its tip towards the base."""
+    """Returns the plan of one tick of the straight planar arm with a target that pulls its tip towards the
+    base."""
     loaded = torque_scene("planar3-singular")
     chosen = replace(loaded.settings.for_controller(), **changes)
     pulled = {
@@ -32,7 +33,8 @@ def straight(name: str, **changes: Any) -> Plan:
 
 @pytest.mark.parametrize("name", ["osf", "tdeosf"])
 def test_near_a_singularity_nothing_is_hidden(name: str) -> None:
-    """The undamped laws ask for thousands of times the torque there is, finite; the damped ones do not."""
+    """The undamped laws demand finite torques of thousands of times the limit; the damped ones stay below
+    it."""
     limit = load_robot("planar3").tau_limit
     assert np.abs(straight(name).tau / limit).max() > 1e3
     damped = straight(f"{name}_damped").tau
@@ -40,7 +42,8 @@ def test_near_a_singularity_nothing_is_hidden(name: str) -> None:
 
 
 def test_a_direction_that_is_gone_is_named() -> None:
-    """At the exactly straight arm the lost direction is given up, and the level says so."""
+    """With the exactly straight arm OSF leaves the lost direction out, and the status of the level names
+    it."""
     loaded = torque_scene("planar3-singular")
     controller = make_controller("osf", loaded.robot, loaded.settings.for_controller())
     references = loaded.references(loaded.robot, loaded.settings.levels)
@@ -51,7 +54,7 @@ def test_a_direction_that_is_gone_is_named() -> None:
 
 
 def test_hqp_passes_the_singularity_inside_its_bounds() -> None:
-    """R > 0 keeps the Hessian definite: no level fails, and the torque bounds hold."""
+    """R > 0 keeps the Hessian positive definite: every level is solved, and the torque bounds hold."""
     for R in (10.0, 1e-6):
         levels = tuple(replace(level, R=R) for level in torque_scene("planar3-singular").settings.levels)
         plan = straight("hqp", stack=levels)

@@ -1,4 +1,4 @@
-"""Jumps, pushes and replays: inside its bounds, calm again, and the same to the bit."""
+"""After jumps and pushes the robot stays inside its bounds and comes to rest; replays are bitwise equal."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ JUMPS = {
 
 @lru_cache(maxsize=len(JUMPS))
 def after_jump(case: str) -> tuple[TorqueSession, Array]:
-    """Two and a half seconds after the target was put 1 m away at once, reachable or not."""
+    """Returns the session and the rows of 2.5 s after a sudden jump of the target by 1 m, reachable or
+    not."""
     name, jump = JUMPS[case]
     session = TorqueSession(torque_scene(name))
     session.tick()
@@ -41,7 +42,7 @@ def after_jump(case: str) -> tuple[TorqueSession, Array]:
 
 @pytest.mark.parametrize("case", JUMPS)
 def test_a_jump_of_the_gizmo_keeps_the_torque_in_its_bounds(case: str) -> None:
-    """A gizmo jump of 1 m: everything stays finite, and no torque is asked for beyond its bound."""
+    """After a gizmo jump of 1 m all numbers stay finite, and no demanded torque exceeds its bound."""
     session, rows = after_jump(case)
     assert np.isfinite(field(session, rows, "q")).all()
     assert np.isfinite(field(session, rows, "tau")).all()
@@ -51,14 +52,14 @@ def test_a_jump_of_the_gizmo_keeps_the_torque_in_its_bounds(case: str) -> None:
 
 @pytest.mark.parametrize("case", JUMPS)
 def test_a_jump_of_the_gizmo_keeps_velocities_in_their_bounds(case: str) -> None:
-    """No joint is faster than 1.10 of its limit."""
+    """No joint exceeds 1.10 times its velocity limit."""
     session, rows = after_jump(case)
     assert (np.abs(field(session, rows, "v")) / field(session, rows, "v_limit")).max() <= 1.10
 
 
 @pytest.mark.parametrize("case", JUMPS)
 def test_a_jump_of_the_gizmo_keeps_positions_in_their_bounds(case: str) -> None:
-    """No joint passes its limit."""
+    """No joint exceeds its position limit."""
     session, rows = after_jump(case)
     q, lower, upper = (field(session, rows, name) for name in ("q", "q_lower", "q_upper"))
     bounded = np.isfinite(upper - lower)
@@ -71,7 +72,8 @@ SUBSETS = [names for size in range(4) for names in combinations(("position", "or
 
 @pytest.mark.parametrize("enabled", SUBSETS, ids=lambda names: "+".join(names) or "none")
 def test_a_push_dies_out_under_every_subset_of_levels(enabled: tuple[str, ...], scene: TorqueScene) -> None:
-    """5 N·m for 0.1 s on a middle link: whatever is switched on, all joints are slow 3 s later."""
+    """After 5 N·m for 0.1 s on a middle link all joints are slow 3 s later, for every subset of enabled
+    levels."""
     session = TorqueSession(scene)
     for name in ("position", "orientation", "posture"):
         session.post(Set(f"levels.{name}.enabled", name in enabled))
@@ -85,7 +87,7 @@ def test_a_push_dies_out_under_every_subset_of_levels(enabled: tuple[str, ...], 
 
 
 def test_same_events_same_numbers_to_the_bit(scene: TorqueScene) -> None:
-    """Two sessions that are told the same give the same rows, timing aside."""
+    """Two sessions that receive the same events produce the same rows, except for the computing times."""
     script: dict[int, Event] = {
         3: MoveTarget("position", (0.5, 0.2, 0.6)),
         40: Set("levels.orientation.enabled", False),

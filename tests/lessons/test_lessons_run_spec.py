@@ -1,4 +1,4 @@
-"""A run as data: one type for the command line, lessons, jobs, codes and the page."""
+"""RunSpec describes a run as data, with one type for the command line, lessons, jobs, codes and the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scenes keep what the project promises of them: the numbers of 'Done when' 2, 3, 4 and 6."""
+"""The scenes keep what the project promises: the numbers of 'Done when' 2, 3, 4 and 6."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def record(
 
 
 def assert_sound(result: dict[str, Any]) -> None:
-    """What 'sound' means in the contract of the command line: finite, every QP solved, no fallback."""
+    """Assert that a run is sound by the contract of the command line: finite, every QP solved, no
+    fallback."""
     assert result["diverged"] is False
     assert result["finite"] is True
     assert result["solver"]["unsolved"] == 0
@@ -49,7 +50,7 @@ def circle() -> dict[str, Any]:
 
 
 def test_the_circle_is_sound(circle: dict[str, Any]) -> None:
-    """RT4 for 4 s from rest: bounds, residuals and leak as promised, no fallback."""
+    """RT4 for 4 s from rest keeps the promised bounds, residuals and leak, without a fallback."""
     assert_sound(circle)
     assert circle["limits"]["velocity"]["max_ratio"] <= 1.10
     assert circle["duration_s"] == pytest.approx(4.0)
@@ -57,7 +58,7 @@ def test_the_circle_is_sound(circle: dict[str, Any]) -> None:
 
 
 def test_the_circle_is_accurate(circle: dict[str, Any]) -> None:
-    """Level 1 within 1.5 mm RMSE per axis after the first second, level 2 within 1°."""
+    """After the first second the RMSE of level 1 is within 1.5 mm per axis, and that of level 2 within 1°."""
     position, orientation, q1 = circle["tasks"]
     assert (position["name"], position["level"], position["unit"]) == ("position", 1, "m")
     assert (orientation["name"], orientation["level"], orientation["unit"]) == ("orientation", 2, "deg")
@@ -67,14 +68,14 @@ def test_the_circle_is_accurate(circle: dict[str, Any]) -> None:
 
 
 def test_the_circle_presses_on_its_bounds(circle: dict[str, Any]) -> None:
-    """Level 3 asks for more than joint 1 can do: the scene is about active bounds, and they are counted."""
+    """Level 3 demands more than joint 1 can do; bounds are active in the scene, and they are counted."""
     assert circle["bound_active_share"] > 0.1
     assert circle["limits"]["velocity"]["max_ratio"] > 0.95
     assert circle["dynamic_leak_max"] > circle["priority_leak_max"]
 
 
 def test_same_seed_same_output() -> None:
-    """Everything but the timing keys is the same to the last digit."""
+    """Two runs with the same seed have equal results, except for the computing times."""
     results = []
     for _ in range(2):
         result = summary(record("iiwa14-circle", duration=0.4, seed=3))
@@ -94,7 +95,7 @@ def circle_with(assignment: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("assignment", VARIANTS)
 def test_the_circle_stays_sound_when(assignment: str) -> None:
-    """A longer horizon, a payload nobody told the controller of, and lighter links."""
+    """The circle stays sound with a longer horizon, an unknown payload, and lighter links."""
     assert_sound(circle_with(assignment))
 
 
@@ -107,7 +108,8 @@ PAYLOAD = pytest.mark.xfail(
 
 @pytest.mark.parametrize("assignment", [VARIANTS[0], pytest.param(VARIANTS[1], marks=PAYLOAD), VARIANTS[2]])
 def test_the_circle_stays_fast_and_accurate_when(assignment: str) -> None:
-    """The speeds and the level-1 accuracy of the nominal run survive the same changes."""
+    """With the same changes the speeds and the accuracy of level 1 stay within the limits of the nominal
+    run."""
     result = circle_with(assignment)
     assert result["limits"]["velocity"]["max_ratio"] <= 1.10
     assert max(result["tasks"][0]["rmse_after_1s"]) <= 1.5e-3
@@ -115,7 +117,7 @@ def test_the_circle_stays_fast_and_accurate_when(assignment: str) -> None:
 
 @pytest.mark.parametrize("name", ["panda-hold", "planar3-hold", "iiwa14-hold"])
 def test_hold_scenes_are_sound(name: str) -> None:
-    """At rest on their targets they stay there."""
+    """A robot at rest on its targets stays there."""
     result = summary(record(name, duration=4.0))
     assert_sound(result)
     assert result["limits"]["velocity"]["max_ratio"] <= 0.05
@@ -124,7 +126,7 @@ def test_hold_scenes_are_sound(name: str) -> None:
 
 @pytest.mark.parametrize("file", ["ur_description/urdf/ur10_robot.urdf", "xarm_description/urdf/xarm7.urdf"])
 def test_hold_is_sound_on_robots_of_others(example_urdf: Callable[[str], str], file: str) -> None:
-    """`run hold --urdf` with a UR10 and an xArm 7 of example-robot-data."""
+    """`run hold --urdf` is sound with a UR10 and an xArm 7 of example-robot-data."""
     result = summary(record("hold", duration=4.0, urdf=example_urdf(file)))
     assert_sound(result)
     assert result["limits"]["velocity"]["max_ratio"] <= 0.05
@@ -132,7 +134,8 @@ def test_hold_is_sound_on_robots_of_others(example_urdf: Callable[[str], str], f
 
 
 def test_printed_position_rows_fail_honestly() -> None:
-    """With (32d) as printed and twice the speed QPs fail: the run ends, finite, and every rung is counted."""
+    """With (32d) as printed and twice the speed QPs fail: the run ends, its numbers are finite, and every
+    fallback is counted."""
     recording = record("iiwa14-circle", "limits.position=paper", "limits.velocity_scale=2", duration=4.0)
     result = summary(recording)
     solver = result["solver"]
@@ -153,7 +156,8 @@ def test_printed_position_rows_fail_honestly() -> None:
     ids=["encoder", "encoder and friction"],
 )
 def test_sensor_resolution_and_friction_cause_no_limit_cycle(assignments: tuple[str, ...]) -> None:
-    """8 s of iiwa14-hold with a move and a push: settled, the tip moves less than 0.2 mm peak to peak."""
+    """In 8 s of iiwa14-hold with a move and a push, the tip moves less than 0.2 mm peak to peak after it
+    settled."""
     events = (
         (0.2, MoveTarget("position", (0.506, 0.05, 0.428))),
         (2.0, Push("joint_4", force=(0.0, 20.0, 0.0))),

@@ -1,4 +1,4 @@
-"""Settings by their paths: everything a learner can change, with the right type or one clear sentence."""
+"""Settings by their paths: a learner can change each of them; a wrong type or path is one clear sentence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def start() -> TorqueSettings:
 
 
 def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> None:
-    """Each change is what was asked for, and all the rest stays."""
+    """Each assignment changes its own field, and all others keep their values."""
     expected: dict[str, tuple[Any, Any]] = {
         "horizon": (10, lambda s: s.horizon),
         "T_s": (0.002, lambda s: s.T_s),
@@ -59,7 +59,7 @@ def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> Non
 
 @pytest.mark.parametrize("scene", ["iiwa14-circle", "ridgeback-ur10-delivery"])
 def test_one_table_of_paths_serves_all_values(scene: str) -> None:
-    """Many assignments make no table each; other levels have another."""
+    """Changed values share one table of paths; other levels have another table."""
     settings = load_scene(scene).settings
     changed = with_assignments(settings, ["horizon=7", "levels.1.Q=3"])
     assert changed.places() is settings.places()
@@ -67,7 +67,8 @@ def test_one_table_of_paths_serves_all_values(scene: str) -> None:
 
 
 def test_one_joint_of_many(start: TorqueSettings) -> None:
-    """A place behind a per-joint path changes that joint alone; one number first spreads to all."""
+    """A path with a joint number changes this joint alone; a single number is first extended to all
+    joints."""
     scaled = start.changed("plant.inertia_scale.2", 0.5)
     assert scaled.plant.inertia_scale == (1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0)
     again = scaled.changed("plant.inertia_scale.7", 2.0).plant.inertia_scale
@@ -84,7 +85,7 @@ def test_one_joint_of_many(start: TorqueSettings) -> None:
 
 
 def test_every_listed_path_is_taken(start: TorqueSettings) -> None:
-    """`paths` lists exactly what `changed` accepts: the present value fits back in."""
+    """`paths` lists exactly the paths that `changed` accepts, and each accepts its present value."""
     assert len(start.paths()) == len(set(start.paths())) > 40
     for path in start.paths():
         head, _, rest = path.partition(".")
@@ -96,7 +97,8 @@ def test_every_listed_path_is_taken(start: TorqueSettings) -> None:
 
 
 def test_weights_of_all_levels_at_once(start: TorqueSettings) -> None:
-    """Q and R take one number, or one per level; a level's own may have one entry per coordinate."""
+    """Q and R accept one number, or one per level; the weight of a level may have one entry per
+    coordinate."""
     assert [level.Q for level in start.changed("Q", 5).levels] == [5.0, 5.0, 5.0]
     assert [level.R for level in start.changed("R", [1, 2, 3]).levels] == [1.0, 2.0, 3.0]
     assert start.changed("levels.1.Q", [1, 2, 3]).levels[0].Q == (1.0, 2.0, 3.0)
@@ -118,7 +120,7 @@ def test_weights_of_all_levels_at_once(start: TorqueSettings) -> None:
     ],
 )
 def test_a_typo_names_the_nearest_path(start: TorqueSettings, wrong: str, right: str) -> None:
-    """One sentence with the name that was probably meant."""
+    """The error is one sentence with the name that was probably meant."""
     with pytest.raises(InputError) as error:
         start.changed(wrong, 1)
     suggestion = str(error.value).split("did you mean '")[1].split("'")[0]
@@ -162,7 +164,7 @@ def test_a_typo_names_the_nearest_path(start: TorqueSettings, wrong: str, right:
     ],
 )
 def test_a_value_that_cannot_be_is_refused(start: TorqueSettings, path: str, value: Any) -> None:
-    """Wrong type or range: one sentence, never another exception."""
+    """A wrong type or range is answered by one sentence, never by another exception."""
     with pytest.raises(InputError) as error:
         start.changed(path, value)
     assert "\n" not in str(error.value)
@@ -176,7 +178,7 @@ def test_a_value_that_cannot_be_is_refused(start: TorqueSettings, path: str, val
     ),
 )
 def test_any_value_is_taken_or_refused_in_words(path: str, value: Any) -> None:
-    """Whatever is written into a field: settings a controller can use, or an InputError."""
+    """Any value written into a field yields settings that a controller can use, or an InputError."""
     try:
         new = START.changed(path, value)
     except InputError as error:
@@ -196,7 +198,8 @@ def test_assignments_are_json_or_words() -> None:
     "text", ["horizon", "=3", "Q=NaN", "Q=nan", "Q=Infinity", "Q=-inf", "Q=", "R=[1, NaN]"]
 )
 def test_assignments_that_are_none(text: str) -> None:
-    """No "=", no number: the sentence repeats what was written."""
+    """An assignment without "=" or with a value that is not a number is refused, and the sentence repeats
+    it."""
     with pytest.raises(InputError, match="--set"):
         parse_assignment(text)
 
@@ -209,7 +212,8 @@ def test_later_assignments_build_on_earlier_ones(start: TorqueSettings) -> None:
 
 
 def test_the_order_is_a_setting_of_its_own(start: TorqueSettings) -> None:
-    """All levels by name, in one word or a list; anything else names what it should be."""
+    """The order names every level, in one word or a list; the error of any other value names the valid
+    form."""
     names = [level.name for level in start.levels]
     turned = start.changed("order", ",".join(reversed(names)))
     assert [level.name for level in turned.levels] == names[::-1]

@@ -1,4 +1,5 @@
-"""`solver` is used where it says so, reported as it ran, and refused where it would change nothing."""
+"""`solver` is used by the controllers that have it, reported as it ran, and refused where it has no
+effect."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ QPS = ("himpc", "hiqp", "nhimpc", "weighted")
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> set[str]:
-    """The QP solvers that were called."""
+    """The names of the QP solvers that were called."""
     found: set[str] = set()
 
     def noted(name: str, attempt: Any) -> Any:
@@ -51,7 +52,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> set[str]:
 def test_the_reported_solver_is_the_one_that_ran(
     scene: str, controller: str, settings: tuple[str, ...], told: str | None, asked: set[str]
 ) -> None:
-    scaled = ("limits.velocity_scale=0.2",)  # so that bounds bind
+    scaled = ("limits.velocity_scale=0.2",)  # so that bounds are active
     spec = RunSpec(scene, controller=controller, set=(*scaled, *settings), duration=0.1)
     found = summary(run(spec.prepared()))["solver"]
     assert found["backend"] == told and found["fallbacks"] == {}

@@ -1,4 +1,5 @@
-"""State codes: a whole setting in a line of text, equal to the last bit, and harmless whoever sends it."""
+"""State codes: all settings as a line of text, bitwise equal after decoding, and safe from untrusted
+senders."""
 
 from __future__ import annotations
 
@@ -72,7 +73,8 @@ def events(draw: st.DrawFn, scene: Scene) -> Event:
 @given(data=st.data())
 @settings(max_examples=60)
 def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
-    """Settings reached by random events → code → the same settings, also from the command line's words."""
+    """Settings after random events are equal after encoding and decoding, also by the words of the command
+    line."""
     scene = find(name)
     reached = scene.settings
     for _ in range(data.draw(st.integers(0, 12))):
@@ -94,7 +96,8 @@ def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
 
 
 def test_a_code_says_only_what_differs() -> None:
-    """The scene as it is gives a code of a few signs; a controller's own rate is not told."""
+    """The code of an unchanged scene has a few characters; the rate that a controller brings with it is not
+    stored."""
     plain = state_of(RunSpec("iiwa14-hold"), find("iiwa14-hold").settings)
     assert plain.run.set == ()
     assert len(encode(plain)) < 50
@@ -131,7 +134,7 @@ GOOD = encode(State(RunSpec("planar3-hold", set=("horizon=7", "levels.position.Q
 
 
 def test_a_code_that_was_cut_or_changed_never_becomes_another_state() -> None:
-    """Refused, but for the few bits of padding that mean nothing."""
+    """Such a code is refused, except for changes of the few padding bits that carry no information."""
     refused = 0
     for place in range(len(GOOD)):
         with pytest.raises(InputError):
@@ -209,7 +212,8 @@ def test_bad_codes_are_refused_in_one_sentence(case: str) -> None:
     ],
 )
 def test_settings_of_a_stranger_are_refused_when_prepared(assignment: str) -> None:
-    """They are names and numbers that go the way of --set: one sentence, whatever they are."""
+    """Names and numbers of a code are checked like those of --set: every wrong one is answered by one
+    sentence."""
     with pytest.raises(InputError) as caught:
         decode(packed({"s": "planar3-hold", "a": [assignment]})).run.prepared()
     assert "\n" not in str(caught.value)
@@ -232,7 +236,7 @@ def test_a_mission_of_a_stranger_cannot_fill_the_memory(assignment: str) -> None
 
 @dataclass(frozen=True, kw_only=True)
 class OwnKind(FramePosition):
-    """A kind of task that no word names."""
+    """A kind of task without a name in the catalog."""
 
 
 def test_what_a_code_cannot_carry_is_said() -> None:
@@ -259,7 +263,8 @@ def test_the_command_line_is_quoted_for_a_shell() -> None:
 
 
 def test_priorities_of_now_are_part_of_a_state() -> None:
-    """Swapped by a hand at velocity level they belong to the run; a code passes them on all the same."""
+    """At velocity level, priorities that a user swaps belong to the run; a state code contains them as
+    well."""
     scene = find("ridgeback-ur10-drag")
     assert isinstance(scene, VelocityScene)
     session = VelocitySession(scene)
@@ -278,7 +283,7 @@ def test_priorities_of_now_are_part_of_a_state() -> None:
 
 
 def test_a_code_of_before_may_name_a_route_that_is_gone() -> None:
-    """What was structured is compiled now; the torques are the same."""
+    """The route "structured" of older codes is now "compiled"; the torques are equal."""
     state = decode(encode(State(RunSpec("planar3-hold", set=("route=structured",)))))
     found = state.run.prepared().settings
     assert isinstance(found, TorqueSettings) and found.route == "compiled"

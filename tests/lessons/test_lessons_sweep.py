@@ -1,4 +1,5 @@
-"""Sweeps: what is asked for is what is run, and a stopped sweep ends as if it had never been stopped."""
+"""A sweep runs the requested cells, and a stopped sweep that is resumed has the same result as one without a
+stop."""
 
 from __future__ import annotations
 
@@ -46,7 +47,8 @@ OVER = ("M_bar_scale=0.5:2:2", "horizon=1:3:3")
     ],
 )
 def test_a_range_becomes_values(over: str, values: tuple[float, ...], log: bool) -> None:
-    """Equal ratios over a decade, equal steps below, whole numbers where the setting takes only those."""
+    """Values have equal ratios over a decade or more, equal steps below, and are integers where the setting
+    requires it."""
     (axis,) = make_sweep(SHORT, [over]).axes
     assert axis.values == pytest.approx(values)
     assert axis.log is log
@@ -77,18 +79,18 @@ def test_a_wrong_range_is_one_sentence(over: tuple[str, ...], says: str) -> None
 
 
 def test_cells_run_what_their_place_says() -> None:
-    """The last axis runs fastest, and each cell's job carries its values on top of the base."""
+    """The last axis changes fastest, and the job of each cell adds its values to those of the base."""
     sweep = make_sweep(RunSpec("planar3-circle", set=("Q=100",)), OVER)
     assert sweep.points == [(m, n) for m in (0.5, 2.0) for n in (1, 2, 3)]
     assert sweep.run(4).set == ("Q=100", "M_bar_scale=2.0", "horizon=2")
 
 
 class Stop(Exception):
-    """What a test raises where a user would press Ctrl-C."""
+    """An exception that stands for Ctrl-C of a user."""
 
 
 def stopping_after(count: int) -> Callable[..., Generator[tuple[int, Any], None, None]]:
-    """Runs `count` items in another order than given, then stops."""
+    """Returns a function that runs `count` items in reverse order and then stops."""
 
     def spread(
         function: Callable[[Any], Any], items: Sequence[Any]
@@ -102,7 +104,8 @@ def stopping_after(count: int) -> Callable[..., Generator[tuple[int, Any], None,
 
 
 def test_a_stopped_sweep_goes_on_to_the_same_result(tmp_path: Path) -> None:
-    """Stopped half-way, torn in the middle of a line, resumed: results.json is the same to the bit."""
+    """A sweep that was stopped half-way, with an incomplete last line, and resumed has a bitwise equal
+    results.json."""
     sweep = make_sweep(SHORT, OVER)
     carry_on(sweep, tmp_path / "whole", one_by_one)
     part = tmp_path / "part"
@@ -127,7 +130,7 @@ def test_a_stopped_sweep_goes_on_to_the_same_result(tmp_path: Path) -> None:
 
 
 def test_all_cores_give_the_same_result_as_one(tmp_path: Path) -> None:
-    """Spawned processes or this one, in whatever order they finish: the same file."""
+    """Spawned processes and this process write the same file, in whatever order the cells finish."""
     sweep = make_sweep(SHORT, ("M_bar_scale=0.5:2:3",))
     for name, spread in (("one", one_by_one), ("all", on_cores)):
         carry_on(sweep, tmp_path / name, spread)
@@ -135,7 +138,7 @@ def test_all_cores_give_the_same_result_as_one(tmp_path: Path) -> None:
 
 
 def test_another_sweep_in_the_same_folder_is_refused(tmp_path: Path) -> None:
-    """The sentence names what differs, and the folder keeps what it holds."""
+    """The sentence names the difference, and the folder keeps its content."""
     sweep = make_sweep(SHORT, ("M_bar_scale=1:2:2",))
     carry_on(sweep, tmp_path, one_by_one)
     held = (tmp_path / "cells.jsonl").read_bytes()
@@ -149,21 +152,21 @@ def test_another_sweep_in_the_same_folder_is_refused(tmp_path: Path) -> None:
 
 
 def fails_at_two(value: int) -> int:
-    """A piece of work that does not always work."""
+    """A job that fails for one value."""
     if value == 2:
         raise InputError("two is too many")
     return value * value
 
 
 def dies_at_one(value: int) -> int:
-    """A piece of work that takes its process with it."""
+    """A job that ends its process for one value."""
     if value == 1:
         os._exit(1)
     return value * value
 
 
 def test_a_sweep_notices_that_a_file_of_ones_own_was_changed(tmp_path: Path) -> None:
-    """Between two calls, or while it runs: cells of two contents are no map."""
+    """A file that changes between two calls, or during one, is detected: cells of two versions are no map."""
     file, out = tmp_path / "mine.py", tmp_path / "out"
     file.write_text("def torque(now):\n    return now.bias\n")
     base = RunSpec("planar3-circle", controller=str(file), duration=0.02)
@@ -196,7 +199,7 @@ def test_a_process_that_dies_costs_its_own_item_only() -> None:
 
 
 def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
-    """A piece of work whose first attempt at 1 takes its process with it."""
+    """A job whose first attempt at 1 ends its process."""
     marker, value = item
     if value == 1 and not marker.exists():
         marker.touch()
@@ -205,7 +208,8 @@ def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
 
 
 def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
-    """Every item has its result, and only what was under way at that moment runs in a process of its own."""
+    """Every item has its result, and only the items in progress at that moment run again in separate
+    processes."""
     outcomes = dict(on_cores(dies_once, [(tmp_path / "died", value) for value in range(12)]))
     done = {place: outcome for place, outcome in outcomes.items() if not isinstance(outcome, FailedJob)}
     assert {place: value for place, (value, _) in done.items()} == {value: value for value in range(12)}
@@ -213,7 +217,8 @@ def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
 
 
 def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
-    """M̄ far too large loses control, a failing run says why; both are in the file, neither has a value."""
+    """A run with a far too large M̄ loses control, and a failing run has its reason; both are in the file,
+    without a value."""
     unbounded = ("plant.saturate=false", "limits.torque=false", "limits.velocity=false")
     sweep = make_sweep(RunSpec("planar3-circle", set=unbounded, duration=0.3), ("M_bar_scale=1:200:2",))
 
@@ -234,7 +239,7 @@ def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
 
 
 def test_metrics_are_the_numbers_of_a_run() -> None:
-    """Level 1 is the default; coordinates are combined; unknown ones name the nearest."""
+    """Level 1 is the default; coordinates are combined; an unknown metric suggests the nearest name."""
     names = metrics(make_sweep(SHORT, OVER))
     assert names[0] == "tasks.position.rmse"
     assert metrics(make_sweep(RunSpec("planar3-circle"), OVER))[0] == "tasks.position.rmse_after_1s"
@@ -260,7 +265,7 @@ def test_three_paths_make_none(tmp_path: Path) -> None:
 
 
 def test_a_map_without_a_single_value_can_be_drawn(tmp_path: Path) -> None:
-    """Everything lost: all hatched, no colour scale to fail on."""
+    """A map in which every run lost control is hatched and has no colour scale."""
     nothing = np.full((2, 2), np.nan)
     lost = np.array([[True, True], [False, True]])
     path = tmp_path / "map.png"

@@ -1,4 +1,4 @@
-"""The controller is switched while the robot moves: no bump, and control goes on."""
+"""The controller is switched while the robot moves: the torque has no jump, and control continues."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def at_rest(controller: str, scene: TorqueScene = SCENE) -> TorqueSession:
 
 
 def switch(session: TorqueSession, name: str, start: Array) -> None:
-    """Hands over: no tick moves a torque by 5 % of its limit, nor the tip as far as 1 mm from start."""
+    """Switch the controller; no tick changes a torque by 5 % of its limit, or moves the tip by 1 mm from
+    `start`."""
     session.post(Set("controller", name))
     before = session.plant.tau
     for _ in range(TICKS + 20):
@@ -47,7 +48,8 @@ def switch(session: TorqueSession, name: str, start: Array) -> None:
 
 @pytest.mark.parametrize("old", list(CONTROLLERS)[:-1])
 def test_a_switch_at_rest_is_bumpless(old: str) -> None:
-    """From this controller to each that is registered after it, and back: in all, every ordered pair."""
+    """A switch from this controller to each later one in the table and back is bumpless; thus every ordered
+    pair is tested."""
     session = at_rest(old)
     start = tip(session)
     for new in list(CONTROLLERS)[list(CONTROLLERS).index(old) + 1 :]:
@@ -57,8 +59,8 @@ def test_a_switch_at_rest_is_bumpless(old: str) -> None:
 
 @pytest.mark.parametrize("new", CONTROLLERS)
 def test_control_goes_on_after_a_switch(new: str) -> None:
-    """The controller that took over follows a target as it should. The posture is off: the weighted
-    controller would stop half-way for it."""
+    """The new controller follows a target. The posture is off, as the weighted controller would otherwise
+    stop half-way."""
     session = at_rest("hqp" if new == "himpc" else "himpc")
     start = tip(session)
     switch(session, new, start)
@@ -73,7 +75,8 @@ def test_control_goes_on_after_a_switch(new: str) -> None:
 
 @pytest.mark.parametrize(("old", "new"), [("himpc", "hqp"), ("hqp", "himpc"), ("weighted", "osf")])
 def test_a_switch_in_motion_is_smooth(old: str, new: str) -> None:
-    """The target moves at up to 0.3 m/s while the controllers change: no tick jolts, and the hand arrives."""
+    """The target moves at up to 0.3 m/s while the controllers change: no torque jumps, and the hand
+    arrives."""
     session = at_rest(old)
     goal = tip(session) + np.array([0.05, 0.15, -0.05])
     session.post(MoveTarget("position", tuple(goal)))
@@ -92,7 +95,7 @@ def test_a_switch_in_motion_is_smooth(old: str, new: str) -> None:
 
 
 def test_the_new_controller_ends_up_alone() -> None:
-    """After the hand-over the session runs the very controller that was asked for."""
+    """After the hand-over the session runs the requested controller itself."""
     session = at_rest("himpc")
     session.post(Set("controller", "hqp"))
     session.tick()
@@ -103,9 +106,10 @@ def test_the_new_controller_ends_up_alone() -> None:
 
 
 def test_the_torque_goes_from_one_controller_to_the_other() -> None:
-    """The blend starts at the old torque, ends at the new one and lies between them at every tick."""
+    """The blended torque starts at the old torque, ends at the new one and lies between them at every
+    tick."""
     session = at_rest("himpc")
-    session.post(Set("plant.payload_kg", 3.0))  # the nominal model does not know: torques differ
+    session.post(Set("plant.payload_kg", 3.0))  # unknown to the nominal model: torques differ
     for _ in range(300):
         session.tick()
     session.post(Set("controller", "hqp"))
@@ -115,13 +119,14 @@ def test_the_torque_goes_from_one_controller_to_the_other() -> None:
         session.tick()
         assert session.plan is not None
         handed.append(session.plan.tau - held)
-        demands.append(session.plan.levels[-1].U[0])  # what the new controller would do at once
+        demands.append(session.plan.levels[-1].U[0])  # the torque of the new controller without blending
     assert np.abs(handed[0]).max() < 1e-3 * np.abs(demands[0]).max()
     np.testing.assert_allclose(handed[-1], demands[-1], atol=1e-2)
 
 
 def test_settings_reach_both_controllers_during_a_hand_over() -> None:
-    """A longer horizon, another period or a level switched off in the middle neither breaks nor shakes it."""
+    """A longer horizon, another period or a disabled level during the hand-over causes no notice and no
+    motion."""
     session = at_rest("himpc")
     start = tip(session)
     session.post(Set("controller", "hiqp"))
@@ -139,7 +144,7 @@ def test_settings_reach_both_controllers_during_a_hand_over() -> None:
 
 
 def test_changes_of_mind_and_a_reset() -> None:
-    """Three switches within a hand-over still move smoothly; a reset ends it at once."""
+    """Three switches within a hand-over remain smooth; a reset ends the hand-over at once."""
     session = at_rest("himpc")
     start, before = tip(session), session.plant.tau
     for name in ("hqp", "hiqp", "himpc"):
@@ -165,7 +170,8 @@ def test_an_unknown_controller_changes_nothing() -> None:
 
 
 def test_a_payload_is_picked_up_and_put_down_without_a_jump() -> None:
-    """The state does not jump when the mass changes; the controller, which is not told, holds on."""
+    """The state does not jump when the payload changes, and the controller, which does not know of it, keeps
+    its target."""
     session = at_rest("himpc")
     start = tip(session)
     for kilograms in (2.0, 0.0):

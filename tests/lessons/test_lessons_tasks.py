@@ -1,4 +1,4 @@
-"""Tasks of every kind in sessions: the compiled route and the printed one."""
+"""Tasks of every kind in sessions: the compiled and the explicit route agree."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ FAR = {
     "relative_two_axes": (1.7, 0.1, 0.1),
     "relative_one_axis": (1.7, 0.1, 0.1),
 }
-"""rad, by which the target of an orientation on some axes is turned away."""
+"""Angles by which the target of an orientation on some axes is turned away, rad."""
 
 GIVEN = {
     "two_axes": lambda: FrameOrientation(name="x", axes="xy", K_p=60.0, K_v=15.0),
@@ -55,8 +55,9 @@ GIVEN = {
 )
 @pytest.mark.parametrize("kind", GIVEN)
 def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: int, controller: str) -> None:
-    """Closed loops side by side while the target moves; the kernel takes the rows as they are handed in. It
-    knows orientations on one or two axes; their targets start 100° away, mostly about what is free."""
+    """Closed loops of both routes agree while the target moves; the kernel receives the rows of the task. It
+    computes orientations on one or two axes itself; their targets start 100° away, mostly about a free
+    axis."""
     scene = torque_scene("iiwa14-hold")
     levels = list(scene.settings.levels)
     levels.insert(place, Level((GIVEN[kind](),)))
@@ -93,7 +94,7 @@ def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: 
 
 @dataclass(frozen=True, kw_only=True)
 class OwnTurn(FrameTask):
-    """A task of somebody's own whose value is a rotation and which controls some axes of it."""
+    """A user's own task whose value is a rotation and which controls some axes of it."""
 
     first_row: ClassVar[int] = 3
     unit: ClassVar[Literal["m", "rad"]] = "rad"
@@ -109,7 +110,8 @@ class OwnTurn(FrameTask):
     ("controller", "route"), [("himpc", "compiled"), ("himpc", "explicit"), ("hqp", "compiled")]
 )
 def test_an_own_rotation_on_some_axes_is_told_of_these(controller: str, route: str) -> None:
-    """Its target turns about all axes; what it asks for has as many columns as the task has rows."""
+    """The target of the task turns about all axes; its previewed derivatives have as many columns as the task
+    has rows."""
     scene = torque_scene("iiwa14-hold")
     levels = (scene.settings.levels[0], Level((OwnTurn(name="x", axes="xy"),)), scene.settings.levels[2])
     taken = replace(scene.settings, levels=levels, controller=controller, route=route)

@@ -1,4 +1,4 @@
-"""The compiled tick in sessions, beside the route as printed."""
+"""The compiled tick in sessions, compared with the route as printed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from lessons.session.torque import TorqueSession
 def test_torques_are_those_of_the_printed_route(
     name: str, horizon: int, position: str, controller: str
 ) -> None:
-    """Two closed loops side by side, one by the kernel, one by the rows as printed; targets are dragged."""
+    """Two closed loops, one by the kernel and one by the rows as printed, agree while targets are dragged."""
     scene = torque_scene(name)
     taken = replace(scene.settings, horizon=horizon, controller=controller)
     taken = taken.changed("limits.position", position)
@@ -59,15 +59,16 @@ def test_torques_are_those_of_the_printed_route(
             assert one.leak <= 1e-6 or controller == "weighted"
             assert one.kkt_residual <= 1e-6
             assert one.cost == pytest.approx(other.cost, rel=1e-6, abs=1e-6)
-    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact. So
-    # it is at the paper's start, where J₁…J₃ have rank 6, if no bound holds what rounding alone decides.
+    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact.
+    # The same holds at the paper's start, where J₁…J₃ have rank 6, if no bound limits the directions that
+    # rounding alone decides.
     loose = controller == "weighted" or (name, position) == ("iiwa14-circle-paper", "paper")
     assert worst <= (1e-7 if loose else 1e-8)
 
 
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
 def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
-    """A sensor that reads many times the robot's limit leaves the next torques within it."""
+    """After a sensor reading of many times the robot's limit the next torques stay within the limit."""
     scene = torque_scene("planar3-hold")
     session = TorqueSession(replace(scene, settings=replace(scene.settings, route=route)))
     session.tick()
@@ -79,7 +80,8 @@ def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
 
 
 def test_a_plan_that_is_kept_stays_as_it_is() -> None:
-    """Frozen, its evidence is that of its own tick, whenever it is looked at; else it says what to do."""
+    """A frozen plan keeps the evidence of its own tick. The evidence of a plan that was not frozen raises an
+    error later, and the message names `freeze`."""
     session = TorqueSession(torque_scene("iiwa14-circle"))
     session.tick()
     shown, other = session.plan, TorqueSession(torque_scene("iiwa14-circle"))
@@ -100,10 +102,11 @@ def test_a_plan_that_is_kept_stays_as_it_is() -> None:
 @pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
 @pytest.mark.parametrize("name", ["iiwa14-circle", "iiwa14-circle-paper", "iiwa14-hold", "planar3-conflict"])
 def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, controller: str) -> None:
-    """What the kernel puts aside for telemetry is what the plan's evidence says."""
+    """The row of telemetry that the kernel collects equals the one that is written from the evidence of the
+    plan."""
     scene = torque_scene(name)
     session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
-    session.post(Set("limits.velocity_scale", 0.3))  # so that bounds bind
+    session.post(Set("limits.velocity_scale", 0.3))  # so that bounds are active
     session.post(Set("limits.position", "viability"))
     target = session.target("orientation")
     if target is not None:
@@ -125,7 +128,7 @@ def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, con
 
 
 def test_nothing_is_compiled_while_a_robot_moves() -> None:
-    """One compiled form of each entry serves every layout."""
+    """One compiled form of each entry function serves every layout."""
     for name in ("iiwa14-circle", "planar3-hold"):
         TorqueSession(torque_scene(name)).tick()
     for compiled in (linearize, solve_level, finish_tick):

@@ -1,4 +1,4 @@
-"""The robot with two arms: what its hands hold on to, they keep, whatever else is asked."""
+"""The robot with two arms: its hands keep their relative pose, whatever the tasks of lower levels are."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from lessons.session.torque import TorqueSession
 
 
 def test_the_hands_move_along_a_square_as_if_they_carried_a_tray() -> None:
-    """They keep their relative pose within 0.5 mm and 0.2°; its middle comes to every corner, level."""
+    """The hands keep their relative pose within 0.5 mm and 0.2°; the middle reaches every corner and stays
+    level."""
     recording = run(torque_scene("baxter-tray"))
     assert np.abs(recording["error/grip"]).max() < 0.5e-3
     assert np.degrees(np.linalg.norm(recording["error/grip_turn"], axis=1).max()) < 0.2
@@ -31,7 +32,8 @@ def test_the_hands_move_along_a_square_as_if_they_carried_a_tray() -> None:
 
 
 def test_nothing_but_level_1_keeps_the_hands_together() -> None:
-    """As the scene says, there is no tray: no weight in the plant, and without the grip the hands part."""
+    """The scene has no tray: the plant has no additional mass, and without the task `grip` the hands move
+    apart."""
     session = TorqueSession(torque_scene("baxter-tray"))
     M = pin.crba(session.robot.model, session.robot.model.createData(), session.plant.q)
     M = np.triu(M) + np.triu(M, 1).T + 0.1 * np.eye(14)
@@ -58,8 +60,9 @@ def test_both_hands_are_dragged_apart_from_each_other() -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_who_ranks_higher_gets_its_hand(swapped: bool) -> None:
-    """The grip comes first: of two hands wanted 15 cm further apart, the one on the higher level has its way
-    and the other one follows; swapped, it is the other way round."""
+    """The grip is on level 1, and the targets of the two hands are 15 cm too far apart: the hand on the
+    higher of the two other levels reaches its target, and the other hand follows; swapped levels swap the
+    hands."""
     session = TorqueSession(torque_scene("baxter-conflict"))
     if swapped:
         session.post(Set("order", "grip+grip_turn,left,right,posture"))

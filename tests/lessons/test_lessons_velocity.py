@@ -39,7 +39,8 @@ def result(
 
 
 def assert_sound(summary: dict[str, Any]) -> None:
-    """Finite, inside velocity and acceleration limits, every QP solved."""
+    """Assert that a run is finite, inside its velocity and acceleration limits, and that every QP was
+    solved."""
     assert summary["finite"] is True
     assert summary["diverged"] is False
     assert summary["solver"]["unsolved"] == 0
@@ -53,7 +54,8 @@ def assert_sound(summary: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("peak", [f"peak={list(peak)}" for peak in random_peaks(0, 3, HOME)])
 def test_the_hand_stays_while_the_base_goes_as_far_as_it_can(peak: str) -> None:
-    """EE error within 1 mm on average and 10 mm at most; the base comes back to within 5 % and is prompt."""
+    """The EE error is at most 1 mm on average and 10 mm at its maximum; the base returns promptly to within 5
+    %."""
     summary = result("ridgeback-ur10-square", peak)
     assert_sound(summary)
     away, back = summary["parts"]
@@ -68,7 +70,8 @@ def test_the_hand_stays_while_the_base_goes_as_far_as_it_can(peak: str) -> None:
 
 
 def test_preview_and_prediction_each_bring_the_base_home_sooner() -> None:
-    """Part 2: HTMPC beats HTMPC_WPT (sees no step coming), which beats HTIDKC (does not predict)."""
+    """Part 2: HTMPC has smaller errors than HTMPC_WPT (without preview of steps), which has smaller ones than
+    HTIDKC (without prediction)."""
     errors = {
         controller: result("ridgeback-ur10-square", controller=controller)["parts"][1][
             "normalised_base_error"
@@ -80,13 +83,13 @@ def test_preview_and_prediction_each_bring_the_base_home_sooner() -> None:
 
 
 def test_a_single_task_controller_leaves_the_base_where_it_is() -> None:
-    """STMPC sees the first task of the window only."""
+    """STMPC considers the first task of the window only."""
     summary = result("ridgeback-ur10-square", controller="stmpc", duration=4.0)
     assert summary["parts"][0]["normalised_base_error"] > 0.95
 
 
 def test_the_same_run_gives_the_same_numbers_and_another_seed_other_noise() -> None:
-    """To the bit; the seed is of the noise."""
+    """Runs with the same seed are bitwise equal; another seed changes the noise."""
     noisy = scene("ridgeback-ur10-square", "plant.position_noise=0.001")
     first, again, other = (run(noisy, 2.0, seed) for seed in (1, 1, 2))
     summaries = [
@@ -98,7 +101,8 @@ def test_the_same_run_gives_the_same_numbers_and_another_seed_other_noise() -> N
 
 
 def test_delay_compensation_holds_the_hand_stiller() -> None:
-    """50 ms of servo lag and 1 mm of noise: EE mean below 5 mm with compensation, and worse without."""
+    """With 50 ms of servo lag and 1 mm of noise the mean EE error is below 5 mm with compensation, and larger
+    without."""
     laggy = ("plant.lag_ms=50", "plant.position_noise=0.001")
 
     def mean(*more: str) -> float:
@@ -114,7 +118,8 @@ def test_delay_compensation_holds_the_hand_stiller() -> None:
 
 
 def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
-    """One round of the delivery, one rule: the single-task architecture needs at least 1.5 times as long."""
+    """In one round of the delivery, with one rule, the single-task architecture needs at least 1.5 times as
+    long."""
     both = [
         result("ridgeback-ur10-delivery", "rounds=1", f"architecture={architecture}")
         for architecture in ("hierarchical", "single_task")
@@ -127,7 +132,7 @@ def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
 
 
 def test_the_hand_waits_for_a_person_and_the_base_does_not_leave_it() -> None:
-    """The hold ends with the release, not before; meanwhile the base goes on and the hand stays."""
+    """The hold ends with the release and not before; meanwhile the base moves on and the hand stays."""
     recording = run(scene("ridgeback-ur10-handover"))
     told = summary(recording)
     assert_sound(told)
@@ -139,12 +144,12 @@ def test_the_hand_waits_for_a_person_and_the_base_does_not_leave_it() -> None:
     assert np.linalg.norm(recording["error/ee"][waiting], axis=1).max() <= 0.01
     base = recording["x/base"][waiting]
     assert np.linalg.norm(base[-1] - base[0]) > 0.2, "the base moved on while the hand waited"
-    # The person's shift of the running task is followed.
+    # The hand follows the person's shift of the running task.
     np.testing.assert_allclose(recording["x/ee"][-1], [-1.9, -0.4, 1.0], atol=0.02)
 
 
 def test_a_running_task_that_is_moved_is_taken_up_at_the_next_step() -> None:
-    """The reference of that very tick is the new one."""
+    """The reference of the next step is the new one."""
     session = VelocitySession(scene("ridgeback-ur10-drag"))
     session.tick()
     session.post(MoveTarget("base", (-0.5, 0.3)))
@@ -160,7 +165,8 @@ def test_a_running_task_that_is_moved_is_taken_up_at_the_next_step() -> None:
 
 
 def test_swapping_the_priorities_lets_the_base_go() -> None:
-    """Out of reach the base stops and the hand stays; swapped, the base goes and the hand is dragged."""
+    """With a target out of reach the base stops and the hand stays; with swapped priorities the base moves to
+    the target and pulls the hand along."""
     target = np.array([-1.5, 0.0])
     session = VelocitySession(scene("ridgeback-ur10-drag"))
     fields = session.layout.fields
@@ -180,7 +186,7 @@ def test_swapping_the_priorities_lets_the_base_go() -> None:
 
 
 def test_obstacles_are_kept_clear_of() -> None:
-    """The distance never falls below the margin by more than 1 cm, all the way."""
+    """The distance to the obstacles is never more than 1 cm below the margin."""
     told = result("ridgeback-ur10-cluttered")
     assert_sound(told)
     assert told["completed"] is True
@@ -188,7 +194,7 @@ def test_obstacles_are_kept_clear_of() -> None:
 
 
 def test_an_obstacle_is_taken_away() -> None:
-    """By its name, live as headless; what is not there cannot be."""
+    """An obstacle is removed by its name, in a session and by an assignment; an unknown name is refused."""
     session = VelocitySession(scene("ridgeback-ur10-cluttered"))
     session.post(Appear("surprise", (9.0, 9.0, 1.0), 0.2))
     session.tick()
@@ -204,7 +210,8 @@ def test_an_obstacle_is_taken_away() -> None:
 
 
 def test_a_ball_that_appears_ahead_is_not_run_into() -> None:
-    """At full speed, 1 m from the nearest point of the robot, right on its way."""
+    """A ball that appears on the way, 1 m from the nearest point of the robot at full speed, is not
+    touched."""
     session = VelocitySession(scene("ridgeback-ur10-cluttered"))
     fields = session.layout.fields
     ahead = np.zeros(3)
@@ -228,7 +235,7 @@ def test_a_ball_that_appears_ahead_is_not_run_into() -> None:
 
 @pytest.mark.parametrize("robot", ["iiwa14", "panda"])
 def test_arms_settle_on_a_target_that_jumps(robot: str) -> None:
-    """A step of 0.3 m ends below 1 mm, orientation kept, no bound left."""
+    """After a step of 0.3 m the error is below 1 mm, the orientation is kept, and no limit is violated."""
     found = scene(f"{robot}-htmpc")
     session = VelocitySession(found)
     start = session.tick()[session.layout.fields["x/position"]].copy()
@@ -242,7 +249,8 @@ def test_arms_settle_on_a_target_that_jumps(robot: str) -> None:
 
 
 def test_the_same_robot_under_the_torque_controller_holds_its_hand_too() -> None:
-    """HIMPC: the base target is dragged 0.5 m; EE RMSE within 2 mm, torques and speeds in their bounds."""
+    """With HIMPC and a base target dragged by 0.5 m, the EE RMSE is within 2 mm, and torques and speeds are
+    in bounds."""
     found = load_scene("ridgeback-ur10-hold")
     told = summary(run(replace(found, events=((0.2, MoveTarget("base", (-0.3, 0.4))),)), 1.5))
     assert told["diverged"] is False

@@ -1,4 +1,4 @@
-"""Velocity-level scenes: their settings, their events as data, what a run puts out, and the paper's items."""
+"""Velocity-level scenes: settings, events as data, the output of a run, and the items of the paper."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from robots import InputError
 
 
 def test_every_setting_can_be_set_and_a_typo_names_the_nearest() -> None:
-    """Numbers, words, lists and null, by the same paths as on the command line."""
+    """Numbers, words, lists and null are assigned by the same paths as on the command line."""
     settings = scene("ridgeback-ur10-delivery").settings
     for path, value, found in (
         ("horizon", 12, lambda s: s.htmpc.horizon),
@@ -65,7 +65,7 @@ def test_every_setting_can_be_set_and_a_typo_names_the_nearest() -> None:
 
 
 def test_a_formulation_and_a_controller_bring_what_they_were_tuned_with() -> None:
-    """Formulation A has stage weight 1, the default 10; HTIDKC runs at 50 Hz."""
+    """Formulation A has stage weight 1, the default formulation has 10; HTIDKC runs at 50 Hz."""
     settings = scene("ridgeback-ur10-square").settings
     paper = settings.changed("formulation", "paper")
     assert [level.Q for level in settings.htmpc.stack] == [10.0, 10.0]
@@ -112,7 +112,7 @@ def test_what_is_wrong_with_an_event_is_a_notice_and_the_run_goes_on() -> None:
     ],
 )
 def test_events_survive_as_data(event: Event) -> None:
-    """What a recording stores is the event."""
+    """An event is equal after it was stored in a recording and read again."""
     assert from_data(as_data(event)) == event
 
 
@@ -128,7 +128,7 @@ def test_the_arrays_hold_one_row_per_tick_and_how_to_repeat_the_run() -> None:
 
 
 def test_a_waypoint_is_a_goal_without_a_speed() -> None:
-    """The options' missions are data that can be read without running them."""
+    """The missions of the options are data that can be read without a run."""
     mission = scene("ridgeback-ur10-delivery").settings.options.mission({})
     assert [task.role for task in mission[:4]] == ["base", "ee", "base", "ee"]
     assert len(mission) == 24
@@ -140,14 +140,15 @@ def test_a_waypoint_is_a_goal_without_a_speed() -> None:
 
 
 def test_the_papers_table_and_figures_can_be_asked_for() -> None:
-    """Table I, Figs. 3 to 9 and the compute times."""
+    """Table I, Figs. 3 to 9 and the computing times of the paper are items."""
     assert {"htmpc-table-1", "htmpc-times", *(f"htmpc-fig-{k}" for k in range(3, 10))} <= set(ITEMS)
     assert printed("htmpc_table_1")["cost"]["high"] == {"avg": 6.25, "std": 2.73}
     assert printed("htmpc_table_1")["per_coordinate"]["low"] == {"avg": 3.07, "std": 0.73}
 
 
 def test_random_peaks_are_out_of_reach_and_near_enough() -> None:
-    """1.83 m + 0.25 to 0.5 m from the EE, less than 3 m from the origin, the same for the same seed."""
+    """Peaks are 1.83 m + 0.25 to 0.5 m from the EE, less than 3 m from the origin, and equal for equal
+    seeds."""
     peaks = np.array(random_peaks(3, 25, HOME))
     away = np.linalg.norm(peaks - HOME, axis=1)
     assert (away >= 1.83 + 0.25 - 1e-9).all()
@@ -158,7 +159,7 @@ def test_random_peaks_are_out_of_reach_and_near_enough() -> None:
 
 
 def test_collinear_waves_are_those_on_the_line_through_hand_and_home() -> None:
-    """Straight behind the base or beyond the hand; not to the side."""
+    """A wave straight behind the base or beyond the hand is collinear, and one to the side is not."""
     behind, side = HOME - 2.2 * HOME / np.linalg.norm(HOME), HOME + np.array([0.0, 2.2])
     assert collinear(square("htmpc", tuple(behind.tolist())))
     assert collinear(square("htmpc", tuple((HOME + 2.2 * HOME / np.linalg.norm(HOME)).tolist())))
@@ -166,7 +167,7 @@ def test_collinear_waves_are_those_on_the_line_through_hand_and_home() -> None:
 
 
 def test_priorities_can_be_a_setting() -> None:
-    """`order` is taken up when a run starts; what it must be is said."""
+    """`order` takes effect when a run starts; a wrong value is refused with the valid form."""
     drag = scene("ridgeback-ur10-drag", "order=base,ee")
     session = VelocitySession(drag)
     session.tick()

@@ -1,4 +1,4 @@
-"""Velocity-level scenes as their tests prepare them."""
+"""Functions that prepare the velocity-level scenes for their tests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from lessons.scenes.catalog import load_scene, prepared
 from lessons.scenes.velocity_scene import VelocityScene
 
 HOME = np.array([1.48962656, 0.173941])
-"""Where the hand of the mobile manipulator begins, seen from above, m."""
+"""Position of the hand of the mobile manipulator at the start, in the horizontal plane, m."""
 
 
 def scene(name: str, *assignments: str, controller: str | None = None) -> VelocityScene:

@@ -34,7 +34,7 @@ def robot(*parts: str) -> str:
 
 
 def two_joint_arm(extra: str = "", j2: str | None = None, l2: str | None = None) -> str:
-    """base – j1 – l1 – j2 – l2, plus whatever a test adds."""
+    """Returns the URDF of an arm base – j1 – l1 – j2 – l2 with the additional parts of a test."""
     second = joint("j2", "l1", "l2") if j2 is None else j2
     return robot(link("base"), link("l1"), l2 or link("l2"), joint("j1", "base", "l1"), second, extra)
 
@@ -45,5 +45,5 @@ def full_mass_matrix(model: pin.Model, q: np.ndarray) -> np.ndarray:
 
 
 def load(text: str) -> Robot:
-    """`load_urdf_text` without the process of its own."""
+    """Load a URDF like `load_urdf_text`, but in this process."""
     return import_robot(text.encode(), "the URDF text").used()

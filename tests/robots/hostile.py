@@ -1,4 +1,4 @@
-"""Robot descriptions nobody should send: kind → document."""
+"""Malformed and malicious robot descriptions, by kind."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ARM = two_joint_arm()
 
 
 def chain(count: int, kind: str = "revolute") -> str:
-    """Links one after the other, with joints of one kind and efforts that are estimated."""
+    """Returns links in series, with joints of one kind and estimated effort limits."""
     limit = '<limit lower="-1" upper="1" velocity="1" effort="0"/>'
     parts = [link("l0"), *(link(f"l{k + 1}") for k in range(count))]
     parts += [joint(f"j{k}", f"l{k}", f"l{k + 1}", kind, limit, "0 1 0") for k in range(count)]
@@ -18,7 +18,7 @@ def chain(count: int, kind: str = "revolute") -> str:
 
 
 def star(count: int) -> str:
-    """Many links fixed to the last of two that move."""
+    """Returns an arm with many links that are fixed to its second moving link."""
     extra = "".join(link(f"s{k}") + joint(f"f{k}", "l2", f"s{k}", "fixed", "") for k in range(count))
     return two_joint_arm(extra)
 
@@ -79,7 +79,7 @@ NUMBERS = (
 
 
 def texts() -> Iterator[tuple[str, str]]:
-    """Every kind that is a text."""
+    """Yields all kinds that are texts."""
     # Documents
     yield "empty", ""
     yield "blank", " \n\t "
@@ -279,7 +279,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def documents() -> dict[str, bytes]:
-    """Every kind, as bytes."""
+    """Returns all kinds, as bytes."""
     found = {name: text.encode() for name, text in texts()}
     found["UTF-16"] = f'<?xml version="1.0" encoding="UTF-16"?>{ARM}'.encode("utf-16")
     found["UTF-16 without a word"] = ARM.encode("utf-16-le")

@@ -1,4 +1,4 @@
-"""Work that does not end well, for a process of its own."""
+"""Functions that crash, hang or print, for tests of work in a separate process."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _seen: list[str] = []
 
 
 def seen_by(*what: str) -> list[str]:
-    """What was seen in this process until now, this included."""
+    """Returns all words that this process has received until now, including the given ones."""
     _seen.extend(what)
     return _seen
 
 
 def open_files() -> set[str]:
-    """What this process has open, its standard files aside."""
+    """Returns the open files of this process, except its standard streams."""
     found = set()
     for number in os.listdir("/proc/self/fd"):
         if int(number) > 2 and os.path.exists(f"/proc/self/fd/{number}"):
@@ -28,7 +28,8 @@ def open_files() -> set[str]:
 
 
 def apart(work: Any, *args: Any, seconds: float = 10.0) -> Any:
-    """isolated(work, *args), as a copy of this process if it can be, which has seen "the original"."""
+    """Run `isolated(work, *args)` in a copy of this process if possible; the copy has the word "the
+    original"."""
     from robots.processes.isolation import Allowance, Fault, isolated
 
     _seen[:] = ["the original"]
@@ -51,7 +52,7 @@ def descend() -> None:
 
 
 def chatter() -> str:
-    """Prints into what the answer comes from, from Python and below it."""
+    """Print to standard output, from Python and from below Python, and return an answer."""
     print("x" * 100_000)
     os.write(1, b"y" * 100_000)
     sys.stdout.flush()
@@ -59,7 +60,7 @@ def chatter() -> str:
 
 
 def stay(file: str) -> None:
-    """Writes its process id and stays."""
+    """Write the process id into a file and sleep."""
     Path(file).write_text(str(os.getpid()))
     time.sleep(3600.0)
 
@@ -78,7 +79,7 @@ def leave() -> None:
 
 
 def multiply() -> int:
-    """Leaves a process behind, and says which."""
+    """Start a process that does not end, and return its id."""
     child = os.fork()
     if child == 0:
         time.sleep(3600.0)

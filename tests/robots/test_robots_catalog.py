@@ -1,4 +1,4 @@
-"""Every robot of the catalog, and what its sources say of it."""
+"""Every robot of the catalog agrees with the data of its sources."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The literal reading of Table V: the diagonal of M(q) altered in the dynamics, and nothing else."""
+"""The literal reading of Table V: only the diagonal of M(q) in the dynamics is changed."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from robots import InputError, Plant, PlantSettings, Robot, load_robot
 Array = NDArray[np.float64]
 
 TABLE_V = (0.8, 0.8, 1.2, 1.2, 0.8, 1.2, 1.2)
-"""The paper's order of reduced and increased diagonal elements."""
+"""Factors of the diagonal elements, in the paper's order."""
 IIWA = load_robot("iiwa14")
 
 
 def altered_mass_matrix(robot: Robot, q: Array) -> Array:
-    """M'(q) from Pinocchio, with no word of MuJoCo's."""
+    """Returns M'(q) from Pinocchio, independent of MuJoCo."""
     M = full_mass_matrix(robot.model, q)
     return M + np.diag((np.array(TABLE_V) - 1.0) * M.diagonal())
 
 
 def test_the_acceleration_solves_the_altered_equation() -> None:
-    """M'(q) q̈ + C q̇ + g = τ at random states, and M' and the bias are what the plant reports."""
+    """M'(q) q̈ + C q̇ + g = τ holds at random states, and the plant reports this M' and this bias."""
     plant = Plant(IIWA, PlantSettings(diagonal_scale=TABLE_V))
     data = IIWA.model.createData()
     rng = np.random.default_rng(3)
@@ -41,7 +41,7 @@ def test_the_acceleration_solves_the_altered_equation() -> None:
 
 
 def test_the_motion_is_that_of_the_altered_equation() -> None:
-    """0.2 s of motion equal an independent integration of M'(q) q̈ + C q̇ + g = τ to 1e-9."""
+    """0.2 s of motion agree with an independent integration of M'(q) q̈ + C q̇ + g = τ to 1e-9."""
     data = IIWA.model.createData()
     q, v = IIWA.home.copy(), np.full(7, 0.3)
     plant = Plant(IIWA, PlantSettings(diagonal_scale=TABLE_V))
@@ -62,7 +62,7 @@ def test_the_motion_is_that_of_the_altered_equation() -> None:
 
 
 def test_it_is_not_what_scaled_links_do() -> None:
-    """The two readings of the paper's sentence are different plants."""
+    """The two readings of the paper's sentence give different plants."""
     matrices = []
     for settings in (PlantSettings(diagonal_scale=TABLE_V), PlantSettings(inertia_scale=TABLE_V)):
         plant = Plant(IIWA, settings)
@@ -74,9 +74,10 @@ def test_it_is_not_what_scaled_links_do() -> None:
     "settings", [PlantSettings(), PlantSettings(friction=0.3, damping=0.1, armature=0.02)]
 )
 def test_our_integration_is_mujocos(settings: PlantSettings) -> None:
-    """A diagonal altered by a hair, integrated by us, moves like the unaltered plant integrated by MuJoCo.
+    """A diagonal that differs by 1e-13, integrated by our own code, moves like the plant that MuJoCo
+    integrates.
 
-    Friction is solved iteratively, to less than rounding: hence 1e-8.
+    The tolerance is 1e-8, as MuJoCo solves friction iteratively and not to rounding.
     """
     plants = [Plant(IIWA, settings), Plant(IIWA, replace(settings, diagonal_scale=1.0 + 1e-13))]
     for plant in plants:

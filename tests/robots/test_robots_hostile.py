@@ -1,4 +1,4 @@
-"""Hostile files: every one is a robot that runs, or one clear sentence."""
+"""Every malformed or malicious file is imported as a robot that runs, or refused by one clear sentence."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robots.shapes import MAX_TOTAL, link_shapes
 from robots.surfaces import read_meshes
 
 DOCUMENTS = hostile.documents()
-GROUPS = 8  # tests: a kind each would be 400, most of them a millisecond long
+GROUPS = 8  # number of tests; one test per kind would be 400, most of them of a millisecond
 
 
 @pytest.mark.parametrize("group", range(GROUPS))
@@ -105,7 +105,8 @@ MESHES = {
 
 
 def test_bad_meshes_are_left_out(tmp_path: Path) -> None:
-    """Read in a process of its own, as `link_shapes` does, and each by itself: none keeps the others away."""
+    """Meshes are read in a separate process, as by `link_shapes`, and one by one: a bad mesh does not affect
+    the others."""
     for name, content in MESHES.items():
         (tmp_path / name).write_bytes(content)
     good = stl(2, TRIANGLE + TRIANGLE)

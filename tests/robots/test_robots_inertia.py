@@ -1,4 +1,4 @@
-"""The suggested M̄ converges wherever the arm may be, and the gauge tells when one does not."""
+"""The suggested M̄ converges at all configurations, and the gauge shows an M̄ that does not."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_suggestion_is_stable_at_unseen_configurations(name: str) -> None:
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_catalog_M_bar_is_stable_at_home(name: str) -> None:
-    """For the planar arm only together with the rotor inertia its scenes give the plant."""
+    """The M̄ of the planar arm is stable only with the rotor inertia that its scenes give to the plant."""
     robot = load_robot(name)
     rotors = np.array([0.05, 0.05, 0.03]) if name == "planar3" else np.zeros(robot.n)
     M = full_mass_matrix(robot.model, robot.home) + np.diag(rotors)
@@ -32,7 +32,7 @@ def test_catalog_M_bar_is_stable_at_home(name: str) -> None:
 
 
 def test_iiwa_gauge_at_the_papers_configuration() -> None:
-    """The paper's M̄ is within the radius but not within the norm."""
+    """At the paper's M̄ the spectral radius is below 1, but the norm is not."""
     robot = load_robot("iiwa14")
     M = full_mass_matrix(robot.model, np.radians([0, 60, 0, 60, 0, 0, 0]))
     norm, radius = convergence_gauge(M, robot.M_bar)

@@ -1,4 +1,5 @@
-"""Work on strangers' files: whatever happens to it is one sentence, and nothing is left behind."""
+"""Work on untrusted files runs in separate processes: every failure is one sentence, and no process
+remains."""
 
 from __future__ import annotations
 
@@ -43,7 +44,8 @@ def test_the_deadline_is_a_sentence(monkeypatch, tmp_path: Path) -> None:
 
 
 def test_waiting_for_a_core_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A busy machine must not make a good file a bad one; yet there is an end."""
+    """The time that a process waits for a core does not count for its deadline, but the total time has a
+    limit as well."""
     monkeypatch.setattr(isolation, "waited", lambda pid: 100.0)
     assert isolated(time.sleep, 3.0, within=isolation.Allowance(2.0)) is None
     monkeypatch.setattr(isolation, "PATIENCE", 2.0)
@@ -57,7 +59,7 @@ def test_what_libraries_print_does_not_spoil_the_answer() -> None:
 
 @pytest.fixture(scope="module")
 def alone() -> Iterator[ProcessPoolExecutor]:
-    """A process with one thread, of which there can be copies."""
+    """A process with one thread, which can be copied."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         yield pool
 
@@ -80,7 +82,7 @@ def test_a_copy_that_crashes_is_a_sentence(work, words: str, alone: ProcessPoolE
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems make no copies")
 def test_a_copy_has_what_is_imported_and_nothing_that_is_open(alone: ProcessPoolExecutor) -> None:
-    """What it does to itself is its own, too."""
+    """Changes that a copy makes to itself do not affect the original, either."""
     for _ in range(2):
         seen = alone.submit(misbehaving.apart, misbehaving.seen_by, "a copy").result(60)
         assert seen == ["the original", "a copy"]
@@ -90,7 +92,7 @@ def test_a_copy_has_what_is_imported_and_nothing_that_is_open(alone: ProcessPool
 
 
 def test_a_process_with_two_threads_is_not_copied() -> None:
-    """What the other thread holds would stay locked."""
+    """A lock that the other thread holds would stay locked in the copy."""
     over = threading.Event()
     other = threading.Thread(target=over.wait)
     other.start()
@@ -132,7 +134,7 @@ def test_what_it_starts_ends_with_it(alone: ProcessPoolExecutor) -> None:
 
 
 def test_a_daemonic_process_may_load() -> None:
-    """A simulation is one, and may not have children of `multiprocessing`."""
+    """A simulation runs in a daemonic process, which may not have children of `multiprocessing`."""
     context = multiprocessing.get_context("spawn")
     answers = context.Queue()
     for text, expected in ((two_joint_arm(), 2), (chain(21), "21 moving joints")):
@@ -158,7 +160,8 @@ def test_check_and_load_go_the_same_way(tmp_path: Path) -> None:
 
 
 def test_a_crash_while_loading_is_reported_and_refused(monkeypatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("robots.load.import_robot", lambda *_: None)  # no process can be sent this
+    # A lambda cannot be sent to a process.
+    monkeypatch.setattr("robots.load.import_robot", lambda *_: None)
     monkeypatch.setattr("robots.load.isolated", _faulty)
     file = tmp_path / "arm.urdf"
     file.write_text(two_joint_arm())

@@ -1,4 +1,4 @@
-"""Kinematics of every catalog robot against a URDF library that shares nothing with ours."""
+"""Kinematics of every catalog robot agree with an independent URDF library."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robots import CATALOG, load_robot
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_every_link_is_where_another_reader_puts_it(name: str) -> None:
-    """The canonical URDF, read by yourdfpy, places every link as Pinocchio does, at random configurations."""
+    """At random configurations, yourdfpy and Pinocchio place every link of the canonical URDF equally."""
     robot = load_robot(name)
     other = yourdfpy.URDF.load(io.StringIO(robot.urdf_text), load_meshes=False, build_scene_graph=True)
     data = robot.model.createData()

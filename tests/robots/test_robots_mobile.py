@@ -1,4 +1,4 @@
-"""The mobile manipulator of the catalog, its velocity servos, and the distances to what it must not touch."""
+"""The mobile manipulator of the catalog, its velocity servos, and its distances to obstacles."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def tool(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def by_denavit_hartenberg(q: np.ndarray) -> np.ndarray:
-    """The tool's position from the arm's parameters alone: base, mount, six joints, tool."""
+    """Returns the position of the tool from the arm's parameters alone: base, mount, six joints, tool."""
     x, y, yaw = q[:3]
     T = pin.SE3(pin.rpy.rpyToMatrix(0, 0, yaw), np.array([x, y, 0.0]))
     T = T * pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.27, 0.01, 0.666]))
@@ -54,7 +54,8 @@ def test_tool_follows_the_arms_denavit_hartenberg_parameters(robot: Robot) -> No
 
 
 def test_horizontal_reach(robot: Robot) -> None:
-    """The farthest the tool gets from the base's centre at the height it has at home."""
+    """The reach is the largest distance of the tool from the centre of the base, at the tool's height at
+    home."""
     height = tool(robot, robot.home)[2]
 
     def away(arm: np.ndarray) -> np.ndarray:
@@ -109,7 +110,7 @@ def command(t: float) -> np.ndarray:
 
 
 def driven(plant: VelocityPlant, seconds: float, h: float = 0.01) -> np.ndarray:
-    """How far v is from the command, largest joint, at every step."""
+    """Returns the largest joint difference between v and the command, at every step."""
     gaps = []
     for _ in range(round(seconds / h)):
         wanted = command(plant.t + h)
@@ -119,7 +120,8 @@ def driven(plant: VelocityPlant, seconds: float, h: float = 0.01) -> np.ndarray:
 
 
 def test_ideal_kinematics_are_the_double_integrator(robot: Robot) -> None:
-    """Commands sampled from constant accelerations: positions as by q + vh + ½uh², velocities exact."""
+    """With commands that sample constant accelerations, positions follow q + vh + ½uh², and velocities are
+    exact."""
     plant = VelocityPlant(robot)
     q, v = robot.home.copy(), np.zeros(9)
     rng = np.random.default_rng(2)
@@ -144,7 +146,8 @@ def test_servo_tracks_better_with_more_bandwidth(robot: Robot) -> None:
 
 
 def test_lag_and_delay_act_in_both_modes(robot: Robot) -> None:
-    """After a step of the command: nothing for the delay, then 1 − e^(−t/lag)."""
+    """After a step of the command the velocity is zero during the delay, and 1 − e^(−t/lag) of the command
+    afterwards."""
     wanted = np.full(9, 0.1)
     for mode in ("ideal", "servo"):
         settings = VelocityPlantSettings(mode=mode, bandwidth=300.0, lag_ms=50.0, delay_ms=40.0)
@@ -207,7 +210,7 @@ def test_wrong_plant_settings_name_the_field(robot: Robot) -> None:
 
 
 def test_planar_and_floating_bases_are_refused_in_one_sentence() -> None:
-    """A platform that is not coordinates of its own, such as a unicycle, cannot come in as one joint."""
+    """A base that is a single joint of several coordinates, such as a unicycle's, is not supported."""
     for kind in ("planar", "floating"):
         text = f"""<robot name="cart"><link name="world"/><link name="cart"><inertial><mass value="1"/>
         <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>

@@ -17,7 +17,8 @@ from robots.truth import joint_axis
 def independently_changed(
     robot: Robot, payload: float, scales: np.ndarray, armature: float, gravity: bool
 ) -> pin.Model:
-    """The changed mechanics, built without robots.truth: scaled dynamic parameters and a payload body."""
+    """Returns the changed mechanics without `robots.truth`: scaled dynamic parameters and a body for the
+    payload."""
     model = robot.model.copy()
     for k in range(robot.n):
         parameters = robot.model.inertias[k + 1].toDynamicParameters()
@@ -133,7 +134,8 @@ def test_a_robot_from_a_urdf_with_prismatic_and_branched_joints() -> None:
 
 @pytest.mark.parametrize("altered", [False, True])
 def test_what_is_faster_than_numbers_can_follow_stays_where_it_was(altered: bool) -> None:
-    """Until the next reset it says so; with an altered M(q) it is our own integrator that runs away."""
+    """The plant reports the overflow until the next reset. With an altered M(q) our own integrator is the one
+    that diverges."""
     robot = load_robot("planar3")
     plant = Plant(robot, PlantSettings(saturate=False, diagonal_scale=0.9 if altered else 1.0))
     plant.step(np.zeros(3), 1e-3)
@@ -151,10 +153,10 @@ def test_what_is_faster_than_numbers_can_follow_stays_where_it_was(altered: bool
 
 @pytest.mark.parametrize("kind", [pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned])
 def test_a_joints_axis_is_read_from_no_configuration(kind: type) -> None:
-    """Pinocchio's joints check no sizes: such a read past a short vector ended a process."""
+    """Pinocchio's joints do not check sizes: a read past the end of a short vector once ended a process."""
     model = pin.Model()
     model.addJoint(0, kind(np.array([0.6, 0.0, 0.8])), pin.SE3.Identity(), "skew")
-    model.joints[1].setIndexes(1, 10**9, 10**9)  # a configuration that long is nowhere in memory
+    model.joints[1].setIndexes(1, 10**9, 10**9)  # no configuration of this length exists in memory
     prismatic, axis = joint_axis(model, 1)
     assert prismatic == (kind is pin.JointModelPrismaticUnaligned)
     np.testing.assert_allclose(axis, [0.6, 0.0, 0.8])

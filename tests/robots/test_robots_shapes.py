@@ -1,4 +1,4 @@
-"""What a robot looks like, with meshes and without."""
+"""Shapes of a robot, with meshes and without."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the motors do to a command and the encoders to a position; determinism; changes while running."""
+"""Effects of motors on a command and of encoders on a position; determinism; changes during a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The canonical import: what it repairs, fills, fixes and refuses, and that it says so."""
+"""The canonical import repairs, completes, fixes or refuses parts of a URDF, and reports each of these
+changes."""
 
 from __future__ import annotations
 

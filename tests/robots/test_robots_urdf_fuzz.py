@@ -1,4 +1,4 @@
-"""Mutated URDFs and junk: nothing but an InputError, and every repaired inertia possible."""
+"""Mutated URDFs and random bytes raise only an InputError, and every repaired inertia is physical."""
 
 from __future__ import annotations
 

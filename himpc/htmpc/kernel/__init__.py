@@ -1,1 +1,1 @@
-"""What Numba compiles of HTMPC: kinematics and clearances along a plan, rows, costs, and the QPs' method."""
+"""The compiled functions of HTMPC: kinematics and clearances along a plan, rows, costs, and the QP method."""

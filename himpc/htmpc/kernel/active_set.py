@@ -1,4 +1,4 @@
-"""Entry: the dual method of Goldfarb and Idnani for one QP, see `htmpc.active_set`."""
+"""The compiled dual method of Goldfarb and Idnani for one QP, see `htmpc.active_set`."""
 
 from __future__ import annotations
 
@@ -26,18 +26,19 @@ Indices = NDArray[np.intp]
 
 SOLVED, CONTRADICTION, LIMIT = range(3)
 SCRATCH = 7
-"""Rows of scratch."""
+"""Number of rows of the scratch array."""
 MOST_STEPS = 600
-"""Rows taken in or let go in one QP: its time is bounded."""
+"""Largest number of rows that are added or removed in one QP: it bounds the computing time."""
 _CLOSE = 0.05
-"""Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are watched first."""
+"""Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are checked first."""
 _SATISFIED = 1e-9
 _DEPENDENT = 1e-10
-"""A row whose part outside the span of those held is shorter than this share of it depends on them."""
+"""A row depends on the active rows if its part outside their span is shorter than this share of its
+length."""
 _ENOUGH = 0.5
-"""See `split`: less left of a row asks for a second round."""
+"""See `split`: if less than this share of a row is left, a second round of orthogonalisation follows."""
 _ROUNDING = 1e-7
-"""By how much a row that depends on the others may be missed: more is a contradiction."""
+"""Largest violation of a row that depends on the others; a larger one is a contradiction."""
 
 
 @inline_kernel
@@ -51,7 +52,7 @@ def residual_of(
     multipliers: Array,
     gradient: Array,
 ) -> float:
-    """`himpc.qp.kkt_residual`; gradient is scratch, (n,)."""
+    """Returns `himpc.qp.kkt_residual`; gradient is scratch, (n,)."""
     n = len(g)
     squares, worst, total = 0.0, 0.0, 0.0
     for i in range(n):
@@ -68,13 +69,13 @@ def residual_of(
     for i in range(n):
         worst = max(worst, abs(gradient[i]) / scale)
         total += x[i]
-    # `max` may lose what is not a number: the sum cannot.
+    # `max` may ignore NaN, a sum cannot.
     return worst if math.isfinite(total) else math.inf
 
 
 @inline_kernel
 def bounds_of(active: Indices, side: Array, count: int, lower: Array, upper: Array, beta: Array) -> None:
-    """β of the rows held."""
+    """Writes β of the active rows."""
     for c in range(count):
         beta[c] = lower[active[c]] if side[c] > 0.0 else -upper[active[c]]
 
@@ -90,8 +91,8 @@ def at_rows(
     z: Array,
     count: int,
 ) -> None:
-    """z and u for the rows held as equalities: F (y + B z₀) = β, z = z₀ + Bᵀy, Fᵀu = y, with
-    the Cholesky factor F and the orthonormal basis B."""
+    """Writes z and u for the active rows as equalities: F (y + B z₀) = β, z = z₀ + Bᵀy, Fᵀu = y, with the
+    Cholesky factor F and the orthonormal basis B."""
     n = len(z)
     copy(beta, y, count)
     forward(cholesky_factor, y, count)
@@ -113,7 +114,7 @@ def let_go(
     index: int,
     count: int,
 ) -> None:
-    """Lets go of the row at a place."""
+    """Removes the active row at an index."""
     for c in range(index, count - 1):
         active[c], side[c], u[c] = active[c + 1], side[c + 1], u[c + 1]
     close_gap(cholesky_factor, orthonormal_basis, index, count, orthonormal_basis.shape[1])
@@ -121,7 +122,7 @@ def let_go(
 
 @kernel(MATRIX, MATRIX)
 def factor(H: Array, L: Array) -> bool:
-    """H = LLᵀ, in the lower triangle of L (n, n); False if H is not positive definite."""
+    """Writes L of H = LLᵀ to the lower triangle of L (n, n); returns False if H is not positive definite."""
     H, L = borrowed(H), borrowed(L)
     copy_rows(H, L)
     return factorise(L, len(L))
@@ -149,13 +150,13 @@ def solve(
     x: Array,
     multipliers: Array,
 ) -> tuple[float, int, int]:
-    """min ½xᵀHx + gᵀx under lower ≤ Ax ≤ upper: the KKT residual, SOLVED or why not, and how many rows hold
-    the point.
+    """Solves min ½xᵀHx + gᵀx under lower ≤ Ax ≤ upper. Returns the KKT residual, the status (SOLVED,
+    CONTRADICTION or LIMIT), and the number of active rows.
 
     Args:
         L, H, g, A, lower, upper: the QP, H = LLᵀ (n, n).
-        active, side, count: the rows held, room for n; those of the QP before.
-        cholesky_factor, orthonormal_basis: the same, see `linear`, room for n + 1.
+        active, side, count: the active rows, space for n; on entry those of the QP before.
+        cholesky_factor, orthonormal_basis: of the active rows, see `linear`, space for n + 1.
         scratch: (SCRATCH, n + 1).
         watched, seen: scratch, as long as A; seen is zero.
         x: (n,), the result.
@@ -180,7 +181,7 @@ def solve(
         if seen[i]:
             watched[watching] = i
             watching += 1
-    # Rows held from before are kept as far as their multipliers have the right sign here.
+    # Active rows of the QP before are kept if their multipliers have the right sign here.
     while True:
         bounds_of(active, side, count, lower, upper, beta)
         at_rows(cholesky_factor, orthonormal_basis, z_0, beta, y, u, z, count)
@@ -208,7 +209,7 @@ def solve(
                 p, excess = i, missing
                 sign = 1.0 if value < lower[i] else -1.0
         if p < 0:
-            # What adding up steps has lost comes back before the other rows are looked at.
+            # This removes the rounding errors of the accumulated steps before the other rows are checked.
             bounds_of(active, side, count, lower, upper, beta)
             at_rows(cholesky_factor, orthonormal_basis, z_0, beta, y, u, z, count)
             copy(z, x, n)

@@ -1,4 +1,4 @@
-"""Entry: signed distances between spheres and shapes, in closed form, with gradients."""
+"""Compiled signed distances between spheres and shapes, in closed form, with gradients."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Indices = NDArray[np.intp]
 
 @inline_kernel
 def from_ball(x: float, y: float, h: float, radius: float, u: Array) -> float:
-    """Distance of a point from a ball about the origin; u: the unit vector away from it."""
+    """Returns the distance of a point from a ball about the origin; u: the unit vector away from the ball."""
     away = math.sqrt(x * x + y * y + h * h)
     if away > 0.0:
         u[0], u[1], u[2] = x / away, y / away, h / away
@@ -38,7 +38,8 @@ def from_ball(x: float, y: float, h: float, radius: float, u: Array) -> float:
 
 @inline_kernel
 def from_box(x: float, y: float, h: float, rotation: Array, half: Array, u: Array) -> float:
-    """The same for a box: from its nearest point; inside, minus the distance to the nearest face."""
+    """The same for a box: the distance from its nearest point; inside, minus the distance to the nearest
+    face."""
     nearest, face, squares = -math.inf, 0, 0.0
     for a in range(3):
         out = abs(rotation[0, a] * x + rotation[1, a] * y + rotation[2, a] * h) - half[a]
@@ -85,18 +86,18 @@ def near(
     normal: Array,
     slopes: Array,
 ) -> int:
-    """Pairs of a sphere and a shape nearer than `within`, m; returns how many there are.
+    """Finds the pairs of a sphere and a shape that are nearer than `within`, m; returns their number.
 
-    A sphere's distance is that of its centre less its radius. Its gradient is the unit vector from the
-    shape to the centre, on the motion of the one against the other.
+    A sphere's distance is that of its centre minus its radius. The gradient is the unit vector from the shape
+    to the centre, multiplied by the Jacobian of the relative motion.
 
     Args:
         placed, z: (K, n+1, …) joints, see `forward_kinematics`. is_revolute, moves: see `Geometry`.
         joint, centre, radius, kind, carrier, rotation, middle, half, meets: see `Surroundings`.
         centres: scratch, (K, S, 3).
-        knot, sphere, shape: of each pair, room for all; the result.
+        knot, sphere, shape: indices of each pair, space for all; the result.
         distance, normal: m, and the unit vector, world axes; the result.
-        slopes: the gradients, room for all or for none.
+        slopes: the gradients, space for all or for none.
     """
     K, n, S, B = len(placed), moves.shape[1], len(radius), len(kind)
     placed, z, centres, normal = borrowed(placed), borrowed(z), borrowed(centres), borrowed(normal)
@@ -111,7 +112,7 @@ def near(
             for s in range(S):
                 if not meets[o, s]:
                     continue
-                # From the shape's middle to the sphere's, in the axes of the shape's carrier.
+                # The vector from the shape's centre to the sphere's, in the axes of the shape's carrier.
                 u, C = normal[count], centres[k, s]
                 x, y, h = C[0] - R[9], C[1] - R[10], C[2] - R[11]
                 x, y, h = (
@@ -127,7 +128,7 @@ def near(
                 else:
                     found = from_ball(x, y, h, half[o, 0], u)
                 found -= radius[s]
-                # Neither is what is not a number near.
+                # A distance that is NaN does not count as near.
                 if not found <= within:
                     continue
                 x, y, h = u[0], u[1], u[2]
@@ -140,7 +141,7 @@ def near(
         u, C = normal[r], centres[k, s]
         for j in range(1, n + 1):
             slopes[r, j - 1] = 0.0
-            # What moves both moves neither against the other.
+            # A joint that moves both does not change their distance.
             sign = moves[joint[s], j - 1] - moves[c, j - 1]
             if sign == 0.0:
                 continue

@@ -1,4 +1,4 @@
-"""Entry: the Gauss-Newton model of a tracking cost."""
+"""The compiled Gauss-Newton model of a tracking cost."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Entries: where joints and frames are along a plan."""
+"""Compiled positions and orientations of joints and frames along a plan."""
 
 from __future__ import annotations
 
@@ -48,12 +48,13 @@ def frame_along(
     p: Array,
     J: Array,
 ) -> None:
-    """A frame where the joints are placed.
+    """Computes a frame from the placements of the joints.
 
     Args:
-        task, part: the tasks whose rows are asked for, see `jacobian`.
+        task, part: the tasks whose rows are computed, see `jacobian`.
         parent, is_revolute: of the joints. placed, z: from `place_all`.
-        joint: (1,) that carries the frame. turn, shift: its axes (3, 3) and origin (1, 3) there.
+        joint: (1,), the joint that carries the frame. rotation, translation: the frame's axes (3, 3) and
+            origin (1, 3) in that joint's frame.
         R, p, J: the result, (K, 3, 3), (K, 3) and (K, m, n).
     """
     placed, z, rotation, translation = (

@@ -1,4 +1,4 @@
-"""Entries: the rows of (7d), and rows of what depends on q, on the condensed inputs."""
+"""Compiled rows of (7d), and rows of functions of q, with respect to the condensed inputs."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from himpc.tick.kernel.linear import dot
 Array = NDArray[np.float64]
 
 RAMP_STEPS = 10
-"""The input is taken back within at most this many knots beyond the horizon."""
+"""Largest number of knots beyond the horizon within which the input returns to zero."""
 STOP_STEPS = 40
-"""Braking is watched for at most this many knots beyond the horizon."""
+"""Largest number of knots beyond the horizon for which braking is checked."""
 
 
 @kernel(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
 def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
-    """From a place on, the rows of A (…, N·n) whose values at knots (r,) have slopes (r, n) in q."""
+    """Writes the rows of A (…, N·n) from `index` on whose values at knots (r,) have slopes (r, n) in q."""
     n = slopes.shape[1]
     for r in range(len(knot)):
         for s in range(len(T_q)):
@@ -46,7 +46,7 @@ def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Arr
 
 @kernel(MATRIX, MATRIX, VECTOR, WHOLE, MATRIX)
 def about(A: Array, bounds: Array, u: Array, count: int, room: Array) -> None:
-    """The bounds of the first rows for the change d of u, u + d: A d in [lower − Au, upper − Au] = `room`."""
+    """Writes the bounds of the first rows for the change d of u: A d in [lower − Au, upper − Au] = `room`."""
     A, u = borrowed(A), borrowed(u)
     for r in range(count):
         value = dot(A[r], u, len(u))
@@ -65,11 +65,12 @@ def guard(
     room: Array,
     labels: NDArray[np.int64],
 ) -> None:
-    """Writes (12), |e + J T_q d| ≤ |e*| in every coordinate and knot, to a table from a place on.
+    """Writes (12), |e + J T_q d| ≤ |e*| in every coordinate and knot, to a table from row `index` on.
 
     Args:
         J, e: (N, m, n) and (N, m), the error of a level above at the iterate. best: e*, (N, m).
-        strict: whether what a step has already taken beyond e* is not granted. The rows of A are then there.
+        strict: whether an error that already exceeds e* must return to e*; it may stay otherwise. If strict,
+            the rows of A must have been written before.
         T_q: (N, N), ∂q_k/∂u_s. A, room, labels: of the table.
     """
     N, m, n = J.shape
@@ -110,7 +111,7 @@ def limits(
     bounds: Array,
     labels: NDArray[np.int64],
 ) -> int:
-    """Writes the rows of `limit_rows` to the beginning of a table; returns how many there are."""
+    """Writes the rows of `limit_rows` to the beginning of a table; returns their number."""
     N, n = len(t), len(q)
     T, count = t[N - 1], 0
     for kind in range(4):
@@ -141,7 +142,7 @@ def limits(
                     bounds[0, count], bounds[1, count] = low, high
                     labels[0, count], labels[1, count], labels[2, count] = kind, k + (kind <= POSITION), i
                     count += 1
-    # "ramp": |v_N ± Δt (m u_{N−1} − j Δt m(m+1)/2)| ≤ v_max, speed while the input goes back to zero.
+    # "ramp": |v_N ± Δt (m u_{N−1} − j Δt m(m+1)/2)| ≤ v_max, the speed while the input returns to zero.
     for i in range(n):
         step = j_max[i] * dt
         if not (math.isfinite(step) and math.isfinite(v_max[i]) and a_max[i] > step):
@@ -155,8 +156,8 @@ def limits(
             bounds[0, count], bounds[1, count] = -room - v[i], room - v[i]
             labels[0, count], labels[1, count], labels[2, count] = RAMP, N, i
             count += 1
-    # "stop": q_N + mΔt v_N ∓ ½a(mΔt)² inside the range, where full braking for m steps leads; left out where
-    # the fastest motion that the input bounds permit does not get there.
+    # "stop": q_N + mΔt v_N ∓ ½a(mΔt)², the position after m steps of full braking, inside the range. A row is
+    # left out if the fastest motion within the input bounds does not reach its bound.
     for m in range(1, STOP_STEPS + 1):
         ahead = m * dt
         for i in range(n):

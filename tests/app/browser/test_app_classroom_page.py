@@ -1,4 +1,4 @@
-"""A classroom: one robot for all pages, steered by who has the token."""
+"""A classroom: one robot for all pages, and only pages with the token can control it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def classroom() -> Iterator[PageServer]:
 
 
 def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
-    """A page without it sees the same robot and cannot stop it; with it the page can."""
+    """A page without the token shows the same robot and cannot stop it; with the token it can."""
     assert isinstance(classroom.sessions, Classroom)
     (learner,) = classroom.sessions.learners
     page = open_page(browser, classroom.link, 1300, 700)

@@ -1,4 +1,4 @@
-"""The very first start, when nothing is compiled: the page opens at once and says how far it is."""
+"""The first start, when nothing is compiled: the page opens at once and shows the progress of compilation."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from lessons.scenes.run_spec import RunSpec
 def test_the_page_opens_while_it_is_compiled(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The file that a browser begins with leads there, and the page counts what is ready. (How the robot
-    comes after that: every other test of the page.)"""
+    """The file that the browser opens first redirects to the page, and the page counts the compiled
+    functions."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)

@@ -1,4 +1,4 @@
-"""The inside of a tick in a real browser: the picture, its numbers, and what it costs."""
+"""The "Inside" panel in a real browser: the picture of a tick, its numbers, and its cost."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from lessons.scenes.run_spec import RunSpec
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 ARM = 0.08
-"""m, where the gizmo of this small arm is taken hold of."""
+"""m, distance from the arm at which the gizmo of this small arm is grasped."""
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def shared(browser: Browser, drawing: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def sheet(shared: Page, drawing: PageServer) -> Page:
-    """The page as it was opened, with the picture painted."""
+    """The page in its initial state, with the picture drawn."""
     press(shared, "Reset all")
     tab(shared, "Inside")
     assert eventually(shared, lambda: point(shared, "optimum-1") is not None)
@@ -62,7 +62,7 @@ FIND = """([title, name]) => { const all = [...document.querySelectorAll("[data-
 
 
 def point(page: Page, name: str) -> np.ndarray | None:
-    """Where a point of the picture is, N·m, to ten digits."""
+    """Returns the coordinates of a point of the picture, N·m, to ten digits; None if it is not drawn."""
     found = page.evaluate(FIND, [PLANE, name])
     return None if found is None else np.array([float(value) for value in str(found).split(",")])
 
@@ -74,7 +74,7 @@ def plane(server: PageServer) -> Plane:
 
 
 def stand_still(page: Page, server: PageServer) -> None:
-    """Pauses, and waits until the picture is that of the last tick."""
+    """Pauses, and waits until the picture shows the last tick."""
     learner = learner_of(server)
     learner.send(Play(False))
     assert eventually(page, lambda: learner.status is not None and not learner.status.running)
@@ -82,7 +82,7 @@ def stand_still(page: Page, server: PageServer) -> None:
 
 
 def agrees(page: Page, server: PageServer) -> bool:
-    """Drawn where the solver put them."""
+    """Whether the picture shows both optima at the solver's points."""
     found = [point(page, f"optimum-{place}") for place in (1, 2)]
     levels = plane(server).levels
     return all(
@@ -93,7 +93,7 @@ def agrees(page: Page, server: PageServer) -> bool:
 
 @contextmanager
 def watched(page: Page, names: Sequence[str]) -> Iterator[None]:
-    """Meanwhile the page notes ten times a second where points are."""
+    """While the context is open, the page stores the coordinates of the points ten times a second."""
     page.evaluate(
         f"""([title, names]) => {{
              const find = {FIND};
@@ -113,7 +113,8 @@ def watched(page: Page, names: Sequence[str]) -> Iterator[None]:
 
 
 def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer) -> None:
-    """Seen from before the drag on: where a browser is slow, all is at rest again when it ends."""
+    """Recorded from before the drag on, because in a slow browser everything is at rest again when the drag
+    ends."""
     names = ("optimum-1", "optimum-2")
 
     def moved() -> bool:
@@ -123,7 +124,7 @@ def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer)
     with watched(sheet, names):
         drag_target(sheet, axis=0, along=0.12, arm=ARM)
         assert eventually(sheet, moved)
-    # At rest level 2 is held away from what it would choose alone, and the two agree with the solver.
+    # At rest, level 2 has another optimum than it would have alone, and the picture agrees with the solver.
     assert eventually(sheet, lambda: point(sheet, "wish-2") is not None)
     stand_still(sheet, drawing)
     assert plane(drawing).apart < 1e-6
@@ -203,7 +204,7 @@ def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
 
 
 def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
-    """From another scene, which stays on the page: this test is the last one."""
+    """This test leaves another scene on the page, so it is the last one."""
     page, learner = shared, learner_of(drawing)
     show_scene(page, learner, SceneChoice(RunSpec("planar3-hold")))
     tab(page, "Inside")
@@ -213,5 +214,5 @@ def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
     expect(page.get_by_text("Later knots are held")).to_be_hidden()
     learner.send(Post(Set("controller", "osf")))
     expect(page.get_by_text("osf solves no such QP")).to_be_visible()
-    learner.send(InsideRequest(plane=(7, 9)))  # a stranger's joints
+    learner.send(InsideRequest(plane=(7, 9)))  # joints that the robot does not have
     assert eventually(page, lambda: learner.failure is None and learner.status is not None)

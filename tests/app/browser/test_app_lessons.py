@@ -1,4 +1,4 @@
-"""Lessons in a real browser: every one is walked through as a learner would."""
+"""Every lesson is done in a real browser, with the actions of a learner."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path
 
 
 def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
-    """Every part of the lesson that is open, as a learner would: whatever it claims holds."""
+    """Does every part of the open lesson with a learner's actions; all claims must hold."""
     for part in parts_of(lesson):
         expect_part(page, lesson, part)
         if isinstance(part, Challenge):
@@ -93,7 +93,7 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
 
 
 def kept(page: Page) -> dict[str, Any]:
-    """What the browser remembers of the lessons."""
+    """Returns the data about lessons in the browser's local storage."""
     return json.loads(
         page.evaluate(
             """() => { const k = Object.keys(localStorage).find((k) => k.endsWith("himpc-lab-lessons"));
@@ -103,7 +103,7 @@ def kept(page: Page) -> dict[str, Any]:
 
 
 def take_challenge(page: Page, school: PageServer, challenge: Challenge) -> None:
-    """As it stands it is missed; with a known solution it is passed."""
+    """The challenge fails with its initial settings, and passes with a known solution."""
     hurry(page)
     run(page, "Start the run")
     expect(page.get_by_text("NOT YET", exact=True)).to_be_visible()

@@ -1,4 +1,4 @@
-"""A minute of a user who tries everything in no order."""
+"""One minute of random actions in a real browser."""
 
 from __future__ import annotations
 

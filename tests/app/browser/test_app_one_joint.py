@@ -1,4 +1,5 @@
-"""A robot with one moving joint in a real browser: it holds, is dragged and runs."""
+"""A robot with one moving joint in a real browser: it holds its position, follows a dragged target and
+resets."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ def page(browser: Browser, server: PageServer) -> Iterator[Page]:
 def test_one_joint_holds_is_dragged_and_runs(
     page: Page, server: PageServer, kind: str, axis: str, there: float
 ) -> None:
-    """A hinge comes as near to the dragged target as it can, a slide comes to it."""
+    """A revolute joint moves to the point nearest to the dragged target, a prismatic joint to the target
+    itself."""
     learner = server.sessions.learners[0]
     show_scene(page, learner, one(kind, axis))
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 1.0)
@@ -67,7 +69,7 @@ def test_one_joint_holds_is_dragged_and_runs(
     drag_target(page, axis=1, along=ALONG, arm=0.08)
     moved = np.array(target_position(page)) - before
     assert moved[1] == pytest.approx(ALONG, abs=0.02) and np.abs(moved[[0, 2]]).max() < 0.02
-    there *= float(moved[1]) / ALONG  # a hand is not exact
+    there *= float(moved[1]) / ALONG  # a drag in the browser is not exact
     assert eventually(page, lambda: abs(joint(learner) - there) < 0.02), joint(learner)
     press(page, "Reset all")
     assert eventually(page, lambda: abs(joint(learner) - home) < 0.01)

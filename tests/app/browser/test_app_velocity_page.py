@@ -1,4 +1,4 @@
-"""The mobile manipulator's scenes in a real browser: what the fourth chapter of the page promises."""
+"""The mobile manipulator's scenes in a real browser."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def page(shared_page: Page) -> Page:
-    """The page with everything at its beginning, as each test finds it."""
+    """The page after a reset, the same for each test."""
     tab(shared_page, "Start")
     press(shared_page, "Reset all")
     expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
@@ -62,7 +62,7 @@ def page(shared_page: Page) -> Page:
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
-    """The simulation behind `page`, which was reset first."""
+    """The simulation of `page`, which was reset before."""
     assert eventually(page, lambda: bool(server.sessions.learners))
     found = server.sessions.learners[0]
     assert eventually(page, lambda: found.status is not None and found.status.ticks > 0)
@@ -75,7 +75,7 @@ def mission(learner: SimulationClient) -> MissionView:
 
 
 def latest(learner: SimulationClient, field: str) -> np.ndarray:
-    """A field of the newest row of telemetry."""
+    """Returns a field of the newest row of telemetry."""
     found = learner.read(lambda _, history: history.latest[history.layout.fields[field]].copy())
     assert found is not None
     return found
@@ -86,7 +86,7 @@ def error(learner: SimulationClient, role: str) -> float:
 
 
 def goal(learner: SimulationClient, place: int) -> np.ndarray:
-    """Where the task at a place of the mission goes, m."""
+    """Returns the goal of the task with this index in the mission, m."""
     found = mission(learner).rows[place].goal
     assert found is not None
     return np.array(found)
@@ -97,7 +97,7 @@ def at_rest(learner: SimulationClient) -> bool:
 
 
 def load(page: Page, learner: SimulationClient, scene: str) -> None:
-    """By the menu of the Robot tab, unless it is there already."""
+    """Loads a scene by the menu of the Robot tab, if it is not loaded yet."""
     if learner.ready is not None and learner.ready.choice.run.scene == scene:
         return
     tab(page, "Robot")
@@ -140,7 +140,8 @@ def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(
 
 
 def test_the_camera_goes_along_with_the_base(page: Page, learner: SimulationClient) -> None:
-    """As far as the base went, though a browser without a graphics card tells late where it looks from."""
+    """The camera moves by the same distance as the base, although a browser without a graphics card reports
+    its camera late."""
     load(page, learner, "ridgeback-ur10-drag")
     tab(page, "Start")
     page.get_by_text("Show", exact=True).first.click()
@@ -165,7 +166,7 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     load(page, learner, "ridgeback-ur10-cluttered")
     assert eventually(page, lambda: is_drawn(page, "/obstacle/1"))
     before = goal(learner, 1)
-    # The mission takes six seconds: on a busy machine it is over before a hand is there.
+    # The mission takes six seconds; on a busy machine it would end before the drag begins, so it runs slowly.
     set_number(page, "Speed", 0.1)
     assert eventually(page, lambda: learner.status is not None and learner.status.speed == 0.1)
     press(page, "Reset")
@@ -174,8 +175,8 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     drag_target(page, axis=1, along=-0.5, node="/goal/base", arm=0.5)
 
     def arrived() -> bool:
-        """A drag is many moves, and a tick takes a second now: all of it has come when the mission goes where
-        the hand let go of the disc."""
+        """Whether all moves of the drag have been applied: the task's goal is at the position of the disc. A
+        drag consists of many moves, and a tick takes a second here."""
         left = target_position(page, "/goal/base/disc")[:2]
         return left[1] < before[1] - 0.2 and np.allclose(goal(learner, 1), left, atol=1e-3)
 
@@ -205,7 +206,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Simu
 
     assert eventually(page, adopted)
     set_number(page, "Speed", 0.5)
-    press(page, "Reset")  # the scene's own script releases it, too, after 14 s
+    press(page, "Reset")  # the scene's own script also releases it, after 14 s
     tab(page, "Mission")
     page.get_by_role("button", name="Release ee 1").click()
     assert eventually(page, lambda: mission(learner).rows[1].state == "done")

@@ -18,7 +18,8 @@ def runs(learner: SimulationClient, name: str) -> bool:
 
 
 def test_the_menu_switches_the_controller_while_the_robot_moves(page: Page, server: PageServer) -> None:
-    """Every registered name is offered with its description; the hand stays where it is."""
+    """The menu offers every registered name with its description; the hand does not move during the
+    switch."""
     assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
     learner = server.sessions.learners[0]
     tab(page, "Control")

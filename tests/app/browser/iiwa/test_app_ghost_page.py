@@ -1,4 +1,4 @@
-"""A ghost, looking back and a file to take home, in a real browser."""
+"""A ghost, looking back and downloading a file, in a real browser."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     expect(page.get_by_text("position [mm], ghost")).to_be_visible()
     expect(page.get_by_text("99 % below")).to_be_visible()
 
-    # Both follow the target aside; then time stands and the view goes back to before that.
+    # Both robots follow the target aside; then the simulation pauses, and the view goes back to the time
+    # before.
     assert learner.status is not None
     x, y, z = learner.status.targets["position"]
     learner.send(Post(MoveTarget("position", (float(x), float(y) + 0.08, float(z)))))

@@ -1,4 +1,4 @@
-"""A setting is passed on: as a command line, as a code and as a script, in a real browser."""
+"""A setting is shared in a real browser: as a command line, as a code and as a script."""
 
 from __future__ import annotations
 

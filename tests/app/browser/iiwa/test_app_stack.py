@@ -1,4 +1,4 @@
-"""The hierarchy is composed in a real browser, while the robot moves."""
+"""A user changes the hierarchy in a real browser while the robot moves."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def error(learner: SimulationClient, task: str) -> float:
 
 
 def now(learner: SimulationClient, field: str) -> float:
-    """How large it is in the newest row."""
+    """Returns the norm of a field in the newest row."""
     found = learner.read(lambda _, history: (history.layout, history.latest))
     assert found is not None
     layout, latest = found
@@ -54,7 +54,7 @@ def unfold(page: Page, title: str, at: int = 0) -> None:
 
 
 def frame_clicked(page: Page) -> str:
-    """What the menu shows after a click on the forearm."""
+    """Returns the frame that the menu shows after a click on the forearm."""
     click_on(page, "/robot/4/shape8")
     return row(page, "Of frame").locator("input").first.input_value()
 
@@ -62,8 +62,8 @@ def frame_clicked(page: Page) -> str:
 def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     page: Page, server: PageServer
 ) -> None:
-    """An elbow under the hand: errors, ranks and gizmo follow, no level loses its target, and the stack's
-    code is the same stack elsewhere."""
+    """A user adds an elbow task below the hand: errors, ranks and gizmo follow every change, no level loses
+    its target, and the stack's code gives the same stack elsewhere."""
     learner = server.sessions.learners[0]
     tab(page, "Tasks")
     unfold(page, "Add a task")
@@ -83,7 +83,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: target_position(page, ELBOW)[0] > before[0] + 0.03)
     assert eventually(page, lambda: error(learner, "elbow") > 1e-3)
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
-    assert now(learner, "priority_leak") < 1e-6  # for whom the elbow's level moves
+    assert now(learner, "priority_leak") < 1e-6  # the elbow's level does not disturb the level above
 
     page.get_by_role("button", name="▲ Up", exact=True).nth(1).click()
     assert eventually(page, lambda: levels(learner)[:2] == ["elbow", "position"])
@@ -94,7 +94,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     expect(page.get_by_text("gets 1 of 1 directions", exact=False).first).to_be_visible()
     assert eventually(page, lambda: error(learner, "elbow") < 2e-3)
 
-    expect(row(page, "Axes").locator("input").first).to_be_visible()  # it stays unfolded
+    expect(row(page, "Axes").locator("input").first).to_be_visible()  # the task stays unfolded
     unfold(page, "Change", 1)
     page.get_by_role("button", name="Merge with the level above", exact=True).first.click()
     assert eventually(page, lambda: levels(learner) == ["elbow+position", "orientation", "posture"])
@@ -128,7 +128,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
         other = server.sessions.learners[1]
         assert eventually(page, lambda: other.settings == settings(learner)), elsewhere.notices
 
-    tab(page, "Tasks")  # what was edited last is unfolded
+    tab(page, "Tasks")  # the task that was edited last is unfolded
     press(page, "Remove forearm")
     assert eventually(page, lambda: levels(learner) == ["position", "orientation", "posture"])
     assert eventually(page, lambda: not is_drawn(page, "/targets/forearm/control"))

@@ -1,1 +1,1 @@
-"""Tests in a browser that have a page of the iiwa for themselves: they load other robots."""
+"""Tests in a browser that need a page of the iiwa of their own, because they load other robots."""

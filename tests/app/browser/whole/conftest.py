@@ -1,4 +1,4 @@
-"""The fixtures of `iiwa`, once more: what these tests leave is nobody else's."""
+"""The fixtures of `iiwa` with a server of their own, because these tests change its state."""
 
 from iiwa.conftest import page, server, shared_page
 

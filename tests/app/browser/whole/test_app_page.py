@@ -45,13 +45,13 @@ from robots import CATALOG
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
-    """The simulation behind `page`, which was opened first and never left for long."""
+    """The simulation of `page`."""
     assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
     return server.sessions.learners[0]
 
 
 def error(learner: SimulationClient, task: str) -> float:
-    """‖x̃‖ now, m or rad."""
+    """Returns ‖x̃‖ now, m or rad."""
     row = learner.read(lambda _, history: (history.layout, history.latest))
     assert row is not None
     layout, latest = row
@@ -70,7 +70,7 @@ def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: SimulationClient)
     drag_target(page, axis=1, along=0.15)
     assert eventually(page, lambda: position(page, "/actual")[1] > before[1] + 0.08)
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
-    # The arrows are the world's, however the hand is turned.
+    # The arrows are along the world's axes for every orientation of the hand.
     assert np.allclose(np.delete(target_position(page), 1), np.delete(before, 1), atol=1e-3)
     expect(page.get_by_text("Target within reach")).to_be_visible()
     expect(page.get_by_text("Now switch a level off")).to_be_visible()
@@ -91,7 +91,7 @@ def test_rings_turn_the_target_while_its_level_is_on(page: Page, learner: Simula
 
 
 def turned(learner: SimulationClient, before: np.ndarray) -> float:
-    """Angle of the orientation target's turn since `before`, rad."""
+    """Returns the angle by which the orientation target was rotated since `before`, rad."""
     assert learner.status is not None
     trace = float(np.trace(learner.status.targets["orientation"] @ before.T))
     return float(np.arccos(np.clip((trace - 1) / 2, -1.0, 1.0)))
@@ -99,10 +99,11 @@ def turned(learner: SimulationClient, before: np.ndarray) -> float:
 
 def test_an_unreachable_target_is_shown_and_breaks_nothing(page: Page, learner: SimulationClient) -> None:
     for _ in range(3):
-        drag_target(page, axis=1, along=-0.6)  # away from who looks: it stays in the picture
+        drag_target(page, axis=1, along=-0.6)  # away from the camera, so that it stays in the picture
     expect(page.get_by_text("Out of reach by")).to_be_visible()
     assert eventually(page, lambda: position(page, "/actual")[1] < -0.3)
-    assert eventually(page, lambda: error(learner, "position") < 5e-3)  # of the target it accepted
+    # the error from the target that the controller accepted
+    assert eventually(page, lambda: error(learner, "position") < 5e-3)
     assert learner.failure is None
     press(page, "Bring the target to the hand")
     expect(page.get_by_text("Target within reach")).to_be_visible()
@@ -178,7 +179,8 @@ def test_pause_step_reset(page: Page, learner: SimulationClient) -> None:
 
 
 def test_paused_edits_show_at_once(page: Page, learner: SimulationClient) -> None:
-    """Nothing moves, but panel, order of the stack and gauge are those of the edited settings."""
+    """While the simulation is paused, panel, order of the stack and gauge show the edited settings at
+    once."""
     key(page, "Space")
     expect(page.get_by_text("PAUSED", exact=True).first).to_be_visible()
     assert learner.status is not None
@@ -195,7 +197,7 @@ def test_paused_edits_show_at_once(page: Page, learner: SimulationClient) -> Non
 
 
 def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: SimulationClient) -> None:
-    """Typed into a field they are text; pressed twice quickly they cancel out."""
+    """Keys that are typed into a field are text; a toggle key that is pressed twice quickly has no effect."""
     tab(page, "Robot")
     row(page, "Hand frame").locator("input").click()
     page.keyboard.type("s 2r")
@@ -220,7 +222,7 @@ def test_no_thread_can_hold_up_what_is_sent(page: Page, server: PageServer) -> N
 def test_the_browser_tells_which_charts_it_shows(
     page: Page, server: PageServer, learner: SimulationClient
 ) -> None:
-    """Of the others nothing is sent."""
+    """The server sends the data of these charts only."""
     pages = [each._page for each in server._visits.values() if each._page is not None]
     (shown,) = (each for each in pages if each.learner is learner)
 
@@ -265,7 +267,7 @@ def test_two_browsers_and_no_third(
     pid = other.pid
     second.context.close()
     assert pid is not None
-    assert wait_until(lambda: other not in server.sessions.learners, 30.0)  # closing the tab ends the child
+    assert wait_until(lambda: other not in server.sessions.learners, 30.0)  # closing the tab ends the process
     third.get_by_role("button", name="Try again").click()
     wait_for_scene(third)
     third.context.close()
@@ -283,7 +285,7 @@ def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Simulat
     assert learner.pid != pid
     wait_for_scene(page)
     page.wait_for_timeout(500)
-    assert np.allclose(camera(page), view, atol=1e-3)  # looked at from where it was
+    assert np.allclose(camera(page), view, atol=1e-3)  # the view is the same as before
 
 
 def test_wrong_robots_are_one_sentence_and_uploads_work(
@@ -293,7 +295,8 @@ def test_wrong_robots_are_one_sentence_and_uploads_work(
     write(page, "File", "/nowhere/<b>robot</b>.urdf")
     press(page, "Load file")
     expect(page.get_by_text("only files below the folder")).to_be_visible()
-    expect(page.get_by_text("/nowhere/<b>robot</b>.urdf")).to_be_visible()  # text, not markup
+    # shown as text, not interpreted as HTML
+    expect(page.get_by_text("/nowhere/<b>robot</b>.urdf")).to_be_visible()
     write(page, "File", "<b>robot</b>.urdf")
     press(page, "Load file")
     expect(page.get_by_text("NOT LOADED")).to_be_visible()
@@ -309,7 +312,7 @@ def test_wrong_robots_are_one_sentence_and_uploads_work(
     mine.write_text(re.sub(r'<robot name="[^"]*"', f'<robot name="{hostile}"', text, count=1))
     _upload(page, mine)
     assert eventually(page, lambda: learner.ready is not None and learner.ready.robot.n == 3)
-    expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()  # the panel is built anew
+    expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()  # the panel was built again
     tab(page, "Robot")
     expect(page.get_by_text("3 joints").first).to_be_visible()
     assert page.evaluate("() => window.hacked") is None
@@ -327,7 +330,7 @@ def test_other_scenes_and_the_phone(browser: Browser, server: PageServer) -> Non
     learner = server.sessions.learners[-1]
     expect(phone.get_by_text("Drag the target by its arrows")).to_be_visible()
     left, right = sheet(phone)
-    assert left < 1 and 389 <= right <= 391  # the sheet fills the screen
+    assert left < 1 and 389 <= right <= 391  # the sheet has the width of the screen
     tab(phone, "Robot")
     phone.get_by_role("button", name="Load robot").scroll_into_view_if_needed()
     learner.send(Load(SceneChoice(RunSpec("iiwa14-circle"))))
