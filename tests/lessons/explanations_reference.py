@@ -165,13 +165,13 @@ REFERENCE = (
         ("lessons/settings/missions.py", "All but the tasks in the window is the same"),
     )),
     Exempt("software", LESSONS + "deadline.py::test_the_clock_decides_only_if_asked_to", (
-        ("lessons/settings/settings.py", "Whether the clock on the wall decides anything"),
+        ("lessons/settings/settings.py", "Whether measured computing times change the run"),
     )),
     Exempt("software", LESSONS + "deadline.py::test_the_horizon_decides_what_is_late", (
-        ("lessons/settings/torque.py", "solve_ms_per_knot: how long the computer"),
+        ("lessons/settings/torque.py", "solve_ms_per_knot: assumed computing time"),
     )),
     Exempt("software", LESSONS + "own.py::test_own_files_are_run_only_where_the_command_line_says_so", (
-        ("lessons/settings/torque.py", "No path reaches them: what comes from elsewhere"),
+        ("lessons/settings/torque.py", "They have no path: data from elsewhere"),
     )),
 )
 # fmt: on

@@ -245,7 +245,7 @@ def test_what_a_code_cannot_carry_is_said() -> None:
     first, *others = hold.settings.levels
     own = replace(first, tasks=(OwnKind(name="position"),))
     other = replace(hold.settings, levels=(own, *others))
-    with pytest.raises(InputError, match="cannot be told"):
+    with pytest.raises(InputError, match="cannot be written"):
         state_of(RunSpec("planar3-hold"), other)
 
 
