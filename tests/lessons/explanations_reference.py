@@ -170,8 +170,5 @@ REFERENCE = (
     Exempt("software", LESSONS + "deadline.py::test_the_horizon_decides_what_is_late", (
         ("lessons/settings/torque.py", "solve_ms_per_knot: assumed computing time"),
     )),
-    Exempt("software", LESSONS + "own.py::test_own_files_are_run_only_where_the_command_line_says_so", (
-        ("lessons/settings/torque.py", "They have no path: data from elsewhere"),
-    )),
 )
 # fmt: on
