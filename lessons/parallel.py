@@ -61,9 +61,8 @@ def on_cores(
         items: its arguments.
 
     Yields:
-        (index of the item, its result), with `FailedJob` as the result if it raised an exception or its
-        process
-            ended unexpectedly twice.
+        (index of the item, its result). The result is a `FailedJob` if the function raised an exception, or
+        if its process ended unexpectedly twice.
     """
     waiting = deque(range(len(items)))
     while waiting:
