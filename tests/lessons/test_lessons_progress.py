@@ -98,5 +98,5 @@ def test_grade_reads_what_is_handed_in(tmp_path: Path, capsys: pytest.CaptureFix
     with pytest.raises(InputError, match=r"nobody\.txt: cannot be read"):
         grade(tmp_path / "nobody.txt")
     key.write_bytes(b"short")
-    with pytest.raises(InputError, match="a key has 16 signs or more"):
+    with pytest.raises(InputError, match="a key has 16 characters or more"):
         read_key(str(key))
