@@ -32,7 +32,7 @@ class Mistake:
 
 @final
 class Diagnosis:
-    """The known mistakes that still fit a submission, run by run."""
+    """The known mistakes whose torques have been equal to those of a submission so far."""
 
     def __init__(self, mistakes: Sequence[Mistake]) -> None:
         self._left = list(mistakes)

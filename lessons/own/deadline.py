@@ -57,7 +57,7 @@ class CallDeadline:
         self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
 
     def _hear(self, _: int, __: FrameType | None) -> None:
-        """The alarm. Raises TooLong, or sets it again."""
+        """Handles the alarm: raises TooLong, or sets the alarm again."""
         if time.thread_time() - self._computed > 0.9 * self._seconds:
             raise TooLong
         now, starved = time.monotonic(), waited(os.getpid())

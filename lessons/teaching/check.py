@@ -59,7 +59,7 @@ Outcomes = Mapping[RunSpec, Outcome]
 
 
 def measured(piece: tuple[RunSpec, tuple[Measure, ...]]) -> Outcome:
-    """Runs and measures. Raises InputError for a run that is not possible."""
+    """Performs a run and computes its measures. Raises InputError for a run that is not possible."""
     what, measures = piece
     recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}

@@ -1,4 +1,4 @@
-"""Table III: properties of the controllers, decided from runs."""
+"""Table III: properties of the controllers, determined from runs."""
 
 from __future__ import annotations
 
