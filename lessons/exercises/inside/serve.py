@@ -87,7 +87,7 @@ def serve(parent: int, memory: int, kernel: bool) -> None:
         if refused:
             answer = (
                 wire.FAULT,
-                f"{source.path}: a submission may not do this ({refused[0]})".encode(errors="replace"),
+                f"{source.path}: a submission may not do that ({refused[0]})".encode(errors="replace"),
             )
         wire.write(told, *answer)
 
