@@ -51,10 +51,10 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
         "no gravity": Mistake("now.gravity +", "", 5, "g(q) is missing"),
         "sign of gravity": Mistake("now.gravity +", "-now.gravity +", 5, "g(q) has the wrong sign"),
-        "gravity of the start": Mistake("", _FROZEN, 7, "g(q) is that of the start"),
+        "gravity of the start": Mistake("", _FROZEN, 7, "g(q) is computed at the start"),
         "no M̄": Mistake("now.M_bar *", "", 5, "M̄ is missing"),
         "no target": Mistake("level.error", 'level.x["posture"]', 5, "q_d is missing"),
-        "holds the torque": Mistake("", _HELD, 2, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 2, "the torque is constant"),
     },
     "null-space": {
         "no J̇q̇": Mistake("- level.J_dot_q_dot", "", 7, "J̇q̇ is missing"),
@@ -76,7 +76,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 3, "K_v has the wrong sign"),
     },
     "time-delay": {
-        "holds the torque": Mistake("", _HELD, 1, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 1, "the torque is constant"),
         "sign of q̈₀": Mistake("- now.q_ddot", "+ now.q_ddot", 3, "q̈₀ has the wrong sign"),
         "no q̈₀": Mistake("- now.q_ddot", "", 3, "q̈₀ is missing"),
         "q̈₀ without T_s": Mistake("- now.q_ddot", "- now.T_s * now.q_ddot", 3, "not divided by T_s"),
@@ -109,7 +109,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "no Q": Mistake("level.Q * e", "e", 5, "Q is missing in f"),
         "references of now": Mistake("_d[1]", "_d[0]", 6, "those of this tick"),
         "no M̄": Mistake("level.J / now.M_bar", "level.J", 3, "M̄ is missing in G"),
-        "holds the torque": Mistake("", _HELD, 3, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 3, "the torque is constant"),
         "increments alone": Mistake("now.tau_0 + solve_qp", "solve_qp", 3, "τ₀ is missing"),
     },
     "two-levels": {
@@ -128,7 +128,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "only one level": Mistake(
             "in now.levels:", "in [now.levels[0]] * 2:", 5, "the second level is left out"
         ),
-        "holds the torque": Mistake("", _HELD, 2, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 2, "the torque is constant"),
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 7, "R is missing"),
     },
 }
