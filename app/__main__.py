@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 if __name__ == "__main__":
-    import app.commands.early  # noqa: F401  (first of all)
+    import app.commands.early  # noqa: F401  (must be the first import)
 
 import os
 import sys
@@ -14,13 +14,13 @@ from app.commands.interrupts import interruptible
 
 COMMANDS: dict[str, str] = {
     "serve": "open the page (also what himpc-lab does without a command)",
-    "run": "run a scene headless and print what came out",
+    "run": "run a scene headless and print the results",
     "scenes": "list the scenes",
     "controllers": "list the controllers",
     "robots": "list the robots, or check a URDF",
     "lessons": "list the lessons, or run every claim of them headless",
     "grade": "judge solutions of the exercises, one file or a folder of them",
-    "new": "write a controller, scene, lesson or task of your own to begin with",
+    "new": "write a template of a controller, scene, lesson or task of your own",
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",
     "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",
@@ -64,12 +64,12 @@ def _call(name: str, arguments: list[str]) -> int:
 
     command: Callable[..., int] = getattr(import_module(f"app.commands.{name}"), name)
     prog = "himpc-lab" if name == "serve" else f"himpc-lab {name}"
-    # Flags have no negative form: the one of --no-browser would be --no-no-browser.
+    # Flags have no negative form: tyro would make --no-no-browser out of --no-browser.
     return tyro.cli(command, prog=prog, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
 
 
 def _print_commands() -> None:
-    print("Commands (himpc-lab COMMAND --help tells more):")
+    print("Commands (himpc-lab COMMAND --help shows the options of a command):")
     for name, line in COMMANDS.items():
         print(f"  {name:12} {line}")
     print()

@@ -12,11 +12,11 @@ FILE = Path(__file__).with_name("settings.md")
 
 _HEAD = """# Settings
 
-What `--set PATH=VALUE` takes, and what the page's controls set. `himpc-lab run SCENE --settings` lists what
-one scene has, with its present values. `*` stands for a name: `levels.position.Q` or, by place, `levels.1.Q`.
-Where a value may be a list of one number per joint, a place behind the path sets that joint's alone:
-`M_bar.3=0.05`; `gains.2=0.4` does so for a level's gain. `obstacles.NAME=[x,y,z,radius]` adds a ball,
-`obstacles.NAME=null` takes it away.
+These are the settings that `--set PATH=VALUE` and the page's controls change. `himpc-lab run SCENE
+--settings` lists the settings of one scene with their present values. In a path, `*` is a name or a place:
+`levels.position.Q` or `levels.1.Q`. If a value is a list with one number per joint, a number after the path
+selects a joint: `M_bar.3=0.05`; `gains.2=0.4` selects the gain of a level. `obstacles.NAME=[x,y,z,radius]`
+adds a ball, and `obstacles.NAME=null` removes it.
 
 Made by `python -m docs.settings`.
 """

@@ -1,4 +1,4 @@
-"""What is taught: scenes, the headless session, lessons and the papers' experiments."""
+"""Scenes, the session that runs them without a page, lessons, exercises and the papers' experiments."""
 
 from typing import TYPE_CHECKING
 

@@ -18,17 +18,19 @@ T = TypeVar("T")
 U = TypeVar("U")
 
 PATIENCE = 60.0
-"""s that a scheduler may be without workers before work is given up: one that died is replaced sooner."""
+"""Time, s, that a scheduler may be without workers before the work is given up. A worker that died is usually
+replaced sooner."""
 _ASK = 1.0  # s between two checks whether there are workers
 
 
 @contextmanager
 def on_cluster(address: str) -> Iterator[Spread]:
-    """A way to spread work over the workers of an existing Dask scheduler; they need himpc-lab installed.
+    """Yields a function that spreads work over the workers of an existing Dask scheduler, on which himpc-lab
+    must be installed.
 
     Raises:
-        InputError: dask.distributed is not installed, or nobody answers at the address; while work is spread:
-            the scheduler went away, or had no worker for `PATIENCE` s.
+        InputError: dask.distributed is not installed, or no scheduler answers at the address; while work is
+            spread: the connection to the scheduler was lost, or it had no worker for `PATIENCE` s.
     """
     try:
         from distributed import Client
@@ -73,8 +75,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
     def spread(
         function: Callable[[T], U], items: Sequence[T]
     ) -> Generator[tuple[int, U | FailedJob], None, None]:
-        # pure=False: two equal items are two pieces of work. A lost worker is no failure: the scheduler gives
-        # its work to another one, up to its `allowed-failures` (3) times.
+        # pure=False: two equal items are two pieces of work. A lost worker does not count as a failure: the
+        # scheduler gives its work to another worker, up to its `allowed-failures` (3) times.
         orphans: list[int] = []
         futures = [client.submit(guarded, function, item, pure=False) for item in items]
         places = {future.key: place for place, future in enumerate(futures)}
@@ -85,8 +87,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
                     orphans.append(places[future.key])
                 else:
                     yield places[future.key], future.result() if error is None else FailedJob(sentence(error))
-            # A dying worker also loses the work that waited on it; if the items run one at a time, the guilty
-            # one is found.
+            # A worker that dies also loses the items that waited for it. The items are therefore repeated one
+            # at a time, which shows which of them ends its worker.
             for place in sorted(orphans):
                 alone = client.submit(guarded, function, items[place], pure=False)
                 futures.append(alone)
@@ -95,7 +97,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
                     yield place, future.result() if error is None else FailedJob(sentence(error))
         except (OSError, CancelledError):
             raise InputError(
-                f"--scheduler {address}: the scheduler is gone. Give the same command again once it answers"
+                f"--scheduler {address}: the scheduler no longer answers. Start it, then repeat the command"
             ) from None
         finally:
             client.cancel(futures)

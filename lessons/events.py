@@ -111,13 +111,13 @@ def as_data(event: Event) -> dict[str, Any]:
 
 
 def from_data(data: dict[str, Any]) -> Event:
-    """The inverse of `as_data`. Raises InputError for data that is no event."""
+    """The inverse of `as_data`. Raises InputError for data that do not describe an event."""
     fields = dict(data)
     kind = _KINDS.get(str(fields.pop("event", "")))
     if kind is None:
-        raise InputError(f"{data} is no event: its kind must be one of {', '.join(_KINDS)}")
+        raise InputError(f"{data} is not an event: its kind must be one of {', '.join(_KINDS)}")
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
     try:
         return kind(**values)
     except TypeError:
-        raise InputError(f"{data} is no event: it does not fit {kind.__name__}") from None
+        raise InputError(f"{data} is not an event: its fields are not those of {kind.__name__}") from None

@@ -1,8 +1,8 @@
 """Runs a function on independent items on all local cores; `cluster` does the same on other machines.
 
 An item that fails gives an outcome, too, and the others continue. Outcomes come in the order in which they
-are ready; each outcome has the index of its item, so that results do not
-depend on the speed of the processes.
+are ready; each outcome has the index of its item, so that results do not depend on the speed of the
+processes.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class FailedJob:
-    """Why a piece of work has no result, in one sentence."""
+    """A failed item: one sentence that says why it has no result."""
 
     reason: str
 
 
 class Spread(Protocol):
-    """A way to spread work: (place of the item, its outcome), in the order they become ready. Closing the
-    generator ends what still runs."""
+    """A function that spreads work over processes. It yields (index of the item, its outcome), in the order
+    in which they become ready. Closing the generator ends the work that still runs."""
 
     def __call__(
         self, function: Callable[[T], U], items: Sequence[T]
@@ -46,7 +46,7 @@ class Spread(Protocol):
 
 
 def cores() -> int:
-    """Cores this process may use."""
+    """Number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return max(1, len(affinity(0)) if affinity else os.cpu_count() or 1)
 
@@ -61,13 +61,14 @@ def on_cores(
         items: its arguments.
 
     Yields:
-        (place of the item, its result, or `FailedJob` where it raised or its process died twice).
+        (index of the item, its result). The result is a `FailedJob` if the function raised an exception, or
+        if its process ended unexpectedly twice.
     """
     waiting = deque(range(len(items)))
     while waiting:
         orphans = yield from _until_one_dies(function, items, waiting)
-        # A dying process also ends the other work of its pool; if the items run one at a time, the guilty one
-        # is found.
+        # A process that dies also ends the other work of its pool. The items are therefore repeated one at a
+        # time, which shows which of them ends its process.
         for place in sorted(orphans):
             yield place, _alone(function, items[place])
 
@@ -75,8 +76,8 @@ def on_cores(
 def _until_one_dies(
     function: Callable[[T], U], items: Sequence[T], waiting: deque[int]
 ) -> Generator[tuple[int, U | FailedJob], None, list[int]]:
-    """Works off `waiting`, places of items, until nothing is left or a process dies; returns the places whose
-    work it took along."""
+    """Runs the items with the indices in `waiting` until none is left or a process dies; returns the indices
+    of the items whose work was lost with that process."""
     under_way: dict[Future[U | FailedJob], int] = {}
     orphans: list[int] = []
     workers = min(cores(), len(waiting))
@@ -99,7 +100,7 @@ def _until_one_dies(
 def one_by_one(
     function: Callable[[T], U], items: Sequence[T]
 ) -> Generator[tuple[int, U | FailedJob], None, None]:
-    """The same in this process, in order: for measuring times, and for tests."""
+    """As `on_cores`, but in this process and in order: for measuring times, and for tests."""
     for place, item in enumerate(items):
         yield place, guarded(function, item)
 
@@ -113,7 +114,7 @@ def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
 
 
 def sentence(error: BaseException) -> str:
-    """An error in one line, with its class unless it is written for people."""
+    """An error in one line, with the name of its class, except for an InputError, which is a sentence."""
     text = " ".join(str(error).split()) or "no reason given"
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
 
@@ -125,12 +126,15 @@ def _alone(function: Callable[[T], U], item: T) -> U | FailedJob:
         try:
             return future.result()
         except BrokenProcessPool:
-            return FailedJob("its process died (out of memory, or a crash in a compiled library)")
+            return FailedJob(
+                "its process ended unexpectedly (out of memory, or a crash in a compiled library)"
+            )
 
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Spawned processes that end at once if their owner is interrupted, killed or gone."""
+    """Yields a pool of spawned processes that end at once if their owner is interrupted or ends in any
+    way."""
     others = set(mp.active_children())
     pool = ProcessPoolExecutor(workers, mp.get_context("spawn"), initializer=_obey_the_owner)
     try:
@@ -176,7 +180,8 @@ def _obey_the_owner() -> None:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Children inherit these variables; they count when numpy is first imported, before any code of ours."""
+    """Sets environment variables that children inherit. NumPy reads them when it is first imported, before
+    any code of ours runs in a child."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:

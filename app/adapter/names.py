@@ -1,8 +1,8 @@
-"""Every name of viser that is private and is used here; each is checked before the server starts.
+"""The private names of viser that this program uses; each is checked before the server starts.
 
-viser's page has no public names at all: selectors and objects that our scripts and styles use are constants
-of this module, and viser's sources of the page, which its package contains, must still have what they stand
-for.
+viser documents no names of its page. The selectors and objects that our scripts and styles use are constants
+of this module. viser's package contains the sources of its page, and the check searches them for the text
+that each constant depends on.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ OF_THE_PAGE = (
     ("components/Slider.tsx", "id={uuid}"),
     ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
 )
-"""(file below viser's `client/src`, what stands in it)."""
+"""(file below viser's `client/src`, text that it must contain)."""
 
 
 def check_names() -> None:

@@ -32,7 +32,7 @@ try:
     from viser import _messages, infra
 except ImportError as error:
     raise InputError(
-        f"viser {viser.__version__} is not the one this page was made for ({error}): install 1.1"
+        f"viser {viser.__version__} does not fit this page ({error}): install viser 1.1"
     ) from None
 
 Guard = Callable[[Mapping[str, Any]], dict[str, Any]]
@@ -42,16 +42,17 @@ _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
 
 _UNSENT = 32_000
-"""Bytes that may wait in the socket's send buffer; the usual megabytes would hold seconds of old pictures."""
+"""Bytes that may wait in the socket's send buffer; the usual size, megabytes, holds seconds of old
+pictures."""
 
 
 def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
-    """Starts a viser server whose connections pass `guard`. It opens no public tunnel, and its senders always
-    wake up. Raises InputError, and listens nowhere, if `guard` cannot be installed."""
+    """Starts a viser server that checks every connection with `guard`, opens no public tunnel, and whose
+    senders always wake up. Raises InputError, without listening, if `guard` cannot be installed."""
     self_test(guard)
     # Malformed requests of strangers are not logged on the terminal.
     warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
-    # viser prints a greeting of its own; we promise exactly one line.
+    # viser prints a greeting of its own, but the command promises exactly one line of output.
     with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
@@ -91,8 +92,9 @@ def self_test(guard: Guard) -> None:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[list[bool]]:
-    """Servers that viser starts within this context pass `guard`. Yields a list with one entry per server:
-    False where `guard` could not be installed and every request is refused."""
+    """Within this context viser starts servers that check every connection with `guard`. Yields a list with
+    one entry per server: False if `guard` could not be installed, so that the server refuses every
+    request."""
     served: list[bool] = []
     plain = web.serve
 
@@ -156,15 +158,16 @@ def unfinished_uploads(client: viser.ClientHandle) -> int:
 
 
 def forget_upload(client: viser.ClientHandle, transfer: str) -> None:
-    """Discards what was received of a file; viser then also ignores the parts that still arrive."""
+    """Discards the received parts of a file; viser then also ignores the parts that arrive later."""
     client.gui._current_file_upload_states.pop(transfer, None)
 
 
 async def read_storage(
     client: viser.ClientHandle, keys: Sequence[str], timeout: float
 ) -> tuple[str | None, ...]:
-    """The value that the browser stores under each key; None if there is no value, if the browser may not
-    tell, or if it does not answer within `timeout` seconds. Waits without blocking the event loop."""
+    """The value that the browser stores under each key; None if there is no value, if the browser blocks
+    access to its storage, or if it does not answer within `timeout` seconds. Does not block the event
+    loop."""
     connection = client._websock_connection
     loop = asyncio.get_running_loop()
     asked: dict[str, asyncio.Future[str | None]] = {uuid.uuid4().hex: loop.create_future() for _ in keys}
@@ -205,7 +208,7 @@ def keep_short(server: viser.ViserServer, client: viser.ClientHandle) -> None:
         line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT)
 
 
-# ---------------------------------------------------------------- what a browser says
+# ---------------------------------------------------------------- messages of a browser
 
 Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
 """Receives a message, and a function that passes a message on to viser."""

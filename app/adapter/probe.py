@@ -40,6 +40,6 @@ def require(found: bool, what: str) -> None:
     """Raises InputError if a check failed; the server does not start then."""
     if not found:
         raise InputError(
-            f"viser {viser.__version__} is not the one this page was made for ({what} has changed): it is "
-            "not served, for nobody could be kept out. Install viser 1.1 again."
+            f"viser {viser.__version__} does not fit this page ({what} has changed). The page is not served: "
+            "requests without permission could not be refused. Install viser 1.1."
         )

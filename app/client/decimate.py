@@ -8,7 +8,7 @@ _LEVELS = (2, 4, 8, 16, 32)
 
 
 def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
-    """Which points are needed to draw some curves within a tolerance.
+    """Selects the points that are needed to draw some curves within a tolerance.
 
     The points are equally spaced. Of a block of 2, 4, … 32 points only the two ends are kept if every curve
     is nearly straight within it. Blocks are aligned to the points' numbers, so that a scrolling curve loses

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 WINDOW = 8.0  # s of simulated time in the plots
 BUCKETS = 160  # in a window
-KEPT = 60.0  # s of simulated time that one can look back
+KEPT = 60.0  # s of simulated time that the page can show again
 _SPAN = WINDOW / BUCKETS
 _AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
 _SLOTS = round((KEPT + WINDOW) / _SPAN)
@@ -38,7 +38,7 @@ class History:
     """
 
     def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
-        """takers: objects that also receive each portion of rows of a run."""
+        """takers: functions that also receive each portion of rows of a run."""
         self.layout = layout
         self.latest = np.full(layout.size, np.nan)
         self.bound_ticks = np.zeros((layout.fields["at_bound"].stop - layout.fields["at_bound"].start, 3))
@@ -48,7 +48,7 @@ class History:
         self._t = layout.fields["t"].start
         self._before = self._count = 0
         self._numbers = np.full(_SLOTS, -1)
-        # The memory is not initialised, see `RowHistory`: a slot counts only under its own number.
+        # The memory is not initialised, see `RowHistory`: a slot is valid only if `_numbers` has its bucket.
         self._pairs = np.empty((_SLOTS, 2, layout.size))
         self._lasts = np.empty((_SLOTS, layout.size))
         self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)

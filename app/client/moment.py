@@ -13,7 +13,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
-_FAR = 0.5  # s: the picture does not wait for a ghost that is further behind
+_FAR = 0.5  # s: the picture does not wait for a ghost that lags by more than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ class Moment:
 
     Attributes:
         t: s.
-        live: whether it is now.
+        live: whether it is the present instant.
         poses: (n + 1, 7) of joints and tip, position (m) and quaternion wxyz.
-        status: the report that was the newest one.
-        latest: the row of telemetry that was the newest one.
-        window: what the plots show.
+        status: the newest report at that instant.
+        latest: the newest row of telemetry at that instant.
+        window: the curves of the plots.
         way: (k, n + 1, 7) poses of the last TRACE_SECONDS, oldest first.
         ghost: None if there is none.
     """
@@ -51,13 +51,13 @@ class Moment:
 
 
 def moment_of(learner: SimulationClient, past: float | None, curves: bool = True) -> Moment | None:
-    """The instant that the page shows, after new data were read; None before the first report.
+    """Reads new data and returns the instant that the page shows; None before the first report.
 
     Args:
-        learner: whose.
-        past: s of simulated time to look back to; None: now.
-        curves: whether telemetry is wanted that is up to date, and the ways that robot and ghost went, which
-            are empty otherwise.
+        learner: the simulation of the page.
+        past: simulated time of a past instant, s; None: now.
+        curves: whether to read the telemetry and to return the recent poses of robot and ghost; otherwise
+            telemetry may be old, and `way` is empty.
     """
     t = learner.look(curves)
     ghost = learner.ghost
@@ -71,7 +71,7 @@ def moment_of(learner: SimulationClient, past: float | None, curves: bool = True
         t = past
     elif beside is not None and 0.0 < t - beside < _FAR:
         t = beside  # a ghost shown later than the robot would look like one that tracks badly
-    # Within `read` no other scene can be loaded between data that belong together.
+    # Within `read` no other scene can be loaded, so that all data belong to one scene.
     shown = t
     found = learner.read(
         lambda _, history: (

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from lessons.events import Event
 
 HOLD = 0.8
-"""s during which a control that was just used keeps its value: the session's answer is still on its way."""
+"""Time, s, during which a control that was just used keeps its value, because the session may not have
+answered yet."""
 
 Send = Callable[["Event"], None]
 """Puts an event into the session's mailbox."""
@@ -19,8 +20,8 @@ T = TypeVar("T")
 
 
 class PendingEdit(Generic[T]):
-    """The edit that was sent last, as long as the session's answer may be on its way. A second key press or
-    click within that time builds on this edit instead of on the old value that the page still shows."""
+    """The last edit that was sent, as long as the session may not have answered it. A second key press or
+    click within that time changes this edit instead of the old value that the page still shows."""
 
     def __init__(self) -> None:
         self._asked: tuple[float, T] | None = None

@@ -17,7 +17,7 @@ RATE = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """t: s; poses (n + 1, 7): as of `Block`; status: the report that was the newest one."""
+    """t: s; poses: (n + 1, 7), as in `Block`; status: the newest report at that time."""
 
     t: float
     poses: np.ndarray

@@ -23,9 +23,9 @@ class RowHistory:
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self._t = layout.fields["t"].start
-        # Two blocks for good: rows of their own, kept for minutes among what lives for an instant, leave
-        # holes all over the memory. Not filled: the system gives a page of them when a row is written there,
-        # and most scenes are left before a minute has passed.
+        # Two blocks are allocated once: separate arrays per row, which live for minutes among arrays that
+        # live for an instant, would fragment the memory. The blocks are not filled: the system provides a
+        # page of memory when a row is first written there, and most scenes are shown for less than a minute.
         self._recent = np.empty((round(KEPT * RATE), layout.size))
         self._whole = np.empty((MOST, layout.size))
         self._clear()

@@ -16,10 +16,10 @@ class RunFigures:
     """Figures of a run.
 
     Attributes:
-        seconds: of the run.
-        rmse: per task, of ‖x̃‖, m or rad.
-        torque_share: largest |τ| asked for over its bound, NaN where no torque is asked for.
-        unsolved: QPs.
+        seconds: duration of the run, simulated time.
+        rmse: per task, RMS of ‖x̃‖, m or rad.
+        torque_share: largest ratio of a demanded |τ| to its bound; NaN if the controller demands no torque.
+        unsolved: number of QPs without a solution.
         step_ms, slow_ms: the control step's median and 99th percentile, to 3 %.
     """
 

@@ -75,7 +75,7 @@ class Simulation(ABC):
             return
         self._next_complaint = time.monotonic() + _COMPLAIN
         with self._lock:
-            self._notices.append("The simulation does not listen: what you just asked for is lost.")
+            self._notices.append("The simulation does not answer: your last change is lost. Try again.")
 
     # ---------------------------------------------------------------- silence
 
@@ -161,8 +161,8 @@ class Simulation(ABC):
             return look(self._block, self._history)
 
     def look(self, rows: bool = True) -> float | None:
-        """Reads new data, stores them for looking back, and returns the simulated time, s. rows: whether to
-        read the telemetry as well, which may wait for one of the next calls."""
+        """Reads new data, stores them so that they can be shown again, and returns the simulated time, s.
+        rows: whether to read the telemetry as well, which may wait for one of the next calls."""
 
         def take(block: Block, history: History) -> float:
             t, poses = block.moment()

@@ -1,4 +1,4 @@
-"""What a page says and offers when its simulation does not run as it should."""
+"""The problem that a page shows, with a button, when its simulation does not run as it should."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The si
     """The problem of a process that has not failed; None if there is none.
 
     Args:
-        process: which.
-        loading: whether the last it said was that it loads a scene.
-        quiet: s since it said anything.
-        who: begins the sentence.
+        process: the process.
+        loading: whether its last report says that it loads a scene.
+        quiet: time since its last report, s.
+        who: the words with which the sentence begins.
     """
     doing = process.preparing
     if quiet < SILENCE and not doing:
@@ -44,9 +44,9 @@ def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The si
             "PREPARING", f"The simulations are being prepared{what}. {waited} …", *(() if late else (None,))
         )
     if not loading:
-        why = "this computer has no time for it, or it hangs"
-        return Trouble("SILENT", f"{who} has not said a word for {waited}: {why}.")
+        why = "this computer is too busy, or the simulation hangs"
+        return Trouble("SILENT", f"{who} has not reported anything for {waited}: {why}.")
     if quiet < DEADLINE:
         return Trouble("LOADING", f"{who} is being loaded: {waited} of at most {DEADLINE:.0f} s.", "Cancel")
-    why = "this computer has no time for it, or it is too much"
-    return Trouble("SILENT", f"{who} was to be loaded within {DEADLINE:.0f} s: {why} ({waited}).")
+    why = "this computer is too busy, or the scene is too large"
+    return Trouble("SILENT", f"{who} could not be loaded within {DEADLINE:.0f} s: {why} ({waited}).")

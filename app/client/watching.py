@@ -8,7 +8,7 @@ from collections.abc import Callable
 from app.link.inside import Inside, InsideRequest
 
 _AGAIN = 0.4
-"""s after which an unanswered request is sent again: a simulation that restarted has forgotten it."""
+"""Time, s, after which an unanswered request is sent again: a simulation that restarted does not have it."""
 
 
 class Watching:

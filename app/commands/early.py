@@ -1,7 +1,7 @@
 """Imported first, so that Ctrl-C during the import of the other modules also ends without a traceback.
 
-Nothing has been started by then that would have to be ended. What the interpreter does before it imports this
-module cannot be handled here.
+Nothing has been started by then that would have to be ended. A Ctrl-C that arrives before the interpreter
+imports this module cannot be handled here.
 """
 
 from __future__ import annotations

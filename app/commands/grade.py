@@ -29,7 +29,7 @@ def grade(
     key: str | None = None,
     json: str | None = None,
 ) -> int:
-    """Judge a solution of an exercise by what it does; without a file, list the exercises.
+    """Run a solution of an exercise and grade its behaviour; without a file, list the exercises.
 
     The name of an exercise instead of a file shows this exercise, with --hints N also its first N hints.
 
@@ -38,15 +38,15 @@ def grade(
     it cannot be run.
 
     Args:
-        file: Python file with the solution, or a folder of them; or the name of an exercise; or a text of
-            what a learner did, as the page wrote it.
-        exercise: name of the exercise; by default what the file says in EXERCISE.
+        file: Python file with the solution, or a folder of them; or the name of an exercise; or the text that
+            the page wrote about a learner's progress.
+        exercise: name of the exercise; by default the name that the file assigns to EXERCISE.
         hints: number of hints of the exercise to show.
-        seed: decides the disturbances.
+        seed: seed of the disturbances.
         out: file for the table of a folder; an unfinished table is continued.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
             machine's cores.
-        key: file with the key of your lab, to tell whether it signed what was handed in.
+        key: file with the key of your lab, to check whether your lab signed the progress that was handed in.
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.exercises import EXERCISES
@@ -87,7 +87,7 @@ def _show(found: Grade, hints: int) -> None:
         ]
         for line in found.lines
     ]
-    columns = ("points", "what is checked", "measured", "wanted", "why it is missed")
+    columns = ("points", "what is checked", "measured", "required", "why points are missing")
     print_table(f"{found.file} · {found.exercise}", columns, rows)
     print(f"{found.points} of {found.of} points")
     print(_kept(found.protection))
@@ -97,7 +97,7 @@ def _show(found: Grade, hints: int) -> None:
 def _kept(protection: tuple[str, ...]) -> str:
     """A sentence about what isolated a submission."""
     if not protection:
-        return "files, network and processes were refused by Python alone, which is politeness and no prison"
+        return "files, network and processes were refused by Python alone, which hostile code can bypass"
     return f"files, network and processes were refused by {' and '.join(protection)}, and by Python"
 
 
@@ -177,7 +177,7 @@ def _handed_in(file: Path, key: str | None, json: str | None) -> int:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         raise InputError(
-            f"{file}: cannot be read as a text; give the file with what the page wrote"
+            f"{file}: cannot be read as text; give the file with the text that the page wrote"
         ) from None
     try:
         handed, proof = read_handed_in(text, None if key is None else read_key(key))
@@ -218,4 +218,4 @@ _SAYS = {
     "not signed": "not signed: anybody could have written it",
     "signed with another key": "signed with another key, or changed",
 }
-_NOT_JUDGED = "nobody knows who wrote it (--key FILE tells)"
+_NOT_JUDGED = "signature not checked: give the key of your lab with --key FILE"

@@ -22,9 +22,9 @@ def lessons(
 ) -> int:
     """List the lessons, or run them headless and judge every claim.
 
-    The check runs each lesson through its script: every claim must hold, and must fail under the wrong
-    setting it names; every challenge must fail at its start and be met by its solutions. The exit code is 1,
-    with one sentence per fault, if anything differs.
+    The check runs the script of each lesson. Every claim must hold, and must fail under the wrong setting
+    that it names; every challenge must fail with its first settings and be passed with its solutions. If one
+    of these does not hold, the exit code is 1, with one sentence per fault.
 
     Args:
         check: names of the lessons to check, or Python files of your own; none after --check: all of them.

@@ -12,7 +12,7 @@ def new(
     file: tyro.conf.Positional[str],
     start: Annotated[str | None, tyro.conf.arg(name="from", metavar="NAME")] = None,
 ) -> int:
-    """Write a short, commented Python file that already runs, to be changed.
+    """Write a short, commented Python file that already runs and that you can change.
 
     Args:
         kind: the kind of file.

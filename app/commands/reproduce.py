@@ -28,15 +28,15 @@ def reproduce(
     """Reproduce tables and figures of the papers: every printed value beside ours.
 
     Writes report.md, disagreements.md, results.json and PNG plots. Every number of a paper gets a verdict:
-    agrees, differs or opposite. Exit code 1 if a check does not hold, or a number is not what it was when it
-    was stored.
+    agrees, differs or opposite. Exit code 1 if a check does not hold, or a number differs from its stored
+    value.
 
     Args:
-        items: which, e.g. himpc-table-2 himpc-fig-12; all of them by default.
+        items: names of tables and figures, e.g. himpc-table-2 himpc-fig-12; all of them by default.
         out: folder to write to.
         quick: shorter and fewer runs.
         stored: run nothing: judge the stored numbers and write disagreements.md only.
-        store: keep what was measured as the numbers that later runs are held against.
+        store: store the measured numbers; later runs are compared with them.
         json: write the results also as JSON to this file, or to standard output for "-".
     """
     from lessons.papers import ITEMS

@@ -6,7 +6,8 @@ from app.commands.output import print_table, write_json
 
 
 def robots(check: str | None = None, json: str | None = None) -> int:
-    """List the catalog, or check a URDF file and report what was repaired, filled in or refused.
+    """List the robots of the catalog, or check a URDF file and report every repair, default value and
+    refusal.
 
     Args:
         check: the URDF file to check. Exit code 1 if it cannot be used.

@@ -37,14 +37,14 @@ def run(
             with --state.
         urdf: URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
-        controller: which controller instead of the scene's own: a name (see himpc-lab controllers) or a
+        controller: controller to use instead of the scene's own: a name (see himpc-lab controllers) or a
             Python file of your own.
-        task: Python file with a task of your own that the stack of --state may name; --set stack=… names it
-            by itself.
+        task: Python file with a task of your own, for a --state whose stack contains this task. With
+            --set stack=… this option is not needed.
         duration: simulated seconds; the scene's own by default.
         seed: seed of the run; 0, or the state's, by default.
         state: a state code, as the page shows it: its scene, robot, settings and seed.
-        settings: list what --set takes in this scene, and run nothing.
+        settings: list the settings that --set can change in this scene, and run nothing.
         set: change a setting, e.g. --set horizon=10 --set plant.payload_kg=2 --set levels.2.enabled=false.
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
@@ -105,7 +105,7 @@ def _list(scene: Scene, json: str | None) -> int:
         write_json([vars(line) for line in found], json)
         return 0
     rows = [[line.path, line.now, line.allowed, line.unit, line.help] for line in found]
-    print_table(f"What --set takes in {scene.name}", ("path", "now", "allowed", "unit", "what it is"), rows)
+    print_table(f"Settings of {scene.name} for --set", ("path", "now", "allowed", "unit", "what it is"), rows)
     return 0
 
 
@@ -153,7 +153,7 @@ def _show(result: dict[str, Any]) -> None:
 
 
 def _ranks(result: dict[str, Any]) -> dict[str, str]:
-    """The rank of each level, if the stack asks for more directions than the robot has."""
+    """The rank of each level; empty if every level gets all directions of its tasks."""
     levels = result.get("levels", ())
     if all(level["rank"] == level["rows"] for level in levels):
         return {}

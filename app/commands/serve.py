@@ -36,24 +36,25 @@ def serve(
     Args:
         lesson: lesson to start with; himpc-lab lessons lists them. Or a Python file of your own.
         scene: scene to start with; iiwa14-hold by default, hold with --urdf. Or a Python file of your own.
-        controller: controller to start with, or a Python file of your own: what is saved there, runs.
+        controller: controller to start with, or a Python file of your own, which runs anew whenever it is
+            saved.
         task: Python file with a task of your own that can be added to the stack.
         urdf: URDF file of your own robot.
         tip: its end-effector frame.
         state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
-        max_sessions: how many people may use it at once, each with a robot of their own.
-        classroom: one robot for all pages; who has the printed token steers it.
+        max_sessions: number of people who may use the page at once, each with a robot of their own.
+        classroom: one robot for all pages; only a page with the printed token can control it.
         host: address to listen on; only this machine can reach the default. The page asks for the token of
             the address that is printed.
         port: port to listen on.
         no_browser: do not open a browser.
-        trusted_origin: where a reverse proxy shows the page, e.g. https://lab.example.org; docs/serving.md
-            has one with TLS.
-        no_token: let everybody in who reaches the page, every user of this machine at least.
-        own_files: folder of the Python and URDF files that you can open from the page, by default the one
-            himpc-lab is started in. Only the page of the first address that is printed opens any.
-        no_own_files: no page opens files of this machine.
-        key: file with a key of yours, 16 signs or more: what learners hand in is signed with it.
+        trusted_origin: address at which a reverse proxy serves the page, e.g. https://lab.example.org;
+            docs/serving.md describes a proxy with TLS.
+        no_token: let everybody use the page who can reach it; this includes every user of this machine.
+        own_files: folder of the Python and URDF files that you can open from the page, by default the folder
+            in which himpc-lab is started. Only the page of the first printed address can open them.
+        no_own_files: no page can open files of this machine.
+        key: file with a key of yours, 16 characters or more, which signs the progress that learners hand in.
     """
     from app.link.choice import SceneChoice
     from app.server.server import FIRST

@@ -33,16 +33,17 @@ def sweep(
 
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file of your own.
-        out: folder for cells.jsonl, results.json and map.png; by default one in out/sweeps, named by scene,
-            settings and what tells this sweep from others.
+        out: folder for cells.jsonl, results.json and map.png; by default a folder in out/sweeps, named after
+            the scene, the settings and a hash of the whole sweep.
         over: a setting and its range, e.g. --over M_bar_scale=0.2:4:20 --over horizon=1:20:20. Ranges of a
-            decade and more have logarithmic steps; PATH=lo:hi:n:lin or :log sets it.
-        controller: which controller, the scene's own by default: a name (see himpc-lab controllers) or a
-            Python file of your own.
+            decade and more have logarithmic steps; PATH=lo:hi:n:lin or PATH=lo:hi:n:log sets the kind of
+            steps.
+        controller: name of a controller (see himpc-lab controllers) or a Python file of your own; the scene's
+            own by default.
         set: change a setting in all runs, e.g. --set plant.payload_kg=2.
         duration: simulated seconds per run; the scene's own by default.
         seed: seed of the runs.
-        metric: what the map shows; by default the RMSE of level 1 after the first second.
+        metric: quantity that the map shows; by default the RMSE of level 1 after the first second.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
     from lessons.cluster import on_cluster
@@ -72,9 +73,7 @@ def sweep(
             cells = carry_on(definition, out, spread, lambda done, all: advance(done / all))
     except KeyboardInterrupt:
         done = len(finished_cells(definition, out))
-        print(
-            f"himpc-lab: stopped with {done} of {total} cells; the same command carries on", file=sys.stderr
-        )
+        print(f"himpc-lab: stopped with {done} of {total} cells; the same command continues", file=sys.stderr)
         raise
     _conclude(definition, cells, shown, out)
     return 0

@@ -58,7 +58,7 @@ def block(inner: str, style: str = "") -> str:
 
 
 def in_trouble(state: str, sentence: str) -> str:
-    """The text that a page shows for a simulation that died, hangs or takes long."""
+    """The text that a page shows for a simulation that ended unexpectedly, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD
     return block(
         f"{badge(state, colour)} {esc(sentence)}",

@@ -1,4 +1,4 @@
-"""What a page shows: a run, and its place in a lesson."""
+"""The choice of a page: a run, and its place in a lesson."""
 
 from __future__ import annotations
 
@@ -112,8 +112,9 @@ class SceneChoice:
         return replace(self, scenes=_both(start.scenes, self.scenes), run=run)
 
     def with_file(self, path: str) -> SceneChoice:
-        """The choice after a file of one's own was opened by path. What the file defines decides: a lesson or
-        a scene replaces the present one, a controller drives the robot, a task can be added to its stack.
+        """The choice after a user's file was opened by path. The effect depends on the content of the file: a
+        lesson or a scene replaces the present one, a controller drives the robot, a task can be added to its
+        stack.
 
         Raises:
             InputError: the file cannot be used, with its line.
@@ -147,8 +148,8 @@ class SceneChoice:
 
     @property
     def asked(self) -> frozenset[str]:
-        """The files that the person who chose asks for: for a step of a lesson only the lesson's file, which
-        may name others."""
+        """The files that the user named: for a step of a lesson only the lesson's file, which may name
+        others."""
         if self.exercise is None:
             return self.paths
         return frozenset(filter(is_file, (self.exercise.lesson,)))

@@ -119,7 +119,7 @@ class Lecture:
         exercise: the exercise.
         phase: see `Phase`.
         attempt: counts runs since the exercise was opened.
-        t: time up to which the run is judged, s; duration: length of the run, s.
+        t: time up to which the claims have been evaluated, s; duration: length of the run, s.
         answer: the learner's prediction.
         changed: one sentence if the run is not the lesson's own: settings differ, or the learner
             interfered.
@@ -127,9 +127,9 @@ class Lecture:
         holds: whether each claim or goal holds so far; None while there is nothing to measure.
         truth: the measured value of the predicted quantity.
         grade: the grade of the prediction, after the run.
-        curves: per signal of the step; ghosts: the same of the second robot, where it was computed.
-        sketched: what a sketch is about.
-        result, points_for: of a challenge, after the run: the result and the number that gives its points.
+        curves: one per signal of the step; ghosts: the same for the second robot, if it was computed.
+        sketched: the curve that a sketch predicts.
+        result, points_for: of a challenge, after the run: the result and the value that decides its points.
         lost_at: s, when the robot went out of control, which ends the run.
     """
 

@@ -1,7 +1,8 @@
 """A process that has imported everything and forks simulations: each starts at once and shares its memory.
 
-The page asks over a socket and never waits. The server and all its children are one process group, tied to a
-pipe that only the page can write to: if the page's process ends for any reason, the kernel ends them too.
+The page sends requests over a socket and never waits. The server and all its children are one process group,
+tied to a pipe that only the page can write to: if the page's process ends for any reason, the kernel ends
+them too.
 """
 
 from __future__ import annotations
@@ -60,10 +61,10 @@ class ForkServer:
     """The page's handle of the fork server. Raises OSError where processes cannot be forked."""
 
     def __init__(self, worker: str) -> None:
-        """worker: a module with `warm(say)`, which loads all that a simulation needs and may say what it is
-        doing, and `main(wire)`, which a child runs."""
+        """worker: a module with `warm(say)`, which loads everything that a simulation needs and may report
+        its progress with `say`, and `main(wire)`, which a child runs."""
         if sys.platform != "linux":
-            raise OSError("libraries of other systems do not survive a fork")
+            raise OSError("only Linux has libraries that still work after a fork")
         ours, theirs = socket.socketpair()
         life, self._life = os.pipe()
         code = (
@@ -136,7 +137,7 @@ class ForkServer:
             )
 
     def _end_if_stuck(self) -> None:
-        """Ends a stuck server: those who wait for a child then learn at once that it gives none."""
+        """Ends a stuck server, so that every pending request for a child fails at once."""
         if self.stuck:
             self.stopped = is_stopped(self.pid)
             self.give_up()
@@ -219,7 +220,7 @@ class _Nest:
     def _fork(self, theirs: socket.socket, status: int) -> None:
         if threads() != 1:
             # A lock that another thread holds at this moment would stay locked in the child forever.
-            print("himpc-lab: a second thread runs in the fork server; it ends", file=sys.stderr)
+            print("himpc-lab: a second thread runs in the fork server, which ends now", file=sys.stderr)
             self._end()
         report = socket.socket(fileno=status)
         pid = os.fork()

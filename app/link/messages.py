@@ -170,15 +170,16 @@ class Ready:
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """What is not worth sending every tick; about ten times a second.
+    """Data that need not be sent every tick; it comes about ten times a second.
 
     real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
     over_budget: ticks whose control step took longer than T_s; late: ticks that missed their deadline;
     resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
     path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
-    I − M⁻¹M̄ while paused, when no row of telemetry tells them; mission: for scenes that have one; lecture:
-    of a lesson, when there is news; inside: while the page watches; own: of a controller from a file; ranks:
-    per level the directions it gets, and its rows.
+    I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: for scenes that have one;
+    lecture: of a lesson, when it has changed; inside: while the page requests it; own: of a controller from a
+        file;
+    ranks: per level the number of directions that it gets, and the number of its rows.
     """
 
     t: float

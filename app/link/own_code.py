@@ -1,4 +1,4 @@
-"""What a page is told about a controller from the learner's own file."""
+"""The state of a controller from the learner's own file, as the simulation reports it to the page."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ class OwnCode:
 
     Attributes:
         file: its path.
-        fault: one sentence if it does not run as it is.
-        saves: number of times that a saved text took effect.
-        at: simulated time of the last one, s.
+        fault: one sentence if the file as it is now cannot run.
+        saves: number of times that a saved version took effect.
+        at: simulated time at which the last saved version took effect, s.
     """
 
     file: str

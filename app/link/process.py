@@ -54,7 +54,7 @@ class Process:
         return not self._closed and not self._ended.is_set()
 
     def listen(self, listener: Callable[[Report], None]) -> None:
-        """Calls `listener` with each report, and with `SimulationFailed` last if the child dies unasked."""
+        """Calls `listener` with each report, and with `SimulationFailed` last if the child ends by itself."""
         with self._lock:
             unheard, self._unheard = self._unheard, []
             for report in unheard:

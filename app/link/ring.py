@@ -31,12 +31,12 @@ _HEAD = 64  # bytes
 
 class Block:
     """A ring of telemetry rows (width float64) and the poses of joints 1 … n and the tip, (n + 1, 7):
-    position, m, and quaternion wxyz. The memory has no name: it is gone with the last process that has it,
-    however that one ends."""
+    position, m, and quaternion wxyz. The memory has no name: it is freed with the last process that uses it,
+    however that process ends."""
 
     def __init__(self, width: int, bodies: int, handle: Handle | None = None) -> None:
-        """Creates the memory, as large as the machine allows, or attaches to what came with `handle`, which
-        is closed. Raises InputError if there is not enough memory even for MIN_ROWS."""
+        """Creates the memory, as large as the machine allows, or attaches to the memory of `handle`, which is
+        then closed. Raises InputError if there is not enough memory even for MIN_ROWS."""
         row, rest = 8 * width, _HEAD + 8 * 7 * bodies
         if handle is None:
             self._file = _allocated(row, rest)
@@ -112,7 +112,7 @@ class Block:
 
 
 def _allocated(row: int, rest: int) -> int:
-    """Creates an unnamed file in memory for as many rows as there is memory for, and allocates all of it now:
+    """Creates an unnamed file in memory, with as many rows as fit into memory, and allocates all of it now:
     if memory ran out at a later write, the process would end."""
     rows = max(MIN_ROWS, min(MAX_ROWS, _MAX_BYTES // row))
     file = _unnamed()

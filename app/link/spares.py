@@ -81,7 +81,7 @@ class Spares:
         return Spawned(self._worker, theirs)
 
     def close(self) -> None:
-        """Ends the spare, the fork server unless it is lent, and all remaining children of what it ends."""
+        """Ends the spare, the fork server unless it is lent, and all remaining children of that server."""
         with self._lock:
             self._closed = True
             spare, self._spare = self._spare, None

@@ -15,7 +15,7 @@ from app.page.values import NotAllowed, allowed
 from app.panels.widgets.in_view import tells_what_is_seen
 
 _OFTEN = 2.0  # s between two notices of one page
-_GONE = "What you just pressed or changed was replaced meanwhile: if it is still there, do it once more."
+_GONE = "The page was rebuilt before your click or change arrived: if the control is still there, try again."
 
 
 class Inlet:

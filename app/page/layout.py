@@ -67,8 +67,8 @@ class Stage:
         notebook: Notebook,
         phone: bool,
     ) -> None:
-        """phone: a phone does not show the panel at the side, so that the plots become tabs of the other
-        panel."""
+        """phone: whether the page is shown on a phone, which has no panel at the left: the plots are then
+        tabs of the other panel."""
         self._client, self._learner, self._ready = client, learner, ready
         self._theme = theme
         self._colours = level_colours([task.level for task in in_order(ready)])
@@ -127,7 +127,7 @@ class Stage:
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
         with tabs.add_tab("Help"):
             self._help = HelpPanel(gui)
-        for place, key in enumerate(_HOTKEYS):  # a stack may get more levels
+        for place, key in enumerate(_HOTKEYS):  # also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):
@@ -168,7 +168,7 @@ class Stage:
         self._learner.send(Post(event))
 
     def recompose(self, ready: Ready) -> None:
-        """Rebuilds what shows levels and tasks when the run continues with another stack."""
+        """Rebuilds the controls and plots of levels and tasks when the run continues with another stack."""
         self._ready = ready
         colours = recoloured([task.level for task in in_order(ready)], self._colours)
         self._colours.clear()
@@ -185,8 +185,9 @@ class Stage:
         self._playback.show_trouble(trouble)
 
     def follow(self, plots: bool, texts: bool) -> None:
-        """Shows the newest poses, and at times plots and texts. A page in a hidden tab gets texts only. A
-        browser that has not received the last messages yet gets nothing for now, and newer data later."""
+        """Shows the newest poses, and, if `plots` or `texts` is set, these too. A page in a hidden tab gets
+        only texts. A browser that has not received the last messages yet gets no messages now, and newer data
+        later."""
         learner = self._learner
         if learner.status is not None:
             self._time_line.update(learner.status.running)

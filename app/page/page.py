@@ -55,8 +55,8 @@ class Page:
         greet: Callable[[viser.GuiApi], None],
     ) -> None:
         """own_files: folder of the files that this page may name; None: it may name none; loop: viser's event
-        loop; on_dark: called with whether the dark theme is shown; greet: adds elements at the top of the
-        panel whenever it is built."""
+        loop; on_dark: called with True when the dark theme is chosen, and with False otherwise; greet: adds
+        elements at the top of the panel whenever the panel is built."""
         self.learner = learner
         self._on_dark = on_dark
         self._greet = greet
@@ -67,7 +67,7 @@ class Page:
         self._event_loop = loop
         self._notebook = notebook
         self._phone = False
-        self._seen: tuple[str | None, ...] | None = None  # names of what the camera was turned to
+        self._seen: tuple[str | None, ...] | None = None  # the scene to which the camera was turned
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
@@ -171,7 +171,7 @@ class Page:
             return None
         if own.saves > self._saves:
             self._client.add_notification(
-                "Saved is running",
+                "Saved code is running",
                 f"{Path(own.file).name} took over at t = {own.at:.2f} s. It is read from the disk of the "
                 "machine that runs the lab.",
                 color="green",
@@ -189,7 +189,7 @@ class Page:
         return True
 
     def _show_early_trouble(self) -> None:
-        """Shows that the simulation died or hangs before there was anything to show."""
+        """Shows that the simulation ended or hangs before it sent its first report."""
         trouble = self.learner.trouble()
         if trouble == self._trouble or self._waiting is None:
             return
@@ -283,7 +283,7 @@ class Page:
                 before.close()
 
     def _pass_on(self) -> None:
-        """Shows the sentences of the session where they belong."""
+        """Shows the session's refusals and notices: refusals in the panel that made the request."""
         refusals, notices = self.learner.take_messages()
         for sentence in map(self.learner.choice.without_places, refusals):
             if self._stage is None or not self._stage.refuse(sentence):

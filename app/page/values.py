@@ -21,10 +21,10 @@ def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
     update changes anything but the value, or if the control cannot have the value."""
     label = str(getattr(handle, "label", "") or "A control")
     if not isinstance(updates, dict) or list(updates) != ["value"]:
-        raise NotAllowed(f"{label}: a page may write its value and nothing else.")
+        raise NotAllowed(f"{label}: a page may only change its value.")
     value = updates["value"]
     if isinstance(handle, viser.GuiUploadButtonHandle):
-        raise NotAllowed(f"{label}: a file is sent, not written.")
+        raise NotAllowed(f"{label}: upload a file instead of writing a value.")
     options = getattr(handle, "options", None)
     if options is not None:
         if not isinstance(value, str) or value not in options:
@@ -43,7 +43,7 @@ def _like(present: Any, value: Any, label: str) -> Any:
         case bool():
             if isinstance(value, bool):
                 return value
-            raise NotAllowed(f"{label}: give yes or no.")
+            raise NotAllowed(f"{label}: give True or False.")
         case int() | float():
             return _number(value, label)
         case str():
@@ -55,7 +55,7 @@ def _like(present: Any, value: Any, label: str) -> Any:
                 return tuple(_like(old, new, label) for old, new in zip(present, value, strict=True))
             raise NotAllowed(f"{label}: give {len(present)} numbers.")
         case _:
-            raise NotAllowed(f"{label} cannot be written.")
+            raise NotAllowed(f"{label}: the page cannot change this control.")
 
 
 def _number(value: Any, label: str) -> int | float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 MESSAGES = 200.0
 """Messages per second, 1/s. A page sends each group of controls, each gizmo and the camera at most 20 to 50
-times per second; one on which everything is dragged and turned at once stays below 100."""
+times per second; a page on which everything is moved at the same time sends fewer than 100."""
 BURST = 400.0
 BYTES = 4e6
 """Bytes per second, B/s, and the largest burst, B:"""
@@ -48,7 +48,7 @@ class Bucket:
 
 
 class Budget:
-    """The limits of one connection. The content of messages plays no role here."""
+    """The limits of one connection. They do not depend on the content of messages."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now

@@ -11,7 +11,7 @@ from app.link.choice import SceneChoice
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
-STEERING = "The instructor steers: this page only watches."
+STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 
 
 class Watcher:
@@ -22,7 +22,7 @@ class Watcher:
     attached = True
 
     def __init__(self, shown: SimulationClient, refuse: Refuse) -> None:
-        """refuse: shows a sentence on the page that says why a command was refused."""
+        """refuse: shows on the page a sentence with the reason why a command was refused."""
         self._shown = shown
         self._refuse = refuse
 

@@ -63,13 +63,13 @@ class Door:
             return _foreign("It must name one host and at most one origin.")
         if not self._is_ours(hosts[0]):
             return _foreign(
-                "It asks for a host of another name. If this name is meant, start himpc-lab with "
+                "It names a host that is not this server. If the name is right, start himpc-lab with "
                 "--trusted-origin and the whole address, e.g. --trusted-origin http://NAME:8080."
             )
         if origins and not self._is_own_page(origins[0], hosts[0]):
             return _foreign("It comes from a page of another site.")
         if not is_upgrade(request) and _is_embedded(headers):
-            return _foreign("A page of another site asks for it.")
+            return _foreign("A page of another site embeds this page.")
         if _leads_away(request):
             return _foreign("Its address would connect the page to another server.")
         return self._ask_token(request, hosts[0], who)
@@ -128,13 +128,13 @@ _FIELD = (
     "<button>Open the page</button></form>"
 )
 _NEEDED = (
-    "<p>Open the whole address that himpc-lab printed where it was started; it ends in "
+    "<p>Open the whole address that himpc-lab printed in the terminal where it was started; it ends in "
     f"<code>?{QUERY}=…</code>. Or give the token here:</p>{_FIELD}"
     '<p>Have you been here before? <a href="./">Open the page</a>.</p>'
 )
 _WRONG = (
-    "<p>This is not the token of the himpc-lab that runs now; each start has a new one. It is printed where "
-    f"himpc-lab was started:</p>{_FIELD}"
+    "<p>This is not the token of the himpc-lab that runs now; each start has a new token. It is printed in "
+    f"the terminal where himpc-lab was started:</p>{_FIELD}"
 )
 
 
@@ -164,13 +164,13 @@ def as_origin(text: str) -> str:
 
 
 def is_upgrade(request: Request) -> bool:
-    """Whether a request asks for a web socket, by the same test as viser's."""
+    """Whether a request wants to open a web socket; the test is the same as in viser."""
     return request.headers.get_all("Upgrade") == ["websocket"]
 
 
 def secured(headers: Headers) -> None:
-    """The headers of every response: other sites may not show it in a frame, and browsers may not guess its
-    type."""
+    """Adds the headers of every response: other sites may not show it in a frame, and browsers may not guess
+    its type."""
     for name, value in _ON_EVERY_ANSWER.items():
         if name not in headers:
             headers[name] = value
@@ -181,8 +181,8 @@ def _query(request: Request) -> dict[str, list[str]]:
 
 
 def _leads_away(request: Request) -> bool:
-    """Whether the address tells viser's page to use another server or another recording. Their messages,
-    which may contain scripts, would run as a part of our page."""
+    """Whether the address makes viser's page connect to another server or play a recording. Messages from
+    there may contain scripts, which would run as a part of our page."""
     return not _ELSEWHERE.isdisjoint(_query(request))
 
 
@@ -195,4 +195,4 @@ def _is_embedded(headers: Headers) -> bool:
 
 
 def _foreign(reason: str) -> Answer:
-    return Answer(HTTPStatus.FORBIDDEN, "Not from here", f"<p>himpc-lab refuses this request. {reason}</p>")
+    return Answer(HTTPStatus.FORBIDDEN, "Request refused", f"<p>himpc-lab refuses this request. {reason}</p>")

@@ -37,8 +37,8 @@ def _for_others(server: PageServer, host: str, origins: Sequence[str]) -> Iterat
         yield f"  {_INSTRUCTOR:{_WIDTH}}{server.sessions.token}"
 
 
-_KEEP = "Keep the first address to yourself: its page runs Python files of yours (not with --no-own-files)."
+_KEEP = "Keep the first address secret: its page can run your Python files (not with --no-own-files)."
 _ALL = (
-    "everybody who reaches this address can open the page, run simulations on this machine and upload robots."
+    "everybody who can reach this address can open the page, run simulations on this machine, upload robots."
 )
 _ALL_HERE = "every user of this machine can open the page, run simulations as you and upload robots."

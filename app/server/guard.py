@@ -114,8 +114,8 @@ class GuardedConnection(ServerConnection):
     """A connection that counts messages before decoding them, and passes on only messages that a page may
     send.
 
-    `uploads` are those of the page that it serves, `refuse` tells the user what was refused, and `is_owners`
-    says whether the person who started the server opened the page.
+    `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user, and
+    `is_owners` is true if the person who started the server opened the page.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
@@ -173,7 +173,7 @@ class GuardedConnection(ServerConnection):
             raw = await super().recv(decode)
             self._waiting = len(self.recv_messages.frames)
             if isinstance(raw, str):
-                await self._end(CloseCode.UNSUPPORTED_DATA, "This page speaks binary.")
+                await self._end(CloseCode.UNSUPPORTED_DATA, "This page accepts binary messages only.")
             if waiting := self._budget.wait(len(raw)):
                 await asyncio.sleep(waiting)
             if self._budget.spent:

@@ -24,13 +24,14 @@ def few_arenas() -> bool:
 
 
 def large_arrays_apart() -> bool:
-    """Gives every large array memory pages of its own, which return to the system when it is freed. Returns
-    whether that was done.
+    """Makes the allocator give every large array memory pages of its own, which return to the system when the
+    array is freed. Returns whether that was done.
 
-    By default, glibc raises the size from which it does that to the largest array that was ever freed, up to
-    32 MB. The recordings of a scene are then in an arena among small objects of other pages. When the scene
-    ends, these objects keep the memory allocated: of 1.2 GB used by eight learners who changed scenes, 0.5 GB
-    were free and not returned. A number in the environment variable MALLOC_MMAP_THRESHOLD_ is respected.
+    glibc does so by default, but only for arrays above a size that it raises to the size of the largest array
+    ever freed, up to 32 MB. The recordings of a scene are then in an arena among small objects of other
+    pages. When the scene ends, these objects keep the memory allocated: of 1.2 GB used by eight learners who
+    changed scenes, 0.5 GB were free and not returned. A number in the environment variable
+    MALLOC_MMAP_THRESHOLD_ is respected.
     """
     return _set("MALLOC_MMAP_THRESHOLD_", _M_MMAP_THRESHOLD, LARGE)
 

@@ -74,7 +74,7 @@ class Passes:
 
 
 def _first(brought: Iterable[bool]) -> Role | None:
-    """The first role whose secret or cookie was sent. All are compared in any case."""
+    """The first role whose secret or cookie was sent. All are compared, also after the first match."""
     found: list[Role] = [role for role, there in zip(_ROLES, list(brought), strict=True) if there]
     return found[0] if found else None
 

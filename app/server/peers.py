@@ -37,8 +37,8 @@ class Ends:
 
     @property
     def user(self) -> str:
-        """The id of the user whose process is at the other end; "" if it is on another machine or the system
-        does not tell. Linux does."""
+        """The id of the user whose process is at the other end; "" if it is on another machine, or on systems
+        other than Linux."""
         if sys.platform != "linux" or not self.near:
             return ""
         table = Path("/proc/net/tcp6" if self.theirs[0].version == 6 else "/proc/net/tcp")

@@ -201,8 +201,8 @@ class PageServer:
 
 
 def _check_choice(choice: SceneChoice) -> None:
-    """Checks a choice, so that a wrong name or file gives one sentence on the terminal, not on a page. If
-    names alone are not enough, the scene is loaded for this check, which takes a second before anybody can
+    """Checks a choice, so that a wrong name or file gives one sentence on the terminal instead of a page. If
+    the names are not enough for the check, it loads the scene, which takes a second before anybody can
     connect."""
     if not choice.known:
         from app.worker.reports.start import start
@@ -221,7 +221,7 @@ def _load(choice: SceneChoice) -> None:
 
 def _check_address(host: str, port: int) -> None:
     if not 0 <= port <= 65535:
-        raise InputError(f"Port {port} does not exist: give one from 1024 to 65535.")
+        raise InputError(f"Port {port} does not exist: give a port from 1024 to 65535.")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -20,7 +20,7 @@ Refuse = Callable[[str], object]
 """Shows a sentence on the page that asked for something that is not allowed."""
 
 GRACE = 10.0  # s that a session outlives its tab: enough for a reload
-_PERIOD = 0.5  # s between looks at who has left
+_PERIOD = 0.5  # s between two checks which learners have left
 _TIDY = 10.0
 """Time, s, between two times that free memory is returned to the system, if scenes were changed meanwhile."""
 
@@ -46,8 +46,9 @@ class Sessions:
             return tuple(self._learners.values())
 
     def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> SimulationClient | None:
-        """The learner that this browser left (its tokens, latest last) or a new one; None if all places are
-        taken. A place that was left a moment ago is reserved for the browser with its token."""
+        """Returns the learner that this browser left, or a new one; None if all places are taken. A place
+        that was left a moment ago is reserved for the browser with its token. tokens: of the browser, latest
+        last."""
         with self._lock:
             if self._closed.is_set():
                 return None

@@ -25,9 +25,9 @@ class Uploads:
     """The uploads of one page.
 
     Args:
-        unfinished: bytes of its files that are not complete.
-        forget: drops what has come of a file.
-        say: tells its user that a file was too much.
+        unfinished: returns the number of bytes of its incomplete files.
+        forget: discards the received parts of a file.
+        say: shows the user that a file was too large.
     """
 
     def __init__(

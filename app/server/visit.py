@@ -28,7 +28,7 @@ from lessons.replay.progress import LearnerProgress
 from lessons.replay.progress import found as found_progress
 
 STORAGE = 5.0
-"""Time, s, within which a browser must say what it has stored."""
+"""Time, s, within which a browser must send the values that it has stored."""
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
@@ -141,7 +141,7 @@ class Visit:
             self._sessions.leave(page.learner)
         self._workers.shutdown(wait=False, cancel_futures=True)
 
-    # ---------------------------------------------------------------- what the page says
+    # ---------------------------------------------------------------- calls from the page
 
     def _keep(self, key: str, text: str) -> None:
         self._client.local_storage.set_item(key, text)
@@ -162,13 +162,13 @@ class Visit:
         add_watching(gui, take)
 
     def _refuse(self, sentence: str) -> None:
-        self._client.add_notification("Not steered", sentence, color="orange", auto_close_seconds=4.0)
+        self._client.add_notification("Not allowed", sentence, color="orange", auto_close_seconds=4.0)
 
     def _refuse_upload(self) -> None:
         self._client.add_notification(
             "Not uploaded",
-            f"Files that are on their way may have {UPLOADS // 1_000_000} MB in all: give a smaller one, or "
-            "wait until the others have come.",
+            f"Files that are being uploaded may have {UPLOADS // 1_000_000} MB in all: choose a smaller "
+            "file, or wait until the other uploads are complete.",
             color="red",
         )
 

@@ -13,7 +13,7 @@ LONGEST = 2_000_000
 characters."""
 _FILE = b"FileTransfer"  # in every message that begins or carries a file
 _CAMERA = b"ViewerCamera"  # in messages that pages send by themselves
-_LEAST = 1e-9  # m, or of a quaternion: below it there is no direction
+_LEAST = 1e-9  # m, or the norm of a quaternion: a shorter vector has no direction
 
 Name = Annotated[str, Meta(max_length=1000)]
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -164,17 +164,17 @@ _SMALL, _FILES = msgspec.msgpack.Decoder(Small | File), msgspec.msgpack.Decoder(
 
 
 def refusal(raw: bytes) -> str | None:
-    """Why a message is refused: a sentence, or "" if the user need not be told. None if the message is
+    """The sentence that says why a message is refused; "" if it is refused without a notice, None if it is
     valid."""
     decoder = _SMALL if len(raw) <= LONGEST else _FILES if _FILE in raw else None
     if decoder is None:
-        return f"A page says at most {LONGEST // 1000} kB at once."
+        return f"The message is too long: a page may send at most {LONGEST // 1000} kB at once."
     try:
         decoder.decode(raw)
     except msgspec.ValidationError as error:
-        return "" if _CAMERA in raw else f"That is nothing a page says: {error}."[:300]
+        return "" if _CAMERA in raw else f"A page cannot send this message: {error}."[:300]
     except (msgspec.DecodeError, RecursionError):
-        return "That is nothing a page says."
+        return "A page cannot send this message."
     return None
 
 

@@ -30,8 +30,8 @@ def fit(
 
     Args:
         points: (k, 3) m.
-        direction: (3,) from what is looked at to the camera; not straight up or down.
-        fov: vertical opening, rad.
+        direction: (3,) from the points to the camera; not vertical.
+        fov: vertical opening angle, rad.
         aspect: width over height.
         phone: whether a sheet covers the lower part.
     """

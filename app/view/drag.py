@@ -25,7 +25,7 @@ _OWN = 1.0
 """Time, s, after a drag during which changes of targets are attributed to this drag."""
 _PATIENCE = 0.05
 """Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
-_PAUSED, _LESSON_PAUSED = "paused: Space, or Run, goes on", "paused: P, or Run this step, goes on"
+_PAUSED, _LESSON_PAUSED = "paused: press Space or Run to continue", "paused: press P or Run this step"
 Later = Callable[[float, Callable[[], None]], object]
 """Calls a function after a time, s."""
 
@@ -34,9 +34,9 @@ class Hand:
     """Gives the controller the position and orientation of the dragged target together.
 
     With the option to keep targets within reach, both wait for the reachability check, so that the controller
-    gets one event, not two. After `_PATIENCE` the orientation is sent with the position that the controller
-    already has, which was accepted before; the checked position follows when it is known. Without the option,
-    nothing waits.
+    gets both at the same time. After `_PATIENCE` the orientation is sent with the position that the
+    controller already has, which was accepted before; the checked position follows when it is known. Without
+    the option, nothing waits.
 
     If a scene has no draggable position target, there is no gizmo, and all methods do nothing.
     """
@@ -171,7 +171,8 @@ class Hand:
         """Shows the filtered target of the last telemetry row, rings if an orientation can be dragged, and
         the verdict.
 
-        running: whether simulated time passes, or the past is shown.
+        running: whether simulated time passes or a past instant is shown; otherwise the gizmo says how to
+            continue.
         """
         gizmo = self._gizmo
         if gizmo is None:

@@ -15,7 +15,7 @@ from robots import Robot
 _SIZE = {False: 0.3, True: 0.1}
 """Length in the picture, m, per m/s of a frame and per rad/s of its rotation, for joints of unit speed."""
 _THIN = 0.004  # m: thickness of directions without motion
-_STILL = 2e-3  # m: changes that nobody would see
+_STILL = 2e-3  # m: smaller changes are invisible
 
 
 class EllipsoidView:

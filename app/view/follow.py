@@ -10,7 +10,7 @@ from app.view.camera import turn
 _STEP = 0.02
 """Motion of the base, m, below which the camera stays: a trembling camera is unpleasant."""
 _REST = 30
-"""Number of calls with the base at rest after which the browser's camera message is certainly up to date."""
+"""Number of calls with the base at rest after which the browser's last camera message is up to date."""
 
 
 class FollowBase:

@@ -67,7 +67,7 @@ class Goal:
 
     @property
     def place(self) -> np.ndarray:
-        """(3,) m."""
+        """The position of the goal, (3,) m."""
         return np.array(self._node.position, float) - self._lift
 
     def follow(self, goal: np.ndarray | None, text: str) -> None:

@@ -18,7 +18,7 @@ from robots.truth import true_model
 
 _STIFF = 7.0  # N/m per kg of robot: a 30 kg arm feels 60 N when pulled 30 cm away
 _MOST = 3.5  # N per kg of robot
-_HELD = 0.15  # s a push lasts if the page does not renew it
+_HELD = 0.15  # s: duration of a push if the page does not renew it
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +118,8 @@ def push_at(
     """Converts a force (N) at a point of a link (m) to force and torque at the link's centre of mass.
 
     Args:
-        robot: whose.
-        plant: what its masses truly are.
+        robot: the robot.
+        plant: its true masses.
         joint: 1 … n, that moves the link.
         pose: (7,) of the joint's frame.
         point: (3,), world.

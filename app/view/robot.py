@@ -20,9 +20,9 @@ _ARROW = 1.2
 
 
 class RobotView:
-    """One frame per joint with the shapes it carries.
+    """One frame per joint, with the shapes of the joint's link.
 
-    links: (joint it moves with, 0 for the base; mesh) of every shape.
+    links: for every shape, the number of the joint that moves it (0 for the base) and its mesh.
     """
 
     def __init__(
@@ -57,8 +57,8 @@ class RobotView:
         self._shown = np.full((robot.n, 7), np.nan)
 
     def move(self, poses: np.ndarray) -> None:
-        """poses (n, 7): position, m, and quaternion wxyz per joint. A robot at rest sends nothing, so that
-        the browser need not draw."""
+        """poses: (n, 7), position, m, and quaternion wxyz per joint. For a robot at rest no message is sent,
+        so that the browser need not draw."""
         moved = ~(np.abs(poses - self._shown) <= _STILL)  # NaN: never shown
         shifted, turned = moved[:, :3].any(axis=1), moved[:, 3:].any(axis=1)
         for k in np.flatnonzero(shifted):

@@ -14,7 +14,7 @@ from app.link.messages import TaskView
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
-_BALL = 0.07  # m: larger than most wrists, which it encloses like a bubble
+_BALL = 0.07  # m: the transparent ball is larger than most wrists and encloses them
 _FRAME = 0.09  # m
 _STILL = 1e-4  # m, and about as many rad: a tenth of a pixel
 _INVITATION = "drag an arrow"
@@ -127,7 +127,7 @@ class TargetGizmo:
         self._say()
 
     def pause(self, words: str) -> None:
-        """words: how to continue, if nothing would follow the target; empty while the simulation runs."""
+        """words: says how to continue a paused simulation; empty while the simulation runs."""
         if words != self._paused:
             self._paused = words
             self._say()

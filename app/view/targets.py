@@ -36,7 +36,7 @@ class Targets:
         size: float,
         post: Send,
     ) -> None:
-        """poses (n + 1, 7): of joints and tip now; size: of the arrows, m."""
+        """poses: (n + 1, 7), present poses of joints and tip; size: of the arrows, m."""
         of_hand = {task.name for task in draggable(ready.tasks) if task is not None}
         self._targets = [
             _Target(scene, task, ready.robot, colours.get(task.level, BOUND), poses, size, post)

@@ -29,7 +29,7 @@ _FINE = 1e-3  # m: half a pixel
 
 
 class Trails:
-    """Reference curves (drawn once), trace and prediction (renewed about ten times a second)."""
+    """Reference curves (drawn once), trace and prediction (updated about ten times a second)."""
 
     def __init__(
         self,

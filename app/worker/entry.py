@@ -1,5 +1,5 @@
 """The entry module of simulation processes, given by name. It imports little itself, so that it can report
-what it loads."""
+the progress of the other imports."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from app.link.wire import Wire
 
 
 def warm(say: Callable[[str], None]) -> None:
-    """Imports all that simulations need. `say` receives a sentence about the progress, for a waiting page."""
+    """Imports everything that simulations need. `say` receives sentences about the progress, for a waiting
+    page."""
     from himpc.compilation.compiling import compile_all
 
     compile_all(lambda ready, of: say(f"compiling the controllers, this once: {ready} of {of} functions"))

@@ -14,7 +14,7 @@ from robots import InputError
 _POSES = 1 / 60  # s
 _REACHED = 1 / 50  # s
 _STATUS = 0.1  # s
-_CHUNK = 0.01  # s: the longest run before commands are looked at again
+_CHUNK = 0.01  # s: the longest run between two checks for commands
 
 
 @final

@@ -1,4 +1,4 @@
-"""A simulation that a ghost follows: the events to send to the ghost, and the limit on its lag."""
+"""The leader of a ghost: the events to send to the ghost, and the limit on the ghost's lag."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from lessons.session.session import Session
 
 
 class Leader:
-    """Off until `begin`. Afterwards the ghost receives all events that took effect, in order."""
+    """The events for a ghost. There is no ghost until `begin`; afterwards the ghost receives all events that
+    took effect, in order."""
 
     def __init__(self) -> None:
         self.on = False
@@ -27,7 +28,7 @@ class Leader:
         self._told = len(session.log)
 
     def end(self) -> None:
-        """Ends the following."""
+        """Called when the ghost no longer follows."""
         self.on, self.until = False, math.inf
 
     def waits(self, t: float) -> bool:

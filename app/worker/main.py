@@ -1,5 +1,5 @@
-"""The simulation process: one `SimulationRunner`, driven in real time; and what its fork server loads
-beforehand."""
+"""The simulation process: one `SimulationRunner`, driven in real time. `rehearse` loads, in the fork server,
+everything that a simulation needs."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from robots import InputError
 POSE_PERIOD = 1 / 60  # s
 STATUS_PERIOD = 0.1  # s
 SCRIPT_PERIOD = 0.02  # s
-_CHUNK = 0.01  # s: the longest run before commands are looked at again
+_CHUNK = 0.01  # s: the longest run between two checks for commands
 _BEAT = 0.004
 """Time, s, between two checks for steps that are due. Waking up for each tick of a millisecond takes three
 times as much processor time, as the caches are cold each time. A command wakes the process at once."""
-_IDLE = 0.02  # s: the same while the simulation is idle
+_IDLE = 0.02  # s: time between two checks while the simulation is idle
 
 
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
@@ -135,7 +135,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
             body.write_poses()
             next_pose = now + POSE_PERIOD
         if now >= next_status:
-            # A run at full speed is slower than requested without the computer being too slow.
+            # A run at full speed never reaches the requested speed, so it does not count as slowed down.
             capped = pacer.capped(now) and body.pace == body.speed
             wire.send(body.status(pacer.real_time_factor(now), capped))
             next_status = now + STATUS_PERIOD

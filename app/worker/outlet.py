@@ -16,8 +16,8 @@ class Outlet:
         block: the shared memory.
         poses: computes the poses that are written there.
         layout: of the rows.
-        step_us, late: columns; None if there is none.
-        told: whether the page was told about this memory.
+        step_us, late: numbers of these columns; None if a row has no such column.
+        told: whether the page has received the handle of this memory.
     """
 
     def __init__(self, session: Session, told: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""How much simulated time is due. No tick is ever skipped."""
+"""Computes the simulated time that is due. No tick is ever skipped."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Pacer:
         self._ran += ticks * T_s
 
     def rest(self, now: float) -> None:
-        """Notes time that does not count as due: while paused, or while loading."""
+        """Called while the simulation is paused or loads a scene: this time does not count as due."""
         self._last = now
         self._debt = 0.0
         self._window = (now, self._ran)

@@ -86,8 +86,8 @@ class SimulationRunner:
         return self._outlet.block
 
     def _refit(self) -> None:
-        """Allocates other memory when a new stack changes the layout of the rows; `news` then tells the
-        page."""
+        """Allocates other memory when a new stack changes the layout of the rows; `news` then returns the
+        message for the page."""
         if not self._outlet.fits(self.session):
             before, self._outlet = self._outlet, Outlet(self.session, told=False)
             before.block.close()
@@ -104,7 +104,7 @@ class SimulationRunner:
         """Executes a command; returns the answer for the page, if the command has one."""
         lecturer = self.lecturer
         if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, StepTicks, RunStep)):
-            self.session.notices.append("First say what you expect: this step asks for a prediction.")
+            self.session.notices.append("Make a prediction first: this step compares it with the run.")
             return None
         match command:
             case Post(Reset()) if lecturer is not None and not lecturer.waiting:
@@ -116,7 +116,7 @@ class SimulationRunner:
                     self._steps = max(self._steps, 1)  # a reset must be visible while paused, too
             case Post(Set(path)) if lecturer is not None and path.partition(".")[0] == "stack":
                 self.session.notices.append(
-                    "In a lesson the stack stays: choose its scene under Robot first."
+                    "The stack cannot be changed in a lesson: load its scene in the tab Robot."
                 )
             case Post(event):
                 self.session.post(event)
@@ -213,19 +213,19 @@ class SimulationRunner:
         self.over_budget += bool(row[outlet.step_us] > 1e6 * self.session.settings.T_s)
         self.late += outlet.late is not None and bool(row[outlet.late])
         if self.lecturer is not None and self.lecturer.follow(row):
-            # A robot out of control only gets worse, and the learner should see where control was lost.
+            # The run stops, so that the learner sees the pose at which control was lost.
             self.running = self.session.diverged_at is None
         return True
 
     @property
     def pace(self) -> float:
-        """Simulated seconds per second that are asked for."""
+        """The requested simulated seconds per second."""
         pace = None if self.lecturer is None else self.lecturer.pace
         return self.speed if pace is None else pace
 
     @property
     def busy(self) -> bool:
-        """Whether there is something to compute, even if no run is active."""
+        """Whether a run is active or a ghost must be computed."""
         return self.running or (self.lecturer is not None and self.lecturer.busy)
 
     def _finish_period(self) -> None:

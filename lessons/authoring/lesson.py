@@ -23,7 +23,7 @@ def lesson_named(name: str) -> Lesson:
 
 @lru_cache(maxsize=64)
 def _lesson_of(source: Source) -> Lesson:
-    """The lesson of a file, tried once per content."""
+    """The lesson of a file. Each content of a file is tested only once."""
     module = module_of(source)
     expected(module, "lesson")
     found = vars(module)["LESSON"]
@@ -46,7 +46,7 @@ def check_lesson(lesson: Lesson) -> None:
             for claim in step.claims:
                 if claim.relation not in get_args(Relation):
                     raise InputError(
-                        f"claim '{claim.text}': {claim.relation!r} is no relation; choose one of "
+                        f"claim '{claim.text}': {claim.relation!r} is not a relation; choose one of "
                         f"{', '.join(get_args(Relation))}"
                     )
         except InputError as error:

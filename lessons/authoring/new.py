@@ -25,8 +25,9 @@ TASKS: tuple[str, ...] = (
     "relative_orientation",
     "plane_distance",
 )
-"""Kinds of tasks there are to begin with. What is on joints has little to be changed; what points has a
-target that is no value of its coordinates, which a task of a file must have."""
+"""Kinds of tasks that can be used as a template. Two kinds are left out: tasks on joints have little
+to change, and the target of pointing tasks is not a value of their coordinates, as a task of a file requires.
+"""
 
 
 def choices(kind: Kind) -> Sequence[str]:
@@ -39,7 +40,7 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
     """The text of a new file. Raises InputError if there is no such template."""
     known = choices(kind)
     if start is not None and start not in known:
-        raise unknown_name(f"{kind} to begin with called", start, known)
+        raise unknown_name(f"template of a {kind}", start, known)
     if kind == "controller" and start in EXERCISES:
         text = start_of(start)
     elif kind == "controller":
@@ -56,7 +57,7 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
 
 
 def write_new(kind: Kind, path: str, start: str | None = None) -> None:
-    """Writes a new file. Raises InputError if there is one already, or it cannot be written."""
+    """Writes a new file. Raises InputError if the file exists already or cannot be written."""
     if not is_file(path):
         raise InputError(f"{path}: give a name that ends with .py, e.g. my_{kind}.py")
     text = text_of(kind, start, path)
@@ -64,9 +65,9 @@ def write_new(kind: Kind, path: str, start: str | None = None) -> None:
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise InputError(f"{path} is there already: give another name, or remove it first") from None
+        raise InputError(f"{path} exists already: give another name, or remove it first") from None
     except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}): give another place") from None
+        raise InputError(f"{path} cannot be written ({error.strerror}): give another path") from None
 
 
 def _read(package: str, name: str) -> str:
@@ -74,7 +75,7 @@ def _read(package: str, name: str) -> str:
 
 
 def _task(word: str) -> str:
-    """The source of one of the lab's kinds, as a task of a file."""
+    """The source of one of the lab's kinds of tasks, as the text of a file with one task."""
     of = KINDS[word].makes[0]
     package, _, module = of.__module__.rpartition(".")
     says, rest = _read(package, module).split('"""\n', 1)

@@ -1,6 +1,6 @@
 """The course: one file per lesson, its docstring is its card.
 
-A file defines `LESSON`. Files are imported when their lesson is asked for.
+A file defines `LESSON`. A file is imported when its lesson is first needed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ COURSE: tuple[str, ...] = (
 
 
 def load_lesson(name: str) -> Lesson:
-    """A lesson by its name. Raises InputError for a name that is none, naming the nearest."""
+    """A lesson by its name. Raises InputError, which names the nearest lesson, for an unknown name."""
     if name not in COURSE:
         raise unknown_name("lesson", name, COURSE)
     lesson: Lesson = import_module(f"lessons.course.{name.replace('-', '_')}").LESSON

@@ -19,7 +19,7 @@ from lessons.teaching.prediction import Choice, Option, Value
 HAND = Signal("error/position", "mm")
 TILT = Signal("error/orientation", "deg")
 JOINT_3 = Signal("q", "deg", column=2)
-# Home is (0, 30, 0, −90, 0, 60, 0)°; joint 3, which carries the elbow around, is asked to turn by 60°.
+# Home is (0, 30, 0, −90, 0, 60, 0)°; the target of joint 3, which moves the elbow around, is turned by 60°.
 TURN_ELBOW = ((0.1, MoveTarget("posture", (0.0, 0.5236, 1.0472, -1.5708, 0.0, 1.0472, 0.0))),)
 
 FOLLOW = Step(
@@ -53,7 +53,7 @@ FOLLOW = Step(
             "at least",
             7.0,
             fails_with=("levels.orientation.enabled=false",),
-            because="then the last joint, which only turns the hand, rests",
+            because="then the last joint, which only turns the hand, does not move",
         ),
         Claim(
             "From 1.2 s on the hand is within 1 mm of the target.",
@@ -61,7 +61,7 @@ FOLLOW = Step(
             "at most",
             1.0,
             fails_with=("levels.position.enabled=false",),
-            because="nobody asks for the position",
+            because="then no level has the task to hold the position",
         ),
         Claim(
             "The hand never tilts by more than 3°.",
@@ -69,7 +69,7 @@ FOLLOW = Step(
             "at most",
             3.0,
             fails_with=("levels.orientation.enabled=false",),
-            because="nobody asks for the orientation",
+            because="then no level has the task to hold the orientation",
         ),
     ),
     events=((0.1, MoveTarget("position", (0.5564, 0.15, 0.3977))),),
@@ -115,7 +115,7 @@ ELBOW = Step(
             "at least",
             20.0,
             fails_with=("levels.posture.enabled=false",),
-            because="nobody asks the elbow to go",
+            because="then no level has the task to turn the elbow",
         ),
     ),
     events=TURN_ELBOW,
@@ -151,7 +151,7 @@ COUNT = Step(
             "at least",
             1.15,
             fails_with=("levels.orientation.enabled=true",),
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "The hand still stays within 6 mm.",
@@ -159,7 +159,7 @@ COUNT = Step(
             "at most",
             6.0,
             fails_with=("levels.position.enabled=false",),
-            because="the position is the one thing that must stay on",
+            because="then no level has the task to hold the position",
         ),
     ),
     set=("levels.orientation.enabled=false",),

@@ -67,7 +67,7 @@ OVERLAP = Step(
             "at most",
             0.7,
             fails_with=SINGLE,
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "After 22 s all six tasks are done.",
@@ -75,7 +75,7 @@ OVERLAP = Step(
             "at least",
             6.0,
             fails_with=SINGLE,
-            because="it is still on its way to the third person",
+            because="the robot is still on its way to the third person",
         ),
         Claim(
             "The base drives at most 0.7 times as far.",
@@ -129,7 +129,7 @@ THERE = Step(
             "at most",
             0.9,
             fails_with=SINGLE,
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "They gain less than in the step before: more than 0.75 times the ghost's time.",
@@ -184,7 +184,7 @@ WAIT = Step(
             "at least",
             0.45,
             fails_with=SINGLE,
-            because="its only task is the hand, and once that is there it rests",
+            because="with the hand as the only task, the robot rests when the hand has arrived",
         ),
         Claim(
             "The ball does not move: the hand stays within 1 mm.",
@@ -200,7 +200,7 @@ WAIT = Step(
             "at least",
             4.0,
             fails_with=SINGLE,
-            because="it sets out when the ball is taken, not before",
+            because="then the base starts only when the ball is taken",
         ),
     ),
     events=TAKEN,
@@ -251,7 +251,7 @@ MOVES = Step(
             "at least",
             0.1,
             fails_with=SINGLE,
-            because="it does not know yet that it will go there",
+            because="with one task at a time the base does not know its next place yet",
         ),
         Claim(
             "Meanwhile the first ball stays within 1 mm.",

@@ -66,7 +66,7 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=BASE_FIRST,
-            because="then the hand is what gives way",
+            because="then the hand has the lower priority",
         ),
         Claim(
             "From 5 s on the base is within 1 cm of its place.",
@@ -127,7 +127,7 @@ REACH = Step(
             "at least",
             1.5,
             fails_with=BASE_FIRST,
-            because="nothing holds it back",
+            because="then no task of higher priority holds the base back",
         ),
         Claim(
             "The arm is stretched: w falls below 0.01.",
@@ -135,7 +135,7 @@ REACH = Step(
             "at most",
             0.01,
             fails_with=("levels.base.enabled=false",),
-            because="with nobody pulling, the arm stays as it is",
+            because="if the base does not move away, the arm does not stretch",
         ),
     ),
     events=FAR,

@@ -104,7 +104,7 @@ REASON = Step(
             "at most",
             0.7,
             fails_with=("horizon=1",),
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "The torque is smoother: its changes are at most 0.8 times as large.",

@@ -60,7 +60,7 @@ NOTHING = Step(
             "at most",
             0.01,
             fails_with=("delta_m=0.001",),
-            because="a millimetre is enough to go all the way",
+            because="with a tolerance of a millimetre the base drives as far as the arm allows",
         ),
         Claim(
             "The accepted steps are below 0.05 on average.",
@@ -120,7 +120,7 @@ LITTLE = Step(
             "at most",
             0.36,
             fails_with=("delta_m=0",),
-            because="with no tolerance it never left",
+            because="without a tolerance the base does not move",
         ),
     ),
     set=("delta_m=0.01",),
@@ -171,7 +171,7 @@ SUM = Step(
             "at least",
             1.5,
             fails_with=("lexicographic=per_coordinate",),
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "The accepted steps are below 0.1 on average.",

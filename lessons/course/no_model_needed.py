@@ -59,7 +59,7 @@ LOAD = Step(
             "at most",
             5.0,
             fails_with=("controller=hqp",),
-            because="a model that does not know the load leaves it to the springs of (4)",
+            because="if the model does not contain the load, only the springs of (4) carry it",
         ),
         Claim(
             "In the end it is within 0.1 mm of its target.",
@@ -67,7 +67,7 @@ LOAD = Step(
             "at most",
             0.1,
             fails_with=("controller=hqp",),
-            because="it never notices the load",
+            because="its model does not contain the load, and it does not estimate the load",
         ),
     ),
     events=((0.2, Set("plant.payload_kg", 1.0)),),
@@ -109,7 +109,7 @@ SMALL = Step(
             "at least",
             3.0,
             fails_with=("M_bar_scale=1",),
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "The gauge stays above 0.99: less than a hundredth of the slowest error goes in a millisecond.",

@@ -84,7 +84,7 @@ DAMPER = Step(
             "at least",
             4.0,
             fails_with=("tasks.position.K_v=20",),
-            because="critically damped, it has long come to rest",
+            because="with critical damping the hand is at rest by then",
         ),
         Claim(
             "It swings to both sides of its target, 10 mm in x from end to end after 0.5 s.",
@@ -137,7 +137,7 @@ PRICE = Step(
             "at most",
             1.05,
             fails_with=("levels.position.R=1e5",),
-            because="there the torque is too dear to follow at once",
+            because="then changes of torque cost so much that the hand follows late",
         ),
     ),
     set=("levels.position.R=1000",),

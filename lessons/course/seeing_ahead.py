@@ -56,7 +56,7 @@ EARLY = Step(
             "at least",
             0.4,
             fails_with=("controller=htmpc_wpt",),
-            because="it cannot leave for a place that it does not know of",
+            because="without preview it does not know the next place before 8 s",
         ),
         Claim(
             "In Part 2 its mean error is at most half of the ghost's.",
@@ -64,7 +64,7 @@ EARLY = Step(
             "at most",
             0.5,
             fails_with=("controller=htmpc_wpt",),
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
     ),
     duration=16.0,
@@ -209,7 +209,7 @@ GAINS = Step(
             "at most",
             0.5,
             fails_with=("gains=[0.5,0.3]",),
-            because="then it is the ghost",
+            because="then both robots have the same settings",
         ),
         Claim(
             "The hand is off by more than 1 cm.",

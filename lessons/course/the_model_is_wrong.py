@@ -19,7 +19,7 @@ Q1 = Signal("error/q1", "deg")
 CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "hqp"))
 FRICTION = Control("plant.friction", "Friction of the joints, N·m", 0.0, 0.3)
 MASS = Control("plant.mass_scale", "Mass of the links, factor", 0.5, 2.0)
-# What the plant of this scene really is, told to the controller.
+# The true parameters of this scene's plant, for the controller's nominal model.
 EXACT = (
     "nominal.mass_scale=1",
     "nominal.inertia_scale=1",
@@ -57,7 +57,7 @@ EXACTLY = Step(
             "at most",
             0.1,
             fails_with=("plant.friction=0.05",),
-            because="so little dry friction is enough to lose the lead",
+            because="with this dry friction the error is no longer below a tenth",
         ),
     ),
     set=("controller=osf", "plant.friction=0", *EXACT),
@@ -156,7 +156,7 @@ HEAVIER = Step(
             "at most",
             0.3,
             fails_with=("controller=hqp",),
-            because="its model knows no friction",
+            because="its model has no friction",
         ),
     ),
     set=("plant.mass_scale=1.5", "plant.inertia_scale=1.5"),

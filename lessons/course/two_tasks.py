@@ -43,7 +43,7 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=("controller=osf",),
-            because="its model knows no friction",
+            because="its model has no friction",
         ),
         Claim(
             "Joint 1 stays within 1° of its reference.",
@@ -101,7 +101,7 @@ WEIGHTED = Step(
             "at least",
             100.0,
             fails_with=("controller=himpc",),
-            because="there the hand ranks first",
+            because="then the hand has the higher priority",
         ),
         Claim(
             "It is off by more than 20 cm: a radian of joint 1 is worth a quarter of a metre of the hand.",
@@ -203,7 +203,7 @@ LIMIT = Step(
             "at least",
             2.0,
             fails_with=("controller=himpc",),
-            because="then both robots are the same",
+            because="then both robots have the same settings",
         ),
     ),
     set=("controller=weighted", "levels.q1.Q=1"),

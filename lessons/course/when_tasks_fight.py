@@ -109,7 +109,7 @@ BETTER_MODEL = Step(
             "at most",
             0.3,
             fails_with=("controller=osf",),
-            because="its model knows no friction",
+            because="its model has no friction",
         ),
         Claim(
             "Then a joint passes twenty times its speed limit.",
@@ -156,7 +156,7 @@ EQUALITY = Step(
             "at most",
             1.5,
             fails_with=("controller=osf",),
-            because="it is off by millimetres, and then lost",
+            because="OSF is off by millimetres, and then loses control",
         ),
         Claim(
             "The demanded torque never exceeds its limit.",
@@ -164,7 +164,7 @@ EQUALITY = Step(
             "at most",
             100.0,
             fails_with=("controller=tdeosf",),
-            because="an inverse near a singularity knows no bound",
+            because="an inverse near a singularity demands torque without any bound",
         ),
         Claim(
             "No joint exceeds its speed limit by more than 5 %.",
@@ -188,7 +188,7 @@ EQUALITY = Step(
             "at most",
             20.0,
             fails_with=("q1_amplitude_deg=20",),
-            because="there the arm never has to straighten",
+            because="with this swing the arm does not become straight",
         ),
     ),
     duration=5.0,

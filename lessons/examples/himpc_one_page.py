@@ -11,7 +11,7 @@ from himpc.qp import solve_qp
 
 
 class Controller:
-    """Remembers nothing but the last prediction, for the Jacobians along it (30)."""
+    """Its only memory is the last prediction, for the Jacobians along it (30)."""
 
     def __init__(self):
         self.predicted = None  # q at knots 0 … N of the last plan
@@ -21,7 +21,7 @@ class Controller:
         knots = self.knots(now)
         rows, lower, upper = bounds(now)
         U = np.zeros(N * n)  # all increments Δτ_0 … Δτ_{N−1}, one after the other
-        Z = [np.eye(n)] * N  # what the levels above leave free at each knot (33)
+        Z = [np.eye(n)] * N  # basis of the directions that the levels above leave free, per knot (33)
         torques = []
         for level in now.levels:
             B = np.array([level.jacobian(q) for q in knots]) / now.M_bar  # Ĵ M̄⁻¹, (N, m, n)
@@ -41,9 +41,11 @@ class Controller:
         return path + (now.q - path[0])
 
     def optimum(self, now, level, B, U, Z, rows, lower, upper):
-        """The change of U that is best for a level: Problem i, (34), with U_i = U_{i−1} + Z y.
+        """The optimal change of U for a level: Problem i, (34), with U_i = U_{i−1} + Z y.
 
-        Whatever y is, J_p M̄⁻¹ Δτ stays as the levels p above left it: the equality (33) needs no rows.
+            For every y, J_p M̄⁻¹ Δτ keeps the value that the levels p above have chosen, so that the equality
+            (33)
+        needs no rows.
         """
         basis = block_diagonal(Z)
         if not basis.shape[1]:
@@ -65,7 +67,7 @@ def residual(now, level, B):
     T, K_p, K_v = now.T_s, level.K_p, level.K_v
 
     def weight(j):
-        """What an acceleration that lasts since j periods adds to the residual."""
+        """The contribution to the residual of an acceleration that has lasted for j periods."""
         return 1.0 + K_v * T * (j + 1) + K_p * T**2 * j * (j + 1) / 2
 
     G, free = np.zeros((N, m, N, n)), np.empty((N, m))
@@ -106,7 +108,7 @@ def predict(now, U):
 
 
 def shrunk(Z, B):
-    """An orthonormal basis of the directions of Z that B maps to zero: what a level leaves to those below."""
+    """An orthonormal basis of the directions of Z that B maps to zero: the freedom of the levels below."""
     _, sigma, right = np.linalg.svd(B @ Z)
     return Z @ right[int((sigma > 1e-10 * np.linalg.norm(B)).sum()) :].T
 

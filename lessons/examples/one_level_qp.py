@@ -2,8 +2,8 @@
 
     himpc-lab run planar3-circle --controller FILE.py
 
-min Σ ‖e‖²_Q + ‖Δτ‖²_R with e the residual (28) at the next knot: affine in Δτ, because the torque that acted
-and the acceleration it gave are a model of the robot (time-delay estimation, (9) of the HIMPC paper).
+min Σ ‖e‖²_Q + ‖Δτ‖²_R with e the residual (28) at the next knot. It is affine in Δτ: the last torque and the
+acceleration that it caused replace a model of the robot (time-delay estimation, (9) of the HIMPC paper).
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ def torque(now):
     T = now.T_s
     H, f = np.zeros((now.n, now.n)), np.zeros(now.n)
     for level in now.levels:
-        # e = e⁰ + G Δτ: one more period with the acceleration there is, changed by J M̄⁻¹ Δτ.
+        # e = e⁰ + G Δτ: one more period with the present acceleration, changed by J M̄⁻¹ Δτ.
         G = (1.0 + level.K_v * T)[:, None] * level.J / now.M_bar
         e = (
             level.x_ddot
@@ -25,7 +25,7 @@ def torque(now):
         )
         H += G.T @ (level.Q[:, None] * G) + np.diag(level.R)
         f += G.T @ (level.Q * e)
-    # The next velocity, q̇ + T_s (q̈ + M̄⁻¹ Δτ), comes no nearer to its bound than it may in one period.
+    # The next velocity, q̇ + T_s (q̈ + M̄⁻¹ Δτ), may use only a share of the distance to its bound.
     share = min(1.0, now.bounds.approach * T or 1.0)
     free = now.M_bar / T * (-T * now.q_ddot)
     v_lower = share * (now.bounds.v_lower - now.q_dot) * now.M_bar / T + free

@@ -2,9 +2,9 @@
 
     himpc-lab run planar3-circle --controller FILE.py
 
-Level by level, with J the Jacobian, N the projector of the levels above and Λ the inertia that is felt there:
-τ = C q̇ + g + Σ (J N)ᵀ Λ (ẍ − J̇ q̇ − J M⁻¹ τ_above), and one row of torques per level is returned, so that the
-lab can say how much a level leaks into those above.
+Level by level, with J the Jacobian, N the projector of the levels above and Λ the inertia of the task:
+τ = C q̇ + g + Σ (J N)ᵀ Λ (ẍ − J̇ q̇ − J M⁻¹ τ_above). The function returns one row of torques per level, so
+that the lab can measure how much a level accelerates the levels above (the leak).
 """
 
 import numpy as np
@@ -12,14 +12,14 @@ import numpy as np
 
 def torque(now):
     M_inv = np.linalg.inv(now.M)
-    N = np.eye(now.n)  # what the levels above leave free: q̈ → q̈
+    N = np.eye(now.n)  # projector on the accelerations that the levels above leave free
     tau = np.zeros(now.n)
     torques = []
     for level in now.levels:
         # The target motion (4): ẍ_d − K_v (ẋ − ẋ_d) − K_p x̃.
         wanted = level.x_ddot_d[0] - level.K_v * (level.x_dot - level.x_dot_d[0]) - level.K_p * level.error
         J = level.J @ N
-        # No inverse where the levels above have left nothing: the pseudo-inverse gives zero there.
+        # In directions without freedom there is no inverse: the pseudo-inverse gives zero there.
         Lambda = np.linalg.pinv(J @ M_inv @ J.T, rcond=1e-9, hermitian=True)
         tau = tau + J.T @ Lambda @ (wanted - level.J_dot_q_dot - level.J @ M_inv @ tau)
         N = N - M_inv @ J.T @ Lambda @ J

@@ -28,9 +28,9 @@ from robots.errors import shortened
 from robots.processes.family import end_family, has_ended, memory_of, spent
 
 LOADING = 10.0
-"""s that loading the file may take, the start of the process not included."""
+"""Time, s, that loading the file may take, without the start of the process."""
 STARTING = 60.0
-"""s that the start of the process may take."""
+"""Time, s, that the start of the process may take."""
 _MARK = "HIMPC_LAB_SUBMISSION"
 _BOOT = (
     "import sys; sys.path.insert(0, sys.argv[1]); from lessons.exercises.inside.serve import serve; "
@@ -47,23 +47,23 @@ class Apart:
     """A process that runs a submission and contains no data of the lab. To be used in a `with` statement.
 
     Attributes:
-        protection: the means of the operating system that deny it files, the network and other processes; ()
-            if only Python does.
-        exercise: what the file says in EXERCISE.
-        line: where it begins to compute the torque.
+        protection: mechanisms of the operating system that refuse it files, the network and other processes;
+            () if only Python refuses them.
+        exercise: the name that the file assigns to EXERCISE.
+        line: number of the line at which the function of the torque begins.
     """
 
     def __init__(self, source: Source, seconds: float, memory: int, kernel: bool = True) -> None:
         """Starts it and loads the file.
 
         Args:
-            source: the file. It is sent; nothing is read where the process runs.
-            seconds: how long all its answers may take by its own doing.
-            memory: bytes for the process and, where it may start any, all it starts.
-            kernel: whether the system's own means are to be used, see `protection`.
+            source: the file. Its text is sent to the process, which reads no files.
+            seconds: total time, s, in which the process may compute or sleep to answer.
+            memory: bytes for the process and all processes that it starts, if it can start any.
+            kernel: whether to use the mechanisms of the operating system, see `protection`.
 
         Raises:
-            InputError: the file cannot be loaded, or is no controller.
+            InputError: the file cannot be loaded, or contains no controller.
         """
         self._source, self._seconds, self._memory, self._kernel = source, seconds, memory, kernel
         self._slept = self._before = 0.0
@@ -93,7 +93,7 @@ class Apart:
         return None if self._child is None else self._child.pid
 
     def close(self) -> None:
-        """Ends the process and whatever it started."""
+        """Ends the process and all processes that it started."""
         child, self._child = self._child, None
         if child is None:
             return
@@ -158,7 +158,7 @@ class Apart:
     def torque(self, now: View) -> Any:
         """The torque of the control law for a tick. Raises OwnFault, one sentence."""
         if self._child is None:
-            raise OwnFault(f"{self._source.path}: its process is over")
+            raise OwnFault(f"{self._source.path}: its process has ended")
         message, arrays = b"", numbers_of(now)
         marks = [now.T_s, now.N, now.bounds.approach, *(level.name for level in now.levels)]
         marks += [each.shape for each in arrays]
@@ -184,7 +184,7 @@ class Apart:
         raise self._fault(kind, data, now.n)
 
     def _reply(self, now: View, data: bytes) -> bytes:
-        """A function of the model, called as the submission asks."""
+        """The message with the result of a function of the model that the submission has called."""
         try:
             name, level, arguments = json.loads(data)
             given = [np.array(each, float).reshape(now.n) for each in arguments]
@@ -245,8 +245,8 @@ class Apart:
         self._account()
 
     def _account(self) -> None:
-        """Raises if all answers together took too long, or the process has too much memory with all it
-        started, and ends it."""
+        """Ends the process and raises OwnFault if all answers together took too long, or if the process and
+        the processes that it started use too much memory."""
         child = self._child
         assert child is not None
         if self._before + self._slept + spent(child.pid)[0] > self._seconds:
@@ -256,7 +256,7 @@ class Apart:
             self.close()
             raise OwnFault(f"{self._source.path}: it needs more memory than {self._memory / 1e9:g} GB")
 
-    # ---------------------------------------------------------------- what went wrong
+    # ---------------------------------------------------------------- sentences about faults
 
     def _gone(self) -> OwnFault:
         child = self._child
@@ -265,19 +265,19 @@ class Apart:
         self.close()
         code = child.returncode
         if not ended:
-            return OwnFault(f"{self._source.path}: it closes the pipe it answers through: leave that out")
+            return OwnFault(f"{self._source.path}: it closes the pipe for its answers: leave that out")
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         return OwnFault(f"{self._source.path}: it ends its own process ({how}): leave that out")
 
     def _nonsense(self) -> OwnFault:
         self.close()
-        return OwnFault(f"{self._source.path}: it writes into the pipe it answers through: leave that out")
+        return OwnFault(f"{self._source.path}: it writes into the pipe for its answers: leave that out")
 
     def _fault(self, kind: bytes, data: bytes, n: int = 0) -> OwnFault:
         said = shortened(" ".join(data.decode(errors="replace").split()), 1000)
         if kind == wire.OTHER and n:
             return OwnFault(
-                f"{self.where}: it returned {said} where numbers are needed: a torque has shape ({n},)"
+                f"{self.where}: it returned {said} instead of numbers: return a torque of shape ({n},)"
             )
         return OwnFault(said) if kind == wire.FAULT else self._nonsense()
 

@@ -20,17 +20,18 @@ TORQUE_UNIT = "N·m"
 
 @dataclass(frozen=True)
 class GradeCheck:
-    """One measured sentence about a submission.
+    """One statement about a submission that is measured.
 
     Attributes:
-        text: the sentence.
-        why: what it may mean if it is missed, where no known mistake fits.
-        run: where it is measured; the controller is the submission.
-        relation, bound: "at most" or "at least" so much.
-        measure: of the submission's own run; None: the torque beside another controller's.
+        text: the statement, as a sentence.
+        why: a possible cause if the statement does not hold and no known mistake fits.
+        run: the run in which it is measured; the controller is the submission.
+        relation, bound: the condition: the value is "at most" or "at least" the bound.
+        measure: the measured quantity of the submission's own run; None: the difference in torque from the
+            controller `beside`.
         beside: the lab's controller that drives the run while the submission is shown the same states; the
             largest difference in torque is measured, N·m.
-        points: for meeting it.
+        points: number of points if it holds.
     """
 
     text: str
@@ -64,7 +65,7 @@ class Exercise:
         name: its name in `lessons.exercises.EXERCISES`.
         card: the docstring of its file.
         equation: LaTeX.
-        plain: the same as plain text, for a terminal.
+        plain: the equation as plain text, for a terminal.
         hints: shown one by one.
         lesson: the lesson it belongs to.
         checks: function of a seed, which decides the disturbances.

@@ -33,13 +33,13 @@ def grade_folder(
     """Grades every Python file of a folder, each in a process of its own.
 
     Args:
-        folder: of the submissions.
-        exercise: which; None: what each file says.
-        seed: decides the disturbances, the same for all.
-        out: CSV file; rows that are there already, of the same content, are kept.
-        spread: how the work is spread.
-        progress: called with the share that is done.
-        within: what grading one file may cost.
+        folder: the folder of the submissions.
+        exercise: name of the exercise; None: the name that each file assigns to EXERCISE.
+        seed: seed of the disturbances, which are the same for all files.
+        out: CSV file; its rows of files whose content has not changed are kept.
+        spread: function that spreads the work.
+        progress: called with the completed share.
+        within: time and memory for grading one file.
 
     Raises:
         InputError: no such exercise, no Python file in the folder, or the table cannot be written.
@@ -106,11 +106,11 @@ def _text(name: str) -> str:
 
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""First characters of cells that a spreadsheet would compute."""
+"""First characters of cells that a spreadsheet would interpret as a formula."""
 
 
 def _cell(text: str) -> str:
-    """The cell in a form that a spreadsheet shows and does not compute."""
+    """The cell in a form that a spreadsheet shows as text."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
@@ -126,7 +126,7 @@ def _rows(out: Path) -> Iterator[Row]:
         with out.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             if tuple(reader.fieldnames or ()) != COLUMNS:
-                raise InputError(f"{out}: is no table of himpc-lab grade; give another file for --out")
+                raise InputError(f"{out}: is not a table of himpc-lab grade; give another file for --out")
             for row in reader:
                 yield {name: _of_cell(value or "") for name, value in row.items()}
     except (OSError, UnicodeDecodeError, csv.Error):

@@ -29,19 +29,19 @@ from robots import InputError, Robot
 from robots.processes.isolation import PATIENCE, Allowance, Fault, isolated
 
 WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program itself", "leave that out")
-"""What grading one file may cost."""
+"""Time and memory for grading one file."""
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One check with what was measured.
+    """One check with the measured value.
 
     Attributes:
-        check: its sentence.
-        measured: in `unit`; NaN if there was nothing to measure.
+        check: the sentence of the check.
+        measured: value in `unit`; NaN if there was nothing to measure.
         unit, wanted: e.g. "mm", "≤ 0.5 mm".
-        points, of: given, possible.
-        why: one sentence where it is missed, "" where it is met.
+        points, of: points given, and points possible.
+        why: one sentence with the cause if the check fails, "" if it holds.
     """
 
     check: str
@@ -59,12 +59,12 @@ class Grade:
 
     Attributes:
         file: its path.
-        digest: of its content.
-        exercise: name of the exercise, "" if nobody knows which.
-        lines: one per check; none if it could not be run.
+        digest: hash of its content.
+        exercise: name of the exercise, "" if it is unknown.
+        lines: one per check; empty if the file could not be run.
         error: one sentence if it could not be run, or was ended.
-        protection: what of the system kept it from files, the network and other processes; () where only
-            Python did.
+        protection: mechanisms of the operating system that refused it files, the network and other processes;
+            () if only Python refused them.
     """
 
     file: str
@@ -93,11 +93,11 @@ class Submission:
 
     Attributes:
         source: the file as it was read.
-        exercise: which; None: what the file says in EXERCISE.
-        seed: decides the disturbances.
-        within: what grading it may cost.
-        kernel: whether the system's own means keep it from files, the network and other processes; else
-            only Python does.
+        exercise: name of the exercise; None: the name that the file assigns to EXERCISE.
+        seed: seed of the disturbances.
+        within: time and memory for grading it.
+        kernel: whether the operating system refuses it files, the network and other processes; otherwise
+            only Python refuses them.
     """
 
     source: Source
@@ -116,7 +116,7 @@ class Shown(Protocol):
         ...
 
     def fresh(self) -> Callable[[View], Any]:
-        """Its law, without memory."""
+        """Its control law, loaded anew, so that it has no memory of earlier runs."""
         ...
 
 
@@ -132,7 +132,7 @@ def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
 
 
 def grade_apart(submission: Submission) -> Grade:
-    """Grades a submission in a process of its own; whatever it does there is a grade."""
+    """Grades a submission in a process of its own. If that process fails, the grade contains the error."""
     source, asked = submission.source, submission.exercise
     # Only the time in the submission's own process counts, not the time of the checks.
     within = replace(submission.within, seconds=PATIENCE * submission.within.seconds)
@@ -146,17 +146,17 @@ def grade_apart(submission: Submission) -> Grade:
 
 
 def graded(submission: Submission) -> Grade:
-    """The same in this process, which holds the plant and the checks; the submission has another one.
+    """Grades a submission with the plant and the checks in this process; the submission runs in another one.
 
     Raises:
-        InputError: the file cannot be loaded, or nobody knows which exercise it is.
+        InputError: the file cannot be loaded, or the name of its exercise is missing or unknown.
     """
     source, within = submission.source, submission.within
     with Apart(source, within.seconds, within.memory, submission.kernel) as apart:
         name = submission.exercise or apart.exercise
         if name not in EXERCISES:
             raise InputError(
-                f'{source.path}: does not say which exercise it is: write e.g. EXERCISE = "joint-pd" at its '
+                f'{source.path}: has no name of an exercise: write e.g. EXERCISE = "joint-pd" at its '
                 f"top, or name one of {', '.join(EXERCISES)}"
             )
         try:
@@ -167,7 +167,7 @@ def graded(submission: Submission) -> Grade:
 
 
 def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult, ...]:
-    """Every check of an exercise; a run that fails costs its own checks only."""
+    """The results of all checks of an exercise; if a run fails, only the checks of this run fail."""
     recordings: dict[RunSpec, Recording | str] = {}
     diagnosis = Diagnosis(exercise.mistakes)
     lines: list[CheckResult] = []
@@ -229,7 +229,8 @@ def _scene(run: RunSpec, controller: str | None = None) -> TorqueScene:
 
 
 def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Robot) -> OwnController:
-    """The controller of a submission: what it is shown is computed here, and its torque comes from there."""
+    """The controller of a submission: this process computes the data that it gets, and the submission's
+    process computes the torque."""
     diagnosis.begin()
 
     def call(law: Callable[[View], Any], now: View) -> Any:

@@ -1,6 +1,6 @@
 """Joint PD
 
-An arm is to stay where it is told and to come back when it is pushed: what is the least that does it?
+An arm must hold a posture and come back when it is pushed: what is the simplest controller for this?
 
 Minutes: 15
 You need: what a torque is; lesson "a-redundant-arm"
@@ -36,7 +36,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
             "The iiwa stays where it is.",
-            "gravity, the spring or M̄ is not what the equation says",
+            "gravity, the spring or M̄ differs from the equation",
             IIWA,
             0.2,
             measure=Measure(ERROR),
@@ -85,14 +85,14 @@ def _frozen() -> Law:
 
 
 MISTAKES: tuple[Mistake, ...] = (
-    wrong("the torque is held: the law does not answer to q and q̇", held),
+    wrong("the torque is constant: the law does not depend on q and q̇", held),
     wrong("the stiffness K_p has the wrong sign", _law, K_p=-1.0),
     wrong("the stiffness K_p is missing", _law, K_p=0.0),
     wrong("the damping K_v has the wrong sign", _law, K_v=-1.0),
     wrong("the damping K_v is missing", _law, K_v=0.0),
     wrong("gravity g(q) is missing", _law, gravity=0.0),
     wrong("gravity g(q) has the wrong sign", _law, gravity=-1.0),
-    Mistake("gravity g(q) is that of the start: it must be computed at every q", _frozen),
+    Mistake("gravity g(q) is computed at the start only: it must be computed at every q", _frozen),
     wrong("M̄ is missing: it turns an acceleration into a torque", _law, M_bar=False),
     wrong("the target q_d is missing: the error is q − q_d", _law, target=False),
 )

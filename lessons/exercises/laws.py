@@ -17,7 +17,8 @@ Array = NDArray[Any]
 
 
 def wanted(level: LevelView, *, K_p: float = 1.0, K_v: float = 1.0, target: bool = True) -> Array:
-    """ẍ that closes (4), (m,); K_p, K_v: factors on the gains; target: whether the error is to x_d."""
+    """ẍ of the target motion (4), (m,); K_p, K_v: factors on the gains; target: whether the error is x − x_d
+    instead of x."""
     error = level.error if target else next(iter(level.x.values()))
     velocity = level.x_dot - level.x_dot_d[0]
     return level.x_ddot_d[0] - K_v * level.K_v * velocity - K_p * level.K_p * error
@@ -40,7 +41,7 @@ def osf(
     levels: int = 2,
     bias: bool = True,
 ) -> Array:
-    """Operational-space control; arguments: factors, and what is there."""
+    """Operational-space control; the arguments are factors on its terms, or switch parts of it off."""
     M_inv = np.linalg.inv(now.M)
     N, tau = np.eye(now.n), np.zeros(now.n)
     for level in now.levels[::order][:levels]:
@@ -72,7 +73,8 @@ def hierarchy(
     equality: str = "(33)",
     alone: bool = False,
 ) -> Array:
-    """One or two levels of the QP (35), one knot; arguments: factors, and what is there."""
+    """One or two levels of the QP (35), one knot; the arguments are factors on its terms, or switch parts of
+    it off."""
     chosen = now.levels[::order][:levels]
     first: Array | None = None
     found = now.tau_0

@@ -13,17 +13,17 @@ from himpc.controllers.view import View
 
 Law = Callable[[View], Any]
 CLOSE = 1e-6
-"""Share of the largest torque by which two laws may differ and count as the same."""
+"""Share of the largest torque by which the torques of two laws that count as equal may differ."""
 _FIRST, _EVERY = 30, 10
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake that is often made.
+    """A frequent mistake.
 
     Attributes:
         says: one sentence about it.
-        make: a law that makes it, without memory.
+        make: returns a new control law with this mistake, without memory of earlier runs.
     """
 
     says: str
@@ -32,7 +32,7 @@ class Mistake:
 
 @final
 class Diagnosis:
-    """The known mistakes that still fit a submission, run by run."""
+    """The known mistakes whose torques have been equal to those of a submission so far."""
 
     def __init__(self, mistakes: Sequence[Mistake]) -> None:
         self._left = list(mistakes)
@@ -40,7 +40,7 @@ class Diagnosis:
         self._seen = 0
 
     def begin(self) -> None:
-        """Notes that a run begins."""
+        """Called when a run begins."""
         self._laws, self._seen = [each.make() for each in self._left], 0
 
     def see(self, now: View, answer: Any) -> None:
@@ -54,7 +54,7 @@ class Diagnosis:
 
     @property
     def says(self) -> str:
-        """The sentence of the first mistake that fits all that was seen; "" if none does."""
+        """The sentence of the first mistake that fits all compared torques; "" if none fits."""
         return self._left[0].says if self._left else ""
 
 
@@ -67,5 +67,5 @@ def _alike(ours: Any, theirs: Any) -> bool:
 
 
 def wrong(says: str, law: Callable[..., Any], **how: Any) -> Mistake:
-    """A law without memory with something wrong in it."""
+    """A mistake as the control law `law` with the arguments `how`."""
     return Mistake(says, lambda: partial(law, **how))

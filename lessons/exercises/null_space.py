@@ -1,6 +1,6 @@
 """The null-space projection
 
-Two tasks, one arm: how does the second get what the first leaves over, and nothing else?
+Two tasks, one arm: how does the second task use only the freedom that the first one leaves?
 
 Minutes: 30
 You need: Jacobians; exercise "joint-pd"; lesson "two-tasks"
@@ -40,7 +40,7 @@ ROUGH = replace(HOLD, set=HOLD.set[:1], duration=0.5)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "The hand follows its circle although the second task asks it to stay: the first has priority.",
+            "The hand follows its circle although the second task wants it to stay: the first has priority.",
             "the first level does not satisfy (4), or does not have priority",
             HOLD,
             2.5,
@@ -79,14 +79,14 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("the second level is left out", osf, levels=1),
     wrong("J̇q̇ is missing: ẍ = J q̈ + J̇q̇", osf, curvature=0.0),
     wrong("J̇q̇ has the wrong sign: it is taken off ẍ", osf, curvature=-1.0),
-    wrong("the projector is missing: J N, not J, for the level below", osf, projector="none"),
+    wrong("the projector is missing: use J N instead of J for the level below", osf, projector="none"),
     wrong("the projector is transposed: the order of its products is M⁻¹JᵀΛJ", osf, projector="transposed"),
     wrong(
-        "the projector is not dynamically consistent: M⁻¹JᵀΛ, not J⁺, belongs there",
+        "the projector is not dynamically consistent: use M⁻¹JᵀΛ instead of J⁺",
         osf,
         projector="plain",
     ),
-    wrong("what the levels above do to a level is asked for twice: take off J₂M⁻¹τ₁", osf, twice=True),
+    wrong("the effect of the levels above is counted twice: subtract J₂M⁻¹τ₁", osf, twice=True),
     wrong("the bias C q̇ + g is missing", osf, bias=False),
     wrong("the stiffness K_p has the wrong sign", osf, K_p=-1.0),
     wrong("the damping K_v has the wrong sign", osf, K_v=-1.0),
@@ -101,9 +101,9 @@ EXERCISE = Exercise(
     r"(J_2 N_1)^\top \Lambda_{2|1} (\ddot x_2 - \dot J_2 \dot q - J_2 M^{-1} \tau_1)",
     plain="τ = N_n + J₁ᵀ Λ₁ (ẍ₁ − J̇₁q̇) + (J₂N₁)ᵀ Λ₂ (ẍ₂ − J̇₂q̇ − J₂M⁻¹τ₁)",
     hints=(
-        "Λ is the inertia felt at a task: (J M⁻¹ Jᵀ)⁻¹, with the projected Jacobian J N for lower levels.",
-        "The projector is N = I − M⁻¹ Jᵀ Λ J: it takes out of q̈ what the level above uses.",
-        "What the levels above do to x₂ is J₂ M⁻¹ τ₁: it must not be asked for twice.",
+        "Λ is the inertia of a task: (J M⁻¹ Jᵀ)⁻¹, with the projected Jacobian J N for lower levels.",
+        "The projector is N = I − M⁻¹ Jᵀ Λ J: it removes from q̈ the part that the level above uses.",
+        "The levels above accelerate x₂ by J₂ M⁻¹ τ₁: subtract this effect.",
     ),
     lesson="two-tasks",
     checks=checks,

@@ -17,7 +17,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# An M̄ that is no multiple of the unit matrix: a solution without M̄ gives a wrong result.
+# This M̄ is not a multiple of the identity matrix, so that a solution without M̄ gives a wrong result.
 M_BAR = ("M_bar=[0.06,0.03,0.02]", "T_s=0.002")
 ALONE = ("horizon=1", "damping=false", "levels.q1.enabled=false", *M_BAR)
 FREE = RunSpec("planar3-circle", set=ALONE, duration=1.0)
@@ -48,7 +48,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "At the torque bound the torque is the optimum of the QP, not a clipped one.",
-            "it is not the optimum: the bounds must stand in the QP",
+            "it is not the optimum: the bounds must be constraints of the QP",
             WEAK,
             1e-6,
             beside="hiqp",
@@ -56,7 +56,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "At the velocity bound the torque is the optimum.",
-            "the velocity bound (32e) on q̇ + T_s (q̈₀ + M̄⁻¹Δτ), approached at most as fast as `approach` says",
+            "the velocity bound (32e) on q̇ + T_s (q̈₀ + M̄⁻¹Δτ), or its `approach`, is wrong",
             SLOW,
             1e-6,
             beside="hiqp",
@@ -64,7 +64,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "The weights Q and R have the right effect.",
-            "Q weighs the residual, R the increments: both stand in H, Q in f",
+            "Q weighs the residual, R the increments: H contains both, f contains Q",
             HEAVY,
             1e-6,
             beside="hiqp",
@@ -76,7 +76,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
 _law = partial(hierarchy, levels=1)
 
 MISTAKES: tuple[Mistake, ...] = (
-    wrong("the torque is held: nothing is optimised", held),
+    wrong("the torque is constant: no cost is minimised", held),
     wrong("no bound is in the QP", _law, limits="none"),
     wrong(
         "the torque is clipped after the QP instead of bounded in the QP",
@@ -85,10 +85,10 @@ MISTAKES: tuple[Mistake, ...] = (
         limits="afterwards",
     ),
     wrong("f has the wrong sign: f = GᵀQe⁰", _law, f=-1.0),
-    wrong("R is missing: it weighs the increments, and stands in H", _law, R=False),
+    wrong("R is missing: it weighs the increments, and is a part of H", _law, R=False),
     wrong("Q is missing in f = GᵀQe⁰", _law, Q=False),
     wrong(
-        "the desired values are this tick's: (28) is about the next knot, index 1",
+        "the desired values are those of this tick: (28) needs those of the next knot, index 1",
         hierarchy,
         levels=1,
         ahead=0,
@@ -122,7 +122,7 @@ EXERCISE = Exercise(
         "One knot on: ẍ = ẍ₀ + J M̄⁻¹Δτ, ẋ = ẋ₀ + T_s ẍ, x̃ = x̃₀ + T_s ẋ₀ (explicit Euler).",
         "e = (ẍ − ẍ_d) + K_v (ẋ − ẋ_d) + K_p x̃, all desired values one knot ahead: index 1.",
         "G = (1 + K_v T_s) J M̄⁻¹, H = GᵀQG + R, f = GᵀQe⁰.",
-        "A velocity may use at most min(1, approach · T_s) of what is left to its bound in one period.",
+        "In one period a velocity may use at most min(1, approach · T_s) of the distance to its bound.",
     ),
     lesson="torque-has-a-limit",
     checks=checks,

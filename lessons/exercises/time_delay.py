@@ -1,6 +1,6 @@
 """Time-delay estimation
 
-What a robot weighs can be read from what just happened: how, and how well?
+The last torque and acceleration show how heavy a robot is: how, and how accurately?
 
 Minutes: 20
 You need: exercise "joint-pd"; lesson "no-model-needed"
@@ -33,7 +33,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
             "The hand does not sag under an attached load of 3 kg that the controller does not know.",
-            "Ĥ = τ₀ − M̄ q̈₀ is not what it should be",
+            "Ĥ = τ₀ − M̄ q̈₀ is wrong",
             LOADED,
             2.0,
             measure=Measure(ERROR, "last"),
@@ -49,7 +49,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "With friction and a push the arm comes back.",
-            "K_p, K_v or τ₀ is not what the equation says",
+            "K_p, K_v or τ₀ differs from the equation",
             pushed(FRICTION, seed, "link_3", 10.0, at=0.05, plane=True),
             0.05,
             measure=Measure(ERROR, "last"),
@@ -77,12 +77,12 @@ def _late(now: View) -> Any:
 
 
 MISTAKES: tuple[Mistake, ...] = (
-    wrong("the torque is held: the law does not answer to q and q̇", held),
+    wrong("the torque is constant: the law does not depend on q and q̇", held),
     wrong("q̈₀ has the wrong sign in Ĥ = τ₀ − M̄ q̈₀", _law, a=-1.0),
-    wrong("q̈₀ is missing: without it what is asked for is added to what is there already", _law, a=0.0),
+    wrong("q̈₀ is missing: the wanted acceleration is added to the present one", _law, a=0.0),
     wrong("q̈₀ is a difference of velocities that is not divided by T_s", _late),
-    wrong("the model stands where τ₀ belongs", _law, tau="g"),
-    wrong("the model stands where Ĥ belongs: read it from the last tick", _law, tau="g", a=0.0),
+    wrong("the model is used instead of τ₀", _law, tau="g"),
+    wrong("the model is used instead of Ĥ: compute Ĥ from the last tick", _law, tau="g", a=0.0),
     wrong("g(q) is in τ₀ already, and is added again", _law, tau="both"),
     wrong("τ₀ is missing in Ĥ = τ₀ − M̄ q̈₀", _law, tau="none"),
     wrong("M̄ is missing: it turns an acceleration into a torque", _law, M_bar=False),
@@ -99,7 +99,7 @@ EXERCISE = Exercise(
     equation=r"\tau = \tau_0 + \bar M \left(\ddot q_d - K_v \dot{\tilde q} - K_p \tilde q - \ddot q_0\right)",
     plain="τ = τ₀ + M̄ (q̈_d − K_v (q̇ − q̇_d) − K_p (q − q_d) − q̈₀)",
     hints=(
-        "`now.tau_0` is the torque that acted, and `now.q_ddot` the acceleration it gave.",
+        "`now.tau_0` is the last torque, and `now.q_ddot` the acceleration under it.",
         "Ĥ = τ₀ − M̄ q̈₀ contains gravity, friction, loads and the model error of M̄: (9).",
         "Then τ = M̄ q̈_wanted + Ĥ.",
     ),

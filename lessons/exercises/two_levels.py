@@ -1,6 +1,6 @@
 """Two levels
 
-The second wish must not cost the first anything: how does a QP know?
+The second task must not change the result of the first: how does a QP guarantee this?
 
 Minutes: 40
 You need: exercise "one-level-qp"; lesson "inside-the-qp"
@@ -15,7 +15,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# An M̄ that is no multiple of the unit matrix: a solution without M̄ gives a wrong result.
+# This M̄ is not a multiple of the identity matrix, so that a solution without M̄ gives a wrong result.
 SETTINGS = ("horizon=1", "damping=false", "M_bar=[0.06,0.03,0.02]", "T_s=0.002", "q1_amplitude_deg=60")
 FREE = RunSpec("planar3-circle", set=SETTINGS, duration=1.0)
 WEAK = RunSpec("planar3-circle", set=(*SETTINGS, "limits.torque_scale=0.04"), duration=1.0)
@@ -26,7 +26,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
             "Without active bounds the torque is the optimum of both levels.",
-            "a residual, a weight or a level is not what it should be",
+            "a residual, a weight or a level is wrong",
             pushed(FREE, seed, "link_3", 2.0, plane=True),
             1e-6,
             beside="hiqp",
@@ -42,7 +42,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "If the torque is not enough for both levels, the error of level 2 grows.",
-            "it is not the optimum: the bounds must stand in the QP of both levels",
+            "it is not the optimum: the bounds must be constraints in the QP of both levels",
             WEAK,
             1e-6,
             beside="hiqp",
@@ -60,11 +60,11 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
 
 
 MISTAKES: tuple[Mistake, ...] = (
-    wrong("the torque is held: nothing is optimised", held),
+    wrong("the torque is constant: no cost is minimised", held),
     wrong("no bound is in the QP", hierarchy, limits="none"),
     wrong("the equality (33) is missing: a weighted sum is not strict", hierarchy, equality="none"),
-    wrong("J₁ stands where J₁M̄⁻¹ belongs in the equality (33)", hierarchy, equality="without M̄"),
-    wrong("J₁M̄⁻¹Δτ₂ is set to zero: it must be what it is for Δτ₁", hierarchy, equality="zero"),
+    wrong("the equality (33) has J₁ instead of J₁M̄⁻¹", hierarchy, equality="without M̄"),
+    wrong("J₁M̄⁻¹Δτ₂ is set to zero: it must be equal to J₁M̄⁻¹Δτ₁", hierarchy, equality="zero"),
     wrong("the levels are in reverse order: the first one comes first", hierarchy, order=-1),
     wrong(
         "the levels are in reverse order: the first one comes first",
@@ -74,17 +74,17 @@ MISTAKES: tuple[Mistake, ...] = (
     ),
     wrong("the second level is left out", hierarchy, levels=1),
     wrong("f has the wrong sign: f = GᵀQe⁰", hierarchy, f=-1.0),
-    wrong("R is missing: it weighs the increments, and stands in H", hierarchy, R=False),
+    wrong("R is missing: it weighs the increments, and is a part of H", hierarchy, R=False),
     wrong("Q is missing in f = GᵀQe⁰", hierarchy, Q=False),
     wrong(
-        "the desired values are this tick's: (28) is about the next knot, index 1",
+        "the desired values are those of this tick: (28) needs those of the next knot, index 1",
         hierarchy,
         ahead=0,
     ),
     wrong("M̄ is missing in G = (1 + K_v T_s) J M̄⁻¹", hierarchy, M_bar=False),
     wrong("τ₀ is missing: the QP gives increments", hierarchy, alone=True),
     wrong("the velocity bound (32e) is missing", hierarchy, limits="torque"),
-    wrong("the bound (32f) is on Δτ alone, and belongs on τ₀ + Δτ", hierarchy, limits="on the increment"),
+    wrong("the bound (32f) is on Δτ instead of τ₀ + Δτ", hierarchy, limits="on the increment"),
     wrong(
         "the velocity bound is approached at once: `approach` is not used",
         hierarchy,
@@ -100,9 +100,9 @@ EXERCISE = Exercise(
     r"\quad \text{s.t. bounds, } J_1 \bar M^{-1} \Delta\tau_2 = J_1 \bar M^{-1} \Delta\tau_1",
     plain="min ‖e₂‖²_Q + ‖Δτ₂‖²_R, within bounds and with J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁",
     hints=(
-        "Solve level 1 as before. Level 2 is the same QP with rows that keep J₁M̄⁻¹Δτ as level 1 left it.",
+        "Solve level 1 as before. Level 2 is the same QP with rows that keep J₁M̄⁻¹Δτ as in level 1.",
         "In `solve_qp` a row with lower = upper is an equality.",
-        "Safer near singularities: Δτ₂ = Δτ₁ + Z y with Z a basis of what J₁M̄⁻¹ maps to zero (SVD).",
+        "Safer near singularities: Δτ₂ = Δτ₁ + Z y with Z a basis of the null space of J₁M̄⁻¹ (SVD).",
         "Return np.array([now.tau_0 + dtau_1, now.tau_0 + dtau_2]): a row per level, the last one acts.",
     ),
     lesson="inside-the-qp",

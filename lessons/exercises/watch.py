@@ -14,14 +14,14 @@ LOOK = 0.1
 
 @final
 class ProcessDeadline:
-    """One question to a process. What it waits for a core on a busy machine does not count, up to `PATIENCE`
-    times as much in all.
+    """The deadline of one answer of a process. Time that the process waits for a core of a busy machine does
+    not count; with this time, the answer may take at most `PATIENCE` times as long.
 
     Attributes:
-        seconds: that the answer may take.
-        what: is being done, for the beginning of a sentence.
-        began: when it was asked.
-        slept: s that it neither computed nor waited for a core, as far as it was looked at.
+        seconds: time that the answer may take, s.
+        what: the activity, for the beginning of a sentence.
+        began: time at which the request was sent.
+        slept: time up to the last check in which it neither computed nor waited for a core, s.
     """
 
     def __init__(self, pid: int, seconds: float, what: str) -> None:
@@ -32,7 +32,7 @@ class ProcessDeadline:
 
     @property
     def passed(self) -> float:
-        """s since it was asked."""
+        """Time since the request, s."""
         return time.monotonic() - self.began
 
     def over(self) -> bool:

@@ -27,9 +27,9 @@ CONTENDERS: tuple[tuple[Route, Solver], ...] = (
 _LONGEST_EXPLICIT = 20
 """The explicit route is left out beyond this horizon: one step takes seconds there."""
 _TURN = 10
-"""Timed ticks of a contender before it is the turn of the next one: all contenders see the same noise. An
-untimed tick goes before them: at that tick the caches still hold the data of the previous contender, which
-does not happen on a robot.
+"""Number of timed ticks of a contender before the next contender runs; all have the same noise then. An
+untimed tick precedes them: at that tick the caches still hold the data of the previous contender, which does
+not happen on a robot.
 """
 _DRAG_TICKS = 100
 """Ticks from one drag to the next."""
@@ -61,7 +61,7 @@ def bench(
         scene: the scene.
         horizons: horizons N.
         ticks: timed ticks per contender.
-        progress: called with the share that is done.
+        progress: called with the completed share.
     """
     loaded = torque_scene(scene)
     timings = []
@@ -110,7 +110,8 @@ def _spread(times: list[float]) -> dict[str, float]:
 
 
 def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
-    """How many times slower than the compiled route, and ProxQP's QP time over DAQP's, per horizon."""
+    """Per horizon: the step time of each route over that of the compiled route, and ProxQP's QP time over
+    DAQP's."""
     found = {(t.horizon, t.route, t.solver): t for t in timings}
     result = {}
     for N in sorted({t.horizon for t in timings}):

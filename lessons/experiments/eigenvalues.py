@@ -25,11 +25,12 @@ class EigenvalueJob(Work):
     """A run during which the eigenvalues of M⁻¹M̄, M the plant's, are computed at every tick. A target that
     can be dragged jumps by up to 10 cm along each axis every half second.
 
-    Its summary has `rms_mm`, the distance of the TCP from its reference after the first second; `largest`,
-    the largest eigenvalue; `beyond_2`, for how many ticks on end one was above 2.
+    Its summary has `rms_mm`, the RMS distance of the TCP from its reference after the first second;
+    `largest`, the largest eigenvalue; `beyond_2`, the largest number of consecutive ticks with an eigenvalue
+    above 2.
 
     Attributes:
-        payload_later: kg at the flange from 2 s on; None: as before.
+        payload_later: payload at the flange from 2 s on, kg; None: the payload does not change.
     """
 
     payload_later: float | None = None

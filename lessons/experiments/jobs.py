@@ -38,8 +38,8 @@ class Work(ABC):
     """A piece of work whose result is a run.
 
     Attributes:
-        spec: what is run.
-        timed: its purpose is to measure step times; nothing else runs at the same time.
+        spec: the run.
+        timed: whether its purpose is to measure step times; no other work runs at the same time then.
     """
 
     spec: RunSpec
@@ -62,7 +62,7 @@ class Job(Work):
 
 @dataclass(frozen=True, eq=False)
 class JobResult:
-    """What came out of a job: the summary of `himpc-lab run --json` and the rows that plots need.
+    """The result of a job: the summary of `himpc-lab run --json` and the rows that plots need.
 
     A run that failed has an `error`, an empty summary and no arrays; figures of it are NaN.
     """
@@ -82,7 +82,7 @@ class JobResult:
 
     @property
     def controller(self) -> str:
-        """The controller that was asked for, or the scene's own."""
+        """The requested controller, or the scene's own."""
         return self.job.spec.controller or str(self.summary.get("controller"))
 
     @property
@@ -120,7 +120,7 @@ class JobResult:
 
 
 Results = Mapping[Any, JobResult]
-"""By the job."""
+"""The results by job."""
 
 
 def _do(job: Work) -> JobResult:

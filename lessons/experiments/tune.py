@@ -26,7 +26,7 @@ class Trial:
         M_bar: the diagonal tried, kg·m².
         error: RMS of the level-1 error in the second half of the run, m or rad.
         roughness: RMS over joints and ticks of the second half of Δτ over the joint's torque limit.
-        gauge: largest spectral radius of I − M⁻¹M̄ on the way; a tuner with a real robot does not know it.
+        gauge: largest spectral radius of I − M⁻¹M̄ during the run; it is unknown for a real robot.
         verdict: "go on", "too small", "satisfactory", "noisy" or "control lost".
     """
 
@@ -50,10 +50,10 @@ def tune(
     """Remark 4: begin with a sufficiently small M̄; increase it until tracking is satisfactory or the closed
     loop almost shows a noisy response.
 
-    All M̄_i grow together. `chosen` tells which step is the result.
+    All M̄_i grow together. `chosen` returns the step that is the result.
 
     Args:
-        scene: where it is tuned; its M̄ gives the proportions.
+        scene: the scene; its M̄ gives the proportions between the joints.
         start: first factor on the scene's M̄.
         factor: from one step to the next, > 1.
         accuracy: a level-1 error below this, m or rad, is satisfactory.
@@ -62,7 +62,7 @@ def tune(
         seed: seed of the runs.
 
     Raises:
-        InputError: a start, factor, accuracy or noise that leads nowhere.
+        InputError: an invalid start, factor, accuracy or noise.
     """
     for name, value in (("start", start), ("accuracy", accuracy), ("noise", noise)):
         if not (math.isfinite(value) and value > 0):

@@ -1,1 +1,1 @@
-"""The geometry of one tick: what its QPs look like, as plain data to draw."""
+"""The geometry of the QPs of one tick, as plain data to draw."""

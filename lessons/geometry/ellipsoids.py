@@ -23,10 +23,10 @@ class Ellipsoid:
 
     Attributes:
         level, task: names.
-        turns: whether it is of rotation.
+        turns: whether the velocity is a rotational one.
         position: (3,) m, of the frame.
         axes: (3, 3), orthonormal columns, right-handed: the semi-axes' directions in the world.
-        radii: (3,) m/s or rad/s for joints of unit speed, the longest first; 0 where nothing moves.
+        radii: (3,) m/s or rad/s for joints of unit speed, the longest first; 0 in directions without motion.
     """
 
     level: str
@@ -38,9 +38,9 @@ class Ellipsoid:
 
 
 def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
-    """Of every frame task of the levels that are on, highest priority first.
+    """The ellipsoids of all frame tasks of the enabled levels, highest priority first.
 
-    Its axes are the task's own: of a task of x alone there is a needle along x.
+    An ellipsoid has the axes that its task controls: for a task of x alone it is a needle along x.
     """
     n = configuration.q.size
     free, found = np.eye(n), []
@@ -71,6 +71,6 @@ def _axes(J: Array) -> tuple[Array, Array]:
 
 
 def _null_space(A: Array) -> Array:
-    """Orthonormal columns that A (m, d) maps to nothing, (d, d')."""
+    """Orthonormal columns that A (m, d) maps to zero, (d, d')."""
     _, sigma, right = np.linalg.svd(A, full_matrices=True)
     return right[int((sigma > _GONE).sum()) :].T

@@ -24,12 +24,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class TickProblems:
-    """A tick taken apart: the strict hierarchy's problems and solutions, whatever controller ran.
+    """The problems and solutions of the strict hierarchy at one tick, whatever controller ran.
 
     Attributes:
-        plan: what was applied.
+        plan: the plan that was applied.
         problems: the levels' QPs, highest priority first.
-        strict: their solutions one after the other; the plan's own where its controller is strict.
+        strict: their solutions one after the other; those of the plan if its controller is strict.
     """
 
     plan: Plan
@@ -41,20 +41,20 @@ def tick_of(session: TorqueSession) -> TickProblems:
     """The last tick.
 
     Raises:
-        InputError: nothing ran yet, or the controller solves no such QP.
+        InputError: no tick has run yet, or the controller does not solve such QPs.
     """
     controller, plan = session.controller, session.plan
     if isinstance(controller, Handover):
         controller = controller.new
     if not isinstance(controller, HIMPC):
         raise InputError(
-            f"{session.settings.controller} solves no such QP: choose himpc, hiqp, nhimpc or weighted"
+            f"{session.settings.controller} does not solve such QPs: choose himpc, hiqp, nhimpc or weighted"
         )
     if plan is None:
-        raise InputError("Nothing was solved yet: let the robot run, or take a single tick (key T)")
+        raise InputError("No QP was solved yet: let the robot run, or take a single tick (key T)")
     problems = controller.problems
     if len(problems) != len(plan.levels):
-        raise InputError("This tick held the torque: there was nothing to solve")
+        raise InputError("This tick held the torque and solved no QP: let the robot run on")
     strict: Sequence[LevelSolution] = plan.levels
     if isinstance(controller, Weighted):
         strict = solve_problems(problems, plan.rows, {})
@@ -65,10 +65,10 @@ def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shif
     """The last tick cut along the first increments of two joints.
 
     Args:
-        session: whose.
-        joints: which two, counted from 0.
-        through: name of the level whose solution the cut goes through; any other word: what is applied.
-        shift: N·m, by which the other joints' first increments are moved from there.
+        session: the session.
+        joints: the two joints, counted from 0.
+        through: name of the level through whose solution the cut goes; any other word: the applied solution.
+        shift: offset of the other joints' first increments from that solution, N·m.
 
     Raises:
         InputError: there is no such tick, see `tick_of`.
@@ -102,7 +102,7 @@ def matrix_of(session: TorqueSession, level: str) -> Matrix:
 
 
 def _weighted(session: TorqueSession, tick: TickProblems) -> Array | None:
-    """One cost of all tasks, under the same bounds, (N, n) N·m."""
+    """The optimum of one weighted cost of all tasks under the same bounds, (N, n) N·m."""
     if isinstance(session.controller, Weighted):
         return tick.plan.levels[-1].U
     return compromise(tick.problems, tick.plan.rows)

@@ -1,4 +1,4 @@
-"""The Hessian of one level's QP as a picture, with the rows that hold its solution."""
+"""The Hessian of one level's QP as a picture, with the active rows of its solution."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.limits.rows import Kind, Rows
 
 LARGEST = 64
-"""Rows and columns that are shown; of a larger Hessian as many whole knots as fit, the first ones."""
+"""Largest number of rows and columns that are shown; of a larger Hessian, the first knots that fit are
+shown."""
 DECADES = 6
-"""Entries smaller than the largest by more than so many powers of ten look like zero."""
+"""Entries that are smaller than the largest by more than this number of powers of ten look like zero."""
 
 
 @dataclass(frozen=True)
 class ActiveRow:
-    """A bound that holds the solution: the joint, counted from 0, the knot of the increment it acts on first,
-    the limit, its side, and the multiplier's size."""
+    """An active bound: the joint, counted from 0, the knot of the first increment on which it acts, the
+    limit, its side, and the size of its multiplier."""
 
     joint: int
     knot: int
@@ -37,10 +38,11 @@ class Matrix:
     Attributes:
         level: its name.
         joints, knots, shown: n, N, and how many knots are shown.
-        shade: (k, k) int8; sign of the entry times 1 … 100, by its size on a logarithmic scale; 0 is nothing.
+        shade: (k, k) int8; sign of the entry times 1 … 100, by its size on a logarithmic scale; 0 for entries
+            that look like zero.
         largest: the largest entry's size, 1/(N·m)².
-        condition: largest over smallest eigenvalue of the whole.
-        active: bounds that hold the level's solution, of all knots.
+        condition: largest over smallest eigenvalue of the whole Hessian.
+        active: active bounds of the level's solution, of all knots.
     """
 
     level: str

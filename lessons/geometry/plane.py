@@ -1,9 +1,8 @@
 """One tick's QPs cut along the increments of two joints: a box, ellipses, lines and points.
 
-Everything else that a QP decides about (the other joints, later knots) is held where one level's solution has
-it. In that cut the cost of a level is (w − c)ᵀ P (w − c) + least, w = (Δτ_a, Δτ_b) of knot 0 in N·m; the
-bounds are a box, since no row couples two joints; and what (33) leaves is the plane, a line, a point or
-nothing.
+All other variables of a QP (the other joints, later knots) have their values in one level's solution. In that
+cut the cost of a level is (w − c)ᵀ P (w − c) + least, w = (Δτ_a, Δτ_b) of knot 0 in N·m; the bounds are a
+box, since no row couples two joints; and the set that (33) allows is the plane, a line, a point or empty.
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ Array = NDArray[np.float64]
 _HELD = 1e-9
 """N·m: a solution nearer to a cut than this counts as lying in it."""
 _MET = 1e-7
-"""N·m: what rounding may leave of an equality."""
+"""N·m: largest violation of an equality that counts as rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueBox:
-    """lower ≤ w ≤ upper, (2,) N·m, ±inf where nothing bounds; kinds: of the limit at (lower, upper) of each
-    joint, None where there is none."""
+    """lower ≤ w ≤ upper, (2,) N·m, ±inf without a bound; kinds: per joint, the kinds of the limits at (lower,
+    upper), None without a bound."""
 
     lower: Array
     upper: Array
@@ -53,8 +52,8 @@ class Allowed:
     span: Array
 
     def segment(self, box: TorqueBox) -> Array | None:
-        """The ends (2, 2) of a line's part in the box, ±inf where it has none; None if there is no part, or
-        no line."""
+        """The ends (2, 2) of the part of a line that is in the box, ±inf for an end without a bound; None if
+        there is no such part, or if this is not a line."""
         if self.at is None or self.span.shape[1] != 1:
             return None
         low, high = _stretch(self.at, self.span[:, 0], box)
@@ -70,14 +69,15 @@ class LevelCut:
     Attributes:
         name: of the level.
         P: (2, 2), the cost's curvature, 1/(N·m)².
-        centre: (2,) N·m, where the cost is least with no bound and no level above.
+        centre: (2,) N·m, the minimum of the cost without bounds and without levels above.
         least: the cost there.
-        allowed: what the levels above leave.
-        optimum: (2,) N·m, the best allowed point of the box, from this geometry alone; None: there is none.
+        allowed: the set that the levels above leave.
+        optimum: (2,) N·m, the best allowed point of the box, computed from this geometry alone; None if there
+            is none.
         solved: (2,) N·m, the controller's own solution.
-        apart: N·m, how far that solution is from the cut, in directions that the level or one above feels;
-            the optimum is the solution if this is 0.
-        leaves: what (33) leaves to the levels below this one.
+        apart: distance of that solution from the cut, N·m, in directions that change the cost of this level
+            or of one above; if it is 0, the optimum is the solution.
+        leaves: the set that (33) leaves to the levels below this one.
     """
 
     name: str
@@ -91,13 +91,13 @@ class LevelCut:
     leaves: Allowed
 
     def cost(self, w: Array) -> float:
-        """At a point of the plane."""
+        """The cost at a point of the plane."""
         away = w - self.centre
         return float(away @ self.P @ away) + self.least
 
     def ellipse(self, through: Array) -> tuple[float, float, float]:
         """The contour of the cost through a point: its semi-axes (N·m), the longer one first, and the angle
-        of that, rad from the first joint's axis."""
+        from the first joint's axis to the longer one, rad."""
         away = through - self.centre
         values, axes = np.linalg.eigh(self.P)
         radii = np.sqrt(float(away @ self.P @ away) / np.maximum(values, 1e-300))
@@ -124,7 +124,8 @@ class Plane:
 
     @property
     def apart(self) -> float:
-        """N·m, how far geometry and solver are apart, over the levels whose solution lies in the cut."""
+        """The largest distance between the optimum by geometry and the solver's solution, N·m, over the
+        levels whose solution lies in the cut."""
         return max(
             (
                 float(np.abs(level.optimum - level.solved).max())
@@ -146,10 +147,10 @@ def cut(
 
     Args:
         problems: of all levels, highest priority first.
-        rows: the bounds they were solved under.
+        rows: the bounds of these problems.
         increments: U_i of every level, (N, n) N·m.
-        joints: which two.
-        held: (N, n) N·m, where everything else is held.
+        joints: the two joints.
+        held: (N, n) N·m, the values of all other variables.
     """
     pair = list(joints)
     box = _box(rows, pair, held)
@@ -187,7 +188,7 @@ def _cost(problem: LevelProblem, pair: list[int], held: Array) -> tuple[Array, A
     moved = held.copy()
     moved[0, pair] = 0.0
     K = problem.knots
-    # e as it moves with the two increments: (K·m, 2).
+    # ∂e/∂w for the two increments: (K·m, 2).
     G = (problem.C[:K, :, 0, None] * problem.B[0][None]).reshape(-1, held.shape[1])[:, pair]
     Q = np.tile(problem.root_Q**2, K)
     e = problem.residual(moved)[:K].ravel()

@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 
 class TooLong(BaseException):
-    """Ends a call; it is a class that user code does not catch by mistake."""
+    """Ends a call. It is a BaseException, which user code does not catch by mistake."""
 
 
 def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
@@ -28,8 +28,8 @@ def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs:
 @final
 class CallDeadline:
     """Ends calls that take too long, in the main thread of a POSIX system. Computing and sleeping count;
-    waiting for a core on a busy machine does not. How long it waited is asked from the first alarm on, since
-    asking costs as much as a short call.
+    waiting for a core on a busy machine does not. The waiting time is read only after the first alarm, since
+    reading it takes as long as a short call.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -57,7 +57,7 @@ class CallDeadline:
         self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
 
     def _hear(self, _: int, __: FrameType | None) -> None:
-        """The alarm. Raises TooLong, or sets it again."""
+        """Handles the alarm: raises TooLong, or sets the alarm again."""
         if time.thread_time() - self._computed > 0.9 * self._seconds:
             raise TooLong
         now, starved = time.monotonic(), waited(os.getpid())

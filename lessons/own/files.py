@@ -38,7 +38,7 @@ class Source:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the content: two files with the same one do the same."""
+        """SHA-256 of the content; equal digests mean equal content."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     @property
@@ -49,7 +49,7 @@ class Source:
 
 
 def read(path: str) -> Source:
-    """The file. Raises InputError if there is none, or it is no text."""
+    """Reads a file. Raises InputError if it does not exist or is not text."""
     try:
         with open(path, "rb") as file:
             data = file.read(LARGEST + 1)
@@ -65,23 +65,24 @@ def read(path: str) -> Source:
         return Source(path, data.decode())
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}, line {line}: is no text in UTF-8; save it as UTF-8") from None
+        raise InputError(f"{path}, line {line}: is not text in UTF-8; save it as UTF-8") from None
 
 
 def fingerprint(path: str) -> str:
-    """What a file is called and what is in it, e.g. "mine.py@3fa9c1d20b7e". Raises InputError if it cannot be
-    read."""
+    """The name of a file and the first characters of its digest, e.g. "mine.py@3fa9c1d20b7e". Raises
+    InputError if it cannot be read."""
     return f"{Path(path).name}@{read(path).digest[:12]}"
 
 
 def by_name(words: Iterable[str]) -> list[str]:
-    """Words to choose from, of files the name alone: who sends a code is not told where they lie."""
+    """Words to choose from, with file names instead of full paths: a code from another person must not reveal
+    folders of this machine."""
     return [Path(word).name if is_file(word) else word for word in words]
 
 
 def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
-    """The file among several that a fingerprint is of; kind: what it is, and the option that names it. Raises
-    InputError if it is none of them."""
+    """The file with a given fingerprint, among several files; kind: the kind of file, which is also the name
+    of its option. Raises InputError if no file has this fingerprint."""
     name = mark.partition("@")[0]
     alike = [each for each in files if is_file(each) and Path(each).name == name]
     for each in alike:
@@ -89,11 +90,11 @@ def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
             return each
     if alike:
         raise InputError(
-            f"{Path(alike[0]).name} is not the {shortened(name, 60)} that this was made with: its content is "
-            f"another ({fingerprint(alike[0])}, not {shortened(mark, 100)})"
+            f"{Path(alike[0]).name} differs from the {shortened(name, 60)} with which this was made: "
+            f"its content is another, {fingerprint(alike[0])} not {shortened(mark, 100)}; get that file"
         )
     raise InputError(
-        f"this was made with a {kind} of somebody's own, {shortened(mark, 100)}: get that file and add "
+        f"this was made with a user's file of a {kind}, {shortened(mark, 100)}: get that file and add "
         f"--{kind} {shortened(name, 60)}"
     )
 
@@ -124,7 +125,7 @@ def _beside(path: str) -> Iterator[None]:
 
 
 def sentence(path: str, error: BaseException) -> str:
-    """Where in the file an exception came from, and what it says."""
+    """A sentence with the line of the file that raised an exception, and the exception's message."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return f"{path}, line {error.lineno}: {error.msg}"
     steps = traceback.walk_tb(error.__traceback__)
@@ -133,7 +134,7 @@ def sentence(path: str, error: BaseException) -> str:
     if isinstance(error, SystemExit):
         return f"{place}: it ends the program (SystemExit): leave that out"
     if isinstance(error, MemoryError):
-        return f"{place}: it needs more memory than there is"
+        return f"{place}: it needs more memory than is available"
     said = " ".join(str(error).split())
     if isinstance(error, InputError):
         return f"{place}: {shortened(said, 1000)}"

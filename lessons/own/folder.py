@@ -24,28 +24,29 @@ class Folder:
         except (OSError, ValueError):  # "." is gone, or this is no path
             path = None
         if path is None or not path.is_dir():
-            raise InputError(f"--own-files {shortened(name, 100)} is no folder: give one that exists")
+            raise InputError(f"--own-files {shortened(name, 100)} is not a folder: give one that exists")
         return cls(path)
 
     def holds(self, path: str) -> bool:
-        """Whether a path leads to below the folder, whatever links and dots it goes through."""
+        """Whether a path is below the folder after all links and dots are resolved."""
         try:
             return self.path in Path(os.path.realpath(path)).parents
         except ValueError:  # e.g. a zero byte
             return False
 
     def admits(self, name: str) -> str:
-        """The path of a file below the folder, whatever links and dots its name goes through: relative to
-        where the program was started, if it lies there.
+        """The path of a file below the folder, after all links and dots of its name are resolved. The path is
+        relative if the file is below the folder in which the program was started.
 
         Raises:
-            InputError: it leads outside, whether or not there is a file. The sentence is the same for both.
+            InputError: it leads outside the folder. The sentence does not reveal whether there is such a
+                file.
         """
         given = str(self.path / name)
         if not self.holds(given):
             raise InputError(
-                f"{shortened(name, 100)}: only files below the folder that himpc-lab was started in are "
-                "opened from the page, or below another one that it was given by --own-files DIR"
+                f"{shortened(name, 100)}: the page opens only files below the folder in which himpc-lab was "
+                "started, or below the folder of --own-files DIR"
             )
         path, here = Path(os.path.realpath(given)), Path(os.path.realpath(Path.cwd()))
         return str(path.relative_to(here) if path.is_relative_to(here) else path)

@@ -20,7 +20,7 @@ _DEFINES: dict[Kind, str] = {
 
 
 def kind_of(module: ModuleType) -> Kind:
-    """Which of the four a file is. Raises InputError if it defines none of them, or several."""
+    """The kind of a file. Raises InputError if it defines none of the four kinds, or several."""
     path, names = module.__file__, vars(module)
     defined: dict[Kind, bool] = {
         "controller": "torque" in names or "Controller" in names,
@@ -40,14 +40,14 @@ def kind_of(module: ModuleType) -> Kind:
 
 
 def expected(module: ModuleType, kind: Kind) -> None:
-    """Raises InputError if a file is something else."""
+    """Raises InputError if a file is not of the expected kind."""
     found = kind_of(module)
     if found != kind:
         raise InputError(f"{module.__file__}: is a {found}, and a {kind} is needed: {_DEFINES[kind]}")
 
 
 def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
-    """The function that creates the law of a controller's file. Raises InputError if there is none."""
+    """The function that creates the control law of a file. Raises InputError if the file defines none."""
     expected(module, "controller")
     names = vars(module)
     if "Controller" in names:
@@ -62,7 +62,7 @@ def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
 
 
 def line_of(module: ModuleType) -> int:
-    """Where a controller's file begins to compute the torque."""
+    """The number of the first line of the function `torque` in a controller's file."""
     made = vars(module).get("Controller")
     law = vars(module).get("torque") if made is None else getattr(made, "torque", None)
     code = getattr(law, "__code__", None)

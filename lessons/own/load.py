@@ -21,7 +21,7 @@ from lessons.own.files import Source, execute
 from robots import InputError
 
 LONGEST = 10.0
-"""s that loading a file may take, without waiting for a core."""
+"""Time, s, that loading a file may take, without the time that it waits for a core."""
 _REFUSED = ("os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "os.posix_spawn", "os.system",
             "os.spawn", "pty.spawn", "signal.pthread_kill")  # fmt: skip
 _BY_ITSELF = ("subprocess.Popen",)
@@ -32,7 +32,7 @@ _running: ContextVar[str] = ContextVar("_running", default="")
 
 @contextmanager
 def alone(path: str) -> Iterator[None]:
-    """While the code of a file runs in this thread it starts and signals no process: PermissionError."""
+    """Within this context, code in this thread that starts or signals a process raises PermissionError."""
     _watched()
     token = _running.set(path)
     try:
@@ -67,8 +67,8 @@ def load(source: Source, seconds: float = LONGEST) -> ModuleType:
     """The module that a file defines.
 
     Raises:
-        InputError: it cannot be executed, with the line; it takes longer than some seconds by its own doing,
-            starts or signals a process, or replaces what the lab uses, too.
+        InputError: it cannot be executed (the message names the line), computes or sleeps for more than
+            `seconds`, starts or signals a process, or replaces an object that the lab uses, too.
     """
     before, handlers = _shared(), _handlers()
     try:
@@ -117,11 +117,11 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
     return done[0]
 
 
-# ---------------------------------------------------------------- what it replaces
+# ---------------------------------------------------------------- replaced objects
 
 
 def _shared() -> dict[str, dict[str, Any]]:
-    """The functions, classes and modules that the modules of the lab and its libraries name."""
+    """The functions, classes and modules that are attributes of the modules of the lab and its libraries."""
     return {
         name: {key: value for key, value in vars(module).items() if _is_code(value)}
         for name, module in list(sys.modules.items())

@@ -26,8 +26,9 @@ _BROAD = (2.4, 1.0)
 def by_controller(
     runs: Sequence[JobResult], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
 ) -> tuple[PlotCurve, ...]:
-    """A field of several controllers' runs, each in its colour. weights: widths of the first, if there are
-    others, and of the others; the first is broad, so that those that coincide with it leave it visible."""
+    """A field of several controllers' runs, each in its colour. weights: widths of the first curve, if there
+    are others, and of the others; the first is broad, so that it stays visible below curves that coincide
+    with it."""
     shown = [run for run in runs if len(run.t)]
     return tuple(
         curve(
@@ -44,12 +45,12 @@ def by_controller(
 
 
 BAND = 0.05
-"""s: of each such window a band shows the least and the largest value."""
+"""Length of the windows of a band, s. A band shows the least and the largest value in each window."""
 
 
 def banded(panel: Panel) -> Panel:
-    """The panel with each curve as the band between its least and largest value in windows of BAND: what
-    chatters would otherwise be a block of ink."""
+    """The panel with each curve as the band between its least and largest value in windows of BAND; a signal
+    that chatters would otherwise fill an area."""
     return replace(panel, curves=tuple(_band(each) for each in panel.curves))
 
 
@@ -62,7 +63,7 @@ def _band(curve: PlotCurve) -> PlotCurve:
 
 
 def excerpt(panel: Panel, start: float, end: float) -> Panel:
-    """A short piece of a panel's time axis, held values shown as steps."""
+    """The panel for a short interval of time, with values shown as steps."""
     curves = []
     for each in panel.curves:
         inside = (each.x >= start) & (each.x <= end)
@@ -80,14 +81,15 @@ def error_panels(
 
 
 FAINTEST = 1e-4
-"""Of a coordinate's unit: where a logarithmic axis of errors ends."""
+"""Lower end of a logarithmic axis of errors, in the unit of the coordinate."""
 
 
 def log_error_panels(
     runs: Sequence[JobResult], tasks: Sequence[tuple[str, int, str, float]]
 ) -> tuple[Panel, ...]:
-    """The same as sizes on logarithmic axes, as the largest in windows of BAND: small errors are seen too.
-    Of controllers that coincide the earlier is broad."""
+    """The panels of `error_panels` with the largest size of the error in windows of BAND on logarithmic axes,
+    so that small errors are visible, too. The first half of the curves is broad, because others may coincide
+    with them."""
     panels = []
     for panel in error_panels(runs, tasks):
         curves = tuple(
@@ -105,7 +107,7 @@ def _largest(curve: PlotCurve) -> PlotCurve:
 
 
 def spans(t: Array, inside: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """The intervals of time in which something holds; gaps of less than BAND are closed."""
+    """The intervals of time in which `inside` is true; gaps of less than BAND are closed."""
     times = t[inside]
     if not times.size:
         return ()

@@ -55,7 +55,7 @@ def page(found: Found) -> str:
 
 
 def _remembered() -> Measured:
-    """What was stored: a short reproduction does not measure all that the texts tell."""
+    """The stored numbers: a short reproduction does not measure every number of the texts."""
     return {
         (item, quantity): (ours, ratio)
         for item, memory in stored(False).items()

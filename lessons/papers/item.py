@@ -1,4 +1,4 @@
-"""A table or figure of a paper: the runs it needs and what is made of them."""
+"""A table or figure of a paper: the runs that it needs and the section that reports them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from lessons.experiments.jobs import Results, Work
 from lessons.plots.panels import Picture
 
 CLOSE = 0.10
-"""Ours and the paper's agree if their ratio is within this of 1: neither plant nor model error is printed, so
-that nothing closer could be expected of a reading."""
+"""Ours and the paper's number agree if their ratio differs from 1 by at most this. The papers print neither
+plant nor model error, so that a closer agreement cannot be expected."""
 
 TIE = 0.02
-"""An effect that is closer than this to its turning point counts as no effect."""
+"""An effect that is closer to its turning point than this share counts as no effect."""
 
 Verdict = Literal["agrees", "differs", "opposite", "no number", ""]
 Side = Literal["below", "above", "about"]
@@ -26,17 +26,18 @@ class Row:
     """One number of a paper beside ours.
 
     Attributes:
-        quantity: what it is; no two rows of an item have the same.
-        unit: of both.
+        quantity: name of the quantity; it is unique within an item.
+        unit: unit of both numbers.
         paper: the printed value; None: the paper prints none.
-        ours: the measured one; NaN: there is none.
-        why: one sentence for the reader if the two differ, or if there is none to compare.
-        turns_at: for an effect, where it turns into its opposite: 1 for a ratio, 0 for a difference.
-        says: where the paper prints no number but says on which side of `turns_at` it is.
-        within: ours and the paper's agree if their ratio is within this of 1.
-        band: how far ours may be from the stored number, as a share; a machine's times need a wide one.
+        ours: the measured value; NaN: there is none.
+        why: one sentence with the cause if the two differ, or if there is no printed number.
+        turns_at: for an effect, the value at which it turns into its opposite: 1 for a ratio, 0 for a
+            difference.
+        says: the side of `turns_at` that the paper states, if it prints no number.
+        within: the two numbers agree if their ratio differs from 1 by at most this.
+        band: largest deviation from the stored number, as a share; times need a wide band.
         topic: the disagreement (`lessons.papers.topics`) that explains it, if the two do not agree.
-        copied: ours is a setting taken over from the paper, no measurement.
+        copied: whether ours is a setting taken from the paper instead of a measurement.
     """
 
     quantity: str
@@ -81,7 +82,7 @@ class Row:
         return "agrees" if (self.ours < turn) == (self.says == "below") else "opposite"
 
     def _turned(self) -> bool:
-        """Whether an effect is the other way round; one that is none, here or there, cannot be."""
+        """Whether an effect has the opposite direction. If one of the two counts as no effect, it has not."""
         if self.turns_at is None or self.paper is None:
             return False
         theirs, own = self.paper - self.turns_at, self.ours - self.turns_at
@@ -101,7 +102,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table beside the paper's rows: more of ours, or verdicts."""
+    """A further table of an item: more numbers of ours, or verdicts."""
 
     title: str
     columns: tuple[str, ...]
@@ -110,13 +111,13 @@ class Table:
 
 @dataclass(frozen=True)
 class PaperCheck:
-    """A measurable sentence, the number it is about, and whether it holds.
+    """A statement, the number that decides it, and whether it holds.
 
     Attributes:
-        text: the sentence; no two checks of an item have the same.
+        text: the statement; it is unique within an item.
         value: the number.
-        holds: whether it is so.
-        band: how far the number may be from the stored one, as a share; None: it may be anything that holds.
+        holds: whether the statement holds.
+        band: largest deviation from the stored number, as a share; None: every number that holds is allowed.
     """
 
     text: str
@@ -130,10 +131,10 @@ class Section:
     """What an item reports.
 
     Attributes:
-        notes: paragraphs before the tables: how it was run, what the paper leaves open.
+        notes: paragraphs before the tables: the settings of the runs, and data that the paper does not print.
         rows: the paper's numbers beside ours.
         tables: further tables.
-        checks: what must hold; one that does not makes the command's exit code 1.
+        checks: statements that must hold; if one does not hold, the command's exit code is 1.
         pictures: plots.
     """
 
@@ -152,8 +153,8 @@ class Item:
         name: e.g. "himpc-table-2".
         title: one line.
         source: paper and section.
-        jobs: the runs it needs; the argument asks for the quick version.
-        report: the section made of them. A failed run must not stop it: its figures are NaN.
+        jobs: returns the runs that it needs; the argument says whether it is the quick version.
+        report: returns the section with their results. The figures of a failed run are NaN.
     """
 
     name: str
@@ -164,10 +165,10 @@ class Item:
 
 
 def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> PaperCheck:
-    """The check that a value is at most a limit; NaN is not."""
+    """The check that a value is at most a limit; it fails for NaN."""
     return PaperCheck(f"{text} ≤ {limit:g}", value, bool(value <= limit), band)
 
 
 def between(text: str, value: float, low: float, high: float, band: float | None = CLOSE) -> PaperCheck:
-    """The check that a value is within two limits; NaN is not."""
+    """The check that a value is within two limits; it fails for NaN."""
     return PaperCheck(f"{text}, {low:g} to {high:g}", value, bool(low <= value <= high), band)

@@ -13,5 +13,5 @@ def printed(table: str) -> dict[str, Any]:
 
 
 def read(table: str) -> dict[str, Any]:
-    """A values file as it is."""
+    """The content of a file of values."""
     return tomllib.loads((Path(__file__).parent / "values" / f"{table}.toml").read_text(encoding="utf-8"))

@@ -20,7 +20,7 @@ from robots import InputError
 
 @dataclass(frozen=True)
 class Report:
-    """An item with what it reports and the runs that failed or lost control.
+    """An item with its section and the runs that failed or lost control.
 
     Attributes:
         judged: every row and check against the stored numbers.
@@ -45,12 +45,12 @@ class Report:
 def reproduce(
     items: Sequence[Item], quick: bool = False, progress: Callable[[float], None] | None = None
 ) -> list[Report]:
-    """Runs everything the items need, runs they share once, and makes their sections.
+    """Runs everything that the items need, shared runs only once, and makes their sections.
 
     Args:
         items: what to reproduce.
         quick: shorter and fewer runs.
-        progress: called with the share of the runs that is done.
+        progress: called with the completed share of the runs.
     """
     results = perform_all((job for item in items for job in item.jobs(quick)), progress)
     memory = stored(quick)
@@ -88,7 +88,7 @@ def _troubles(item: Item, quick: bool, results: Results) -> list[str]:
 
 
 def write(reports: Sequence[Report], folder: Path, quick: bool) -> None:
-    """Writes report.md, results.json and the pictures. Raises InputError if it cannot."""
+    """Writes report.md, results.json and the pictures. Raises InputError if they cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for report in reports:
@@ -105,7 +105,7 @@ PAGE = "disagreements.md"
 
 
 def write_page(reports: Sequence[Report], folder: Path) -> None:
-    """Writes disagreements.md alone. Raises InputError if it cannot."""
+    """Writes only disagreements.md. Raises InputError if it cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / PAGE).write_text(_page(reports), encoding="utf-8")
@@ -114,7 +114,7 @@ def write_page(reports: Sequence[Report], folder: Path) -> None:
 
 
 def keep(reports: Sequence[Report], quick: bool) -> None:
-    """Stores what was measured. Raises InputError if it cannot be written."""
+    """Stores the measured numbers. Raises InputError if they cannot be written."""
     try:
         store({report.item.name: report.section for report in reports}, quick)
     except OSError as error:
@@ -135,7 +135,7 @@ def _page(reports: Sequence[Report]) -> str:
 
 
 def as_data(reports: Sequence[Report], quick: bool) -> dict[str, Any]:
-    """The reports as JSON-ready data; what is not finite becomes None."""
+    """The reports as JSON-ready data; numbers that are not finite become None."""
     return {"quick": quick, "items": [_item_data(report) for report in reports]}
 
 

@@ -55,7 +55,7 @@ def _number(value: float | None) -> float:
 
 
 def store(sections: Mapping[str, Section], quick: bool) -> None:
-    """Keeps what was measured, item by item; other items stay as they are."""
+    """Stores the measured numbers of some items; the stored numbers of other items do not change."""
     data: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     kept = data.setdefault(_version(quick), {})
     for item, section in sections.items():
@@ -79,11 +79,11 @@ def _short(value: float | None) -> float | None:
 
 
 def judged(section: Section, memory: StoredItem | None) -> tuple[PaperCheck, ...]:
-    """A check for every row and every check of a section: is it, on both sides, what it was?
+    """A check for every row and every check of a section: whether its numbers are equal to the stored ones.
 
-    A row must have the stored verdict and ratio (or, where the paper prints no number, value) within its
-    band; one that does not agree must have a topic that explains it; nothing stored may be missing, and
-    nothing be new. Without a memory there is only the need to explain.
+    A row must have the stored verdict, and the stored ratio (or, if the paper prints no number, the stored
+    value) within its band. A row that does not agree with the paper must have a topic that explains it. No
+    stored number may be missing, and none may be new. Without stored numbers only the topics are checked.
     """
     found = [_explained(row) for row in section.rows if row.verdict in ("differs", "opposite")]
     if memory is None:

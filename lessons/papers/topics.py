@@ -1,4 +1,5 @@
-"""Where we disagree with the papers: what differs, our evidence, the likely cause, how to see it live."""
+"""The disagreements with the papers: the difference, our evidence, the likely cause, and a run that shows
+it."""
 
 from __future__ import annotations
 
@@ -22,11 +23,11 @@ class Quoted:
     """A measured number in a topic's texts.
 
     Attributes:
-        item, row: whose, a quantity of the item's rows.
-        ratio: ours over the paper's instead of ours.
-        less: what is taken from it: 1 turns a ratio into a change.
-        scale: what that is multiplied by, for the unit of the text.
-        form: how it is written, a format of Python.
+        item, row: name of an item, and the quantity of one of its rows.
+        ratio: whether the text has ours over the paper's number instead of ours.
+        less: number that is subtracted from it: 1 turns a ratio into a change.
+        scale: factor for the unit of the text, applied after that.
+        form: a Python format.
     """
 
     item: str
@@ -37,7 +38,7 @@ class Quoted:
     form: str = ".2g"
 
     def words(self, measured: Measured) -> str:
-        """As it stands in the text; "–" for none."""
+        """The number as the text contains it; "–" if it was not measured."""
         ours, ratio = measured.get((self.item, self.row), (math.nan, None))
         value = ratio if self.ratio else ours
         if value is None or not math.isfinite(value):
@@ -48,17 +49,17 @@ class Quoted:
 
 @dataclass(frozen=True)
 class Topic:
-    """One disagreement, or several of one cause.
+    """One disagreement, or several with the same cause.
 
     Attributes:
         name: the key that rows refer to.
         title: one line.
-        evidence: what we measured; {names} stand for `numbers`.
-        cause: what most likely makes the difference; so here.
-        look: what to do and see.
+        evidence: text about our measurements; a {name} is replaced by that number of `numbers`.
+        cause: text about the most likely cause; names are replaced here, too.
+        look: text that says how to see the difference.
         scene, set: the setting that shows it; "" for none.
-        numbers: what is measured, by name.
-        given: the numbers in the texts that are not: a paper's, a setting's.
+        numbers: the measured numbers, by name.
+        given: the numbers in the texts that are not measured, but given by a paper or a setting.
     """
 
     name: str
@@ -72,7 +73,7 @@ class Topic:
     given: tuple[str, ...] = ()
 
     def told(self, measured: Measured) -> Topic:
-        """With the measured numbers in its texts."""
+        """The topic with the measured numbers in its texts."""
         words = {name: each.words(measured) for name, each in self.numbers.items()}
         return replace(self, evidence=self.evidence.format_map(words), cause=self.cause.format_map(words))
 
@@ -84,7 +85,7 @@ class Topic:
 
 @cache
 def topics() -> dict[str, Topic]:
-    """All of them by name, in the file's order."""
+    """All topics by name, in the order of the file."""
     text = Path(__file__).with_name("topics.toml").read_text(encoding="utf-8")
     return {name: _topic(name, each) for name, each in tomllib.loads(text).items()}
 

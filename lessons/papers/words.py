@@ -14,12 +14,12 @@ from lessons.scenes.catalog import load_scene
 
 
 def number(value: float | None) -> str:
-    """Three figures, "–" for none."""
+    """A number with three significant digits, "–" if there is none."""
     return "–" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def tally(rows: Sequence[Row]) -> str:
-    """How many agree, differ and are opposite, in words; "–" for none."""
+    """The numbers of rows that agree, differ and are opposite, in words; "–" if there are none."""
     found = [row.verdict for row in rows]
     counted = [f"{found.count(each)} {words}" for each, words in _VERDICTS.items() if each in found]
     return ", ".join(counted) or "–"
@@ -29,14 +29,15 @@ _VERDICTS: dict[Verdict, str] = {"agrees": "agree", "differs": "differ", "opposi
 
 
 def trouble(run: JobResult) -> str:
-    """Why a run has no figures; "" if it has."""
+    """A sentence about the cause if a run has no figures; "" if it has figures."""
     if run.error is not None:
         return f"could not be run: {run.error}"
     return "" if run.lost_at is None else f"lost control at {run.lost_at:.2f} s"
 
 
 def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:
-    """The stiffness and damping a scene uses beside a table's; NaN if a task's coordinates have several."""
+    """Rows with the stiffness and damping of a scene beside those of a table; NaN if the coordinates of a
+    task have different gains."""
     tasks = {task.name: task for level in load_scene(scene).settings.levels for task in level.tasks}
     rows = []
     for entry in table["tasks"]:

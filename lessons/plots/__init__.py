@@ -1,1 +1,1 @@
-"""Pictures for print and page. The only door to matplotlib; what is drawn is data (`panels`)."""
+"""Pictures for print and page, described as data (`panels`). Only this package imports matplotlib."""

@@ -20,7 +20,7 @@ WIDTH = 7.2
 """Inches: a page between its margins."""
 DPI = 150
 _MARKED = 12
-"""Curves of at most so many points show them."""
+"""A curve with at most this number of points has a marker at each point."""
 _DECADES = 300
 """A logarithmic axis that spans less than this factor has ticks at 1, 2, 5."""
 _TALL = 50
@@ -55,7 +55,7 @@ def draw(picture: Picture, folder: Path) -> Path:
 
 
 def _height(picture: Picture, row: int) -> float:
-    """Inches of a row: equal axes need a square, long time series do not."""
+    """The height of a row in inches: panels with equal axes are square, those with time series are lower."""
     panels = picture.panels[row * picture.columns : (row + 1) * picture.columns]
     if any(isinstance(panel, Panel) and panel.equal for panel in panels):
         return min(4.6, 0.85 * WIDTH / picture.columns)
@@ -82,7 +82,8 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     elif panel.bounds and not panel.log_y:
-        # A curve that stays far inside its bounds must not be squeezed flat by them, nor hide them.
+        # The range is that of the curve, so that distant bounds do not flatten it, but includes bounds
+        # nearby.
         low, high = min(panel.bounds), max(panel.bounds)
         margin = 0.08 * (high - low or abs(high) or 1.0)
         bottom, top = axes.get_ylim()
@@ -160,7 +161,7 @@ def _draw_bars(axes: Axes, panel: Bars) -> None:
 
 
 def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
-    """A logarithmic axis has no place for a bar of no height: it gets a dash."""
+    """Draws a dash for a bar of height zero, which a logarithmic axis cannot show."""
     for place, (_, key, values) in enumerate(panel.series):
         offset = (place - 0.5 * (len(panel.series) - 1)) * width
         for group, value in enumerate(values):
@@ -179,7 +180,7 @@ def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
 
 
 def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:
-    """The label of an axis that all panels of a column share stands below the last one only."""
+    """Removes a label that all panels of a column share from all of them but the last."""
     for column in grid.T:
         shown = [axes for axes in column if axes.axison]
         if len({axes.get_xlabel() for axes in shown}) == 1:

@@ -22,7 +22,7 @@ _HATCHED: dict[str, Any] = {"edgecolor": "#B3261E", "linewidth": 0.0}
 _LOST = {"facecolor": "#F3D9D6", "hatch": "////", **_HATCHED}
 _FAILED = {"facecolor": "#D5D9DE", "hatch": "xxxx", **_HATCHED}
 Marks = tuple[tuple[NDArray[np.bool_], dict[str, Any]], ...]
-"""Cells without a value, and how they are drawn."""
+"""The styles of cells without a value."""
 
 
 def draw_map(
@@ -40,10 +40,10 @@ def draw_map(
 
     Args:
         path: the PNG file.
-        title, metric: headline, and what the colour or the curve shows, with its unit.
-        labels, values, log: per axis: the path, its values, whether they go in equal ratios.
-        z: metric, (n,) or (n_1, n_2); NaN where there is none.
-        diverged, failed: cells that lost control, and that could not be run; shaped as z.
+        title, metric: the headline, and the quantity that colour or curve shows, with its unit.
+        labels, values, log: per axis: the path, its values, whether they have equal ratios.
+        z: metric, (n,) or (n_1, n_2); NaN for a cell without a value.
+        diverged, failed: cells that lost control, and cells that could not be run; same shape as z.
     """
     marks = ((diverged, _LOST), (failed, _FAILED))
     with mpl.rc_context(RC):

@@ -40,17 +40,17 @@ class Panel:
         y_label, x_label: with units.
         curves: drawn in order.
         bounds: horizontal bounds: constants, drawn grey.
-        bound_label: what they are, for the legend; "" for nothing.
-        marks: instants on the x axis, drawn as upright lines.
-        mark_label: what they are, for the legend.
+        bound_label: their name in the legend; "" for none.
+        marks: instants on the x axis, drawn as vertical lines.
+        mark_label: their name in the legend.
         spans: intervals on the x axis, shaded.
-        span_label: what they are, for the legend.
+        span_label: their name in the legend.
         notes: (x, y, text) beside points.
         title: above the panel.
         log_x, log_y: logarithmic axes.
         equal: one metre is as long in x as in y.
-        y_range: fixed range of y; what leaves it is cut, and the picture's caption says so.
-        x_names: what stands at x = 0, 1, … instead of numbers.
+        y_range: fixed range of y; curves are cut at its ends, and the picture's caption says so.
+        x_names: labels at x = 0, 1, … instead of numbers.
     """
 
     y_label: str
@@ -92,7 +92,7 @@ class Picture:
 
     Attributes:
         name: file name without ending.
-        caption: what is seen, in a sentence or two.
+        caption: one or two sentences about the picture.
         panels: row by row.
         columns: panels side by side.
     """

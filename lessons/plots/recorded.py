@@ -17,7 +17,7 @@ _FLOOR = 1e-3  # mm or °
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Rows (k, size) of a run and where their fields lie."""
+    """Rows of a run, (k, size), and the layout of their fields."""
 
     layout: Layout
     rows: Array
@@ -27,12 +27,12 @@ class Recorded:
 
 
 def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) -> Picture:
-    """What the page's plots show, over the whole recording.
+    """The plots of the page, over the whole recording.
 
     Args:
         name: file name without ending.
-        run: what is drawn.
-        ghost: drawn dashed, in the same colours.
+        run: the recorded run.
+        ghost: the recorded ghost, drawn dashed in the same colours.
         T_s: s, the budget of a control step.
     """
     both = [(run, "line")] if ghost is None else [(run, "line"), (ghost, "dashed")]
@@ -69,7 +69,7 @@ def _errors(run: Recorded, style: str) -> list[PlotCurve]:
     curves: list[PlotCurve] = []
     for place, task in enumerate(run.layout.tasks):
         unit, factor = ("mm", 1e3) if task.unit == "m" else ("°", 180 / np.pi)
-        # Below that an error is nothing to look at, and would squeeze what is.
+        # Smaller errors are cut, because they would extend the logarithmic axis too far.
         size = np.maximum(factor * np.linalg.norm(run[f"error/{task.name}"], axis=1), _FLOOR)
         label = f"{task.name} ({unit})" + (", ghost" if style == "dashed" else "")
         curves.append(PlotCurve(run["t"][:, 0], size, label, str(place), style))

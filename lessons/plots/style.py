@@ -17,7 +17,8 @@ CONTROLLER_COLOURS: dict[str, str] = {
     "stmpc": "#E07A00",
     "htidkc": "#009E73",
 }
-"""Distinguishable with the common colour-vision deficiencies and in grey print (by lightness)."""
+"""Colours that can be distinguished with the common colour-vision deficiencies and, by lightness, in grey
+print."""
 
 NAMES: dict[str, str] = {
     "himpc": "HIMPC",

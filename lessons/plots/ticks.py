@@ -11,7 +11,8 @@ _FEW = 8
 
 
 def label_values(axis: Axis, values: Sequence[float], log: bool) -> None:
-    """Ticks at the values themselves if they are few, else at round numbers; written out, not as powers."""
+    """Sets ticks at the values themselves if they are few, otherwise at round numbers, with labels that are
+    plain numbers instead of powers."""
     if 0 < len(values) <= _FEW:
         axis.set_major_locator(FixedLocator(list(values)))
     elif not log and all(float(value).is_integer() for value in values):

@@ -43,19 +43,19 @@ def named(
     how: dict[str, Any],
     events: Iterable[tuple[float, Event]] | None = None,
 ) -> dict[str, Any]:
-    """Every field of telemetry by its name, and what reproduces the run. A field per joint that the run's
-    kind does not know is NaN: no torque bounds at velocity level.
+    """Every field of telemetry by its name, and the data that reproduce the run. A field per joint that does
+    not exist for this kind of run is NaN, such as torque bounds at velocity level.
 
-    What an independent replay needs besides: `q_measured` and `v_measured` (what the controller was given),
-    `tau_0` (the torque, at velocity level the command, that acted until the tick), the `tip`'s frame, `a_max`
-    (n,), and the constants of the position bound: `position_margin` (rad), `position_reaction` (s) and
-    `position_return_rate` (1/s) of `himpc.limits.viability`, NaN where it is not in force. x_d, v_d and
-    a_d at the next knot are those of the next row.
+    For an independent replay there are also: `q_measured` and `v_measured` (the measurements of the
+    controller), `tau_0` (the torque, at velocity level the command, that acted until the tick), the `tip`'s
+    frame, `a_max` (n,), and the constants of the position bound: `position_margin` (rad), `position_reaction`
+    (s) and `position_return_rate` (1/s) of `himpc.limits.viability`, NaN where it is not in force. x_d, v_d
+    and a_d at the next knot are those of the next row.
 
     Args:
-        robot, settings: as they are at the end.
-        layout, rows: (k, size), and where its fields lie.
-        how: what is worth telling of where it came from.
+        robot, settings: those at the end of the run.
+        layout, rows: the layout of the fields, and the rows, (k, size).
+        how: data about the origin of the run, as the user gave them.
         events: (time in s, event) in order; None: not known.
     """
     data: dict[str, Any] = {name: rows[:, where] for name, where in layout.fields.items()}

@@ -17,9 +17,9 @@ from robots import Robot
 
 
 def constants(robot: Robot, settings: SceneSettings) -> dict[str, Any]:
-    """a_max (n,) rad/s² (m/s²), and what the bound on the way to a joint's limit counts with: margin (rad),
-    reaction (s) and return rate (1/s); NaN where that bound is not in force, as it never is at velocity
-    level."""
+    """a_max, (n,) rad/s² (m/s²), and the constants of the bound that stops a joint before its limit: margin
+    (rad), reaction (s) and return rate (1/s); NaN if that bound is not in force. At velocity level it never
+    is."""
     a_max, *bound = _OF[type(settings)](robot, settings)
     names = ("position_margin", "position_reaction", "position_return_rate")
     return {"a_max": np.array(a_max), **dict(zip(names, map(np.array, bound), strict=True))}

@@ -19,11 +19,11 @@ Array = NDArray[np.float64]
 def task_figures(
     recording: Recording, task: TaskInfo, level: int, rows: NDArray[np.bool_] | None = None
 ) -> dict[str, Any]:
-    """How well a task was kept: root mean squares and peaks per coordinate, m or degrees.
+    """The errors of a task: root mean squares and peaks per coordinate, m or degrees.
 
     Args:
         recording: the run.
-        task: which.
+        task: the task.
         level: its place in the stack, 1 the highest.
         rows: (ticks,) of bool, the rows that count; None: all.
     """
@@ -47,7 +47,7 @@ def _rms(error: Array) -> list[float]:
 
 
 def qp_figures(recording: Recording, fallbacks: Sequence[str]) -> dict[str, Any]:
-    """How the QPs went. rungs: what was needed to solve a level, in the order of need."""
+    """Figures about the QPs of a run. fallbacks: the names of the fallbacks, by their code."""
     layout = recording.layout
     counts: Counter[str] = Counter()
     for name in layout.levels:

@@ -25,12 +25,12 @@ def run(
     """Runs a scene from its start to the end of its mission, if it has one, or for its duration.
 
     Args:
-        scene: what to run.
+        scene: the scene.
         duration: simulated seconds at most; None: the scene's own.
         seed: seed of the run.
-        progress: called now and then with the share that is done.
-        to_the_end: go on after the mission is done or control was lost, as the page does; otherwise the run
-            ends there.
+        progress: called from time to time with the completed share.
+        to_the_end: whether to continue after the mission is completed or control was lost, as the page does;
+            otherwise the run ends there.
 
     Returns:
         the rows.
@@ -48,7 +48,7 @@ def record(
     progress: Callable[[float], None] | None = None,
     to_the_end: bool = False,
 ) -> Recording:
-    """Does the same for a session that has begun."""
+    """As `run`, for a session that has begun."""
     rows, elapsed, started = [], 0.0, perf_counter()
     layout = session.layout
     # Half a period's tolerance: a sum of periods carries rounding.
@@ -69,7 +69,7 @@ def record(
 
 
 def checked_duration(seconds: float) -> float:
-    """The same number. Raises InputError if nobody can wait that long."""
+    """Returns the number. Raises InputError unless it is above 0 and at most 3600."""
     if not 0 < seconds <= 3600:
         raise InputError(f"--duration is {seconds} s: give a time above 0 and at most 3600")
     return seconds

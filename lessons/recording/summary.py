@@ -24,7 +24,7 @@ def summary(recording: Recording) -> dict[str, Any]:
     """The run as one JSON-ready object; its keys are the contract of the command line.
 
     Ratios compare with the limit in force at that tick, before any tightening. Numbers that are not
-    finite become None. What differs between torque and velocity level is a block of its own.
+    finite become None. Figures that differ between torque and velocity level are in a block of their own.
     """
     session = recording.session
     step_ms = recording["step_us"][:, 0] / 1e3

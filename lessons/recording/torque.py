@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def block(recording: Recording) -> dict[str, Any]:
-    """The part of `lessons.recording.summary.summary` that is the torque level's."""
+    """The part of `lessons.recording.summary.summary` for the torque level."""
     settings, layout = recording.session.settings, recording.layout
     place = {level.name: index for index, level in enumerate(settings.levels, start=1)}
     tasks = sorted(layout.tasks, key=lambda task: place[task.level])
@@ -40,7 +40,8 @@ def block(recording: Recording) -> dict[str, Any]:
 
 
 def _levels(recording: Recording) -> list[dict[str, Any]]:
-    """Per enabled level its rows, and how many directions it gets where the robot ended."""
+    """Per enabled level the number of its rows, and of the directions that it gets at the robot's final
+    pose."""
     found = recording.session.ranks()
     return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def block(recording: Recording) -> dict[str, Any]:
-    """The part of `lessons.recording.summary.summary` that is the velocity level's."""
+    """The part of `lessons.recording.summary.summary` for the velocity level."""
     session, layout = recording.session, recording.layout
     options, progress = session.settings.options, session.progress
     steps = np.concatenate([recording[f"step/{name}"][:, 0] for name in layout.levels])
@@ -91,6 +91,6 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 
 def _qp_method(settings: VelocitySettings) -> str:
-    """The method that solves the QPs; where the compiled one finds no solution, DAQP is asked."""
+    """The method that solves the QPs. If the compiled method finds no solution, DAQP is tried."""
     solver = settings.htmpc.solver
     return OWN_METHOD if solver == "daqp" and settings.controller != "htidkc" else solver

@@ -33,20 +33,22 @@ Proof = Literal["signed", "not signed", "signed with another key"]
 
 @dataclass(frozen=True)
 class LearnerProgress:
-    """Attributes:
-    seen: per lesson the places of the steps whose run was seen.
-    best: per lesson the best points (0 to 100) of its challenge.
+    """The steps that a learner has seen, and the points of challenges.
+
+    Attributes:
+        seen: per lesson the places of the steps whose run was seen.
+        best: per lesson the best points (0 to 100) of its challenge.
     """
 
     seen: Mapping[str, frozenset[int]] = field(default_factory=dict)
     best: Mapping[str, float] = field(default_factory=dict)
 
     def with_step(self, lesson: str, place: int) -> LearnerProgress:
-        """After a step's run."""
+        """The progress after the run of a step."""
         return replace(self, seen={**self.seen, lesson: self.seen.get(lesson, frozenset()) | {place}})
 
     def with_points(self, lesson: str, points: float) -> LearnerProgress:
-        """After a challenge that was passed; only the best attempt counts."""
+        """The progress after a challenge was passed; only the best attempt counts."""
         return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
 
     def next_place(self, lesson: str, steps: int) -> int:
@@ -55,14 +57,14 @@ class LearnerProgress:
         return next((place for place in range(steps) if place not in seen), 0)
 
     def dumped(self) -> str:
-        """As text."""
+        """The progress as text."""
         return json.dumps(
             {"seen": {name: sorted(places) for name, places in self.seen.items()}, "best": dict(self.best)}
         )
 
 
 def kept(progress: LearnerProgress, key: bytes | None) -> str:
-    """As the browser keeps it."""
+    """The progress in the form that the browser stores."""
     text = progress.dumped()
     return text if key is None else _seal(text.encode(), key) + text
 
@@ -111,10 +113,10 @@ class HandedIn:
     """The text that a learner hands in, as data.
 
     Attributes:
-        name: as the learner wrote it.
-        at: when, ISO 8601.
-        progress: of the lessons.
-        code: of the setting that was on the page then; "" if none could be made.
+        name: name of the learner, as the learner wrote it.
+        at: time, ISO 8601.
+        progress: progress in the lessons.
+        code: state code of the setting on the page at that time; "" if none could be made.
     """
 
     name: str
@@ -124,7 +126,7 @@ class HandedIn:
 
 
 def written(handed: HandedIn, key: bytes | None) -> str:
-    """As a text of letters, digits, "-" and "_"."""
+    """What a learner hands in, as a text of letters, digits, "-" and "_"."""
     given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
     body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))
     text = f"hp{VERSION}{'s' if key is not None else ''}-{body.decode().rstrip('=')}"
@@ -132,17 +134,17 @@ def written(handed: HandedIn, key: bytes | None) -> str:
 
 
 def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
-    """What was handed in, and what its seal tells; without a key a signature cannot be judged, and counts as
-    none.
+    """Reads a text that was handed in, and checks its seal. Without a key a signature cannot be checked, and
+    the text counts as not signed.
 
     Raises:
-        InputError: it is no such text, incomplete or damaged, or a newer version wrote it.
+        InputError: the text is of another kind, incomplete or damaged, or was written by a newer version.
     """
     matched = _HANDED.fullmatch("".join(text.split())) if len(text) <= _LONGEST_TEXT else None
     if matched is None:
         raise InputError(
-            f"this is nothing that was handed in: such a text begins with hp{VERSION}- or hp{VERSION}s- and "
-            "ends with 64 digits and letters; copy all of it"
+            f"this is not a text that the page wrote: such a text begins with hp{VERSION}- or hp{VERSION}s- "
+            "and ends with 64 digits and letters; copy all of it"
         )
     version, signed, body, seal = matched.groups()
     if int(version) != VERSION:
@@ -165,14 +167,15 @@ def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
 
 
 def read_key(path: str) -> bytes:
-    """The key in a file, blanks at its ends aside. Raises InputError if there is none that is long enough."""
+    """Reads the key of a file, without blanks at its ends. Raises InputError if it cannot be read or is too
+    short."""
     try:
         key = Path(path).read_bytes().strip()
     except OSError as error:
         raise InputError(f"--key {path}: cannot be read ({error.strerror})") from None
     if len(key) < LEAST_KEY:
         raise InputError(
-            f"--key {path}: a key has {LEAST_KEY} signs or more; make one with "
+            f"--key {path}: a key has {LEAST_KEY} characters or more; make one with "
             "python -c 'import secrets; print(secrets.token_hex())'"
         )
     return key
@@ -187,4 +190,4 @@ def _plain(text: str) -> str:
 
 
 def _damaged() -> InputError:
-    return InputError("the text is incomplete or was changed on its way: copy all of it again")
+    return InputError("the text is incomplete or was changed: copy all of it again")

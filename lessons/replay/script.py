@@ -20,15 +20,16 @@ Log = Sequence[tuple[float, Event]]
 def script(run: RunSpec, log: Log, duration: float) -> str:
     """A stand-alone script that repeats a run to the last bit on the same machine.
 
-    What was before the last reset is left out: the script begins there, with the settings that were in force.
+    The script begins at the last reset, with the settings that were in force then. Earlier events are left
+    out.
 
     Args:
-        run: what it started from, before anything in the log.
+        run: the run at its start, before all events in the log.
         log: `Session.log`, (time in s, event) of every event that took effect.
         duration: s since the last reset, `Session.t`.
 
     Raises:
-        InputError: it cannot be prepared, or its settings cannot be told as assignments.
+        InputError: the run cannot be prepared, or its settings cannot be written as assignments.
     """
     scene = run.prepared()
     resets = [place for place, (_, event) in enumerate(log) if isinstance(event, Reset)]
@@ -75,7 +76,7 @@ import numpy as np
 '''
 
 _CAUTION = """
-Measured computing times took part in it, so every repetition comes out a little different."""
+Measured computing times changed the run, so every repetition is a little different."""
 
 _IMPORTS = """from lessons import arrays, load_scene, prepared, run, scene_named, summary, with_tasks
 """
@@ -115,7 +116,7 @@ def _tuple(name: str, items: Iterable[str]) -> str:
 
 
 def _call(event: Event) -> str:
-    """An event as the call that makes it; what is as by default is left out."""
+    """An event as the call that makes it, without arguments that have their default value."""
     given = [
         f"{field.name}={_literal(value)}" if place > 1 else _literal(value)
         for place, field in enumerate(fields(event))

@@ -21,7 +21,7 @@ from robots import CATALOG, InputError
 from robots.errors import unknown_name
 
 VERSION = 1
-"""Of the code; it changes when an older himpc-lab could not read it."""
+"""Version of the format; a higher number means that an older himpc-lab cannot read the code."""
 
 MAX_CODE = 12_000
 """Characters: a length that still fits into a link or a chat message."""
@@ -38,9 +38,9 @@ class State:
     """All settings of a run, without its history.
 
     Attributes:
-        run: what differs from the scene's own settings is in its assignments; it has no events and lasts as
-            long as the scene.
-        lesson: name of the lesson that is being taken.
+        run: the run; its assignments contain all differences from the scene's own settings. It has no events
+            and lasts as long as the scene.
+        lesson: name of the active lesson.
         step: its place in the lesson, 1 being the first.
     """
 
@@ -52,15 +52,15 @@ class State:
 def state_of(
     run: RunSpec, settings: SceneSettings, *, lesson: str | None = None, step: int | None = None
 ) -> State:
-    """The state of a scene under settings reached from its own.
+    """The state of a scene whose settings have been changed.
 
     Args:
         run: scene, robot and seed.
-        settings: as they are now.
+        settings: the present settings.
         lesson, step: see `State`.
 
     Raises:
-        InputError: the scene cannot be loaded, or the settings cannot be told as assignments.
+        InputError: the scene cannot be loaded, or the settings cannot be written as assignments.
     """
     files = tuple(filter(is_file, settings.controllers))
     own = RunSpec(run.scene, run.urdf, run.tip, seed=run.seed, files=files, tasks=run.tasks)
@@ -74,15 +74,16 @@ def encode(state: State) -> str:
     """The state as a code that fits into a link: letters, digits, "-" and "_".
 
     Raises:
-        InputError: the robot comes from a file, which a code cannot carry; or it would be too long.
+        InputError: the run needs the file of a robot or a scene, which a code cannot contain; or the code
+            would be too long.
     """
     run = state.run
     if run.urdf is not None and run.urdf not in CATALOG:
         raise InputError(
-            "a code cannot carry a robot from a file: pass on the file and the command line instead"
+            "a code cannot contain a robot from a file: pass on the file and the command line instead"
         )
     if is_file(run.scene):
-        raise InputError("a code cannot carry a scene from a file: pass on file and command line")
+        raise InputError("a code cannot contain a scene from a file: pass on the file and the command line")
     told = run.set if run.controller is None else (assignment("controller", run.controller), *run.set)
     told = tuple(map(_carried, told))
     known = {**vars(run), "set": told, "lesson": state.lesson, "step": state.step}
@@ -95,7 +96,7 @@ def encode(state: State) -> str:
 
 
 def _carried(text: str) -> str:
-    """An assignment as a code carries it: of a file of one's own the name and what tells its content."""
+    """An assignment in the form that a code contains: a user's file is replaced by its fingerprint."""
     path, value = parse_assignment(text)
     if path == "controller" and is_file(value):
         return assignment(path, fingerprint(value))
@@ -116,7 +117,7 @@ def decode(code: str) -> State:
     prepared; nothing in it is executed, and it opens no file.
 
     Raises:
-        InputError: the text is no code, incomplete, changed, or made by a newer version.
+        InputError: the text is not a code, is incomplete or changed, or was made by a newer version.
     """
     body = _body("".join(code.split()))
     try:
@@ -129,7 +130,7 @@ def decode(code: str) -> State:
             raise ValueError
         given = json.loads(text.decode(), parse_constant=_no_constant)
     except (ValueError, binascii.Error, zlib.error, RecursionError):
-        raise InputError("the code is incomplete or was changed on its way: copy all of it again") from None
+        raise InputError("the code is incomplete or was changed: copy all of it again") from None
     return _checked(given)
 
 
@@ -137,14 +138,14 @@ def _body(code: str) -> str:
     found = _PREFIX.match(code)
     if found is None or not re.fullmatch(r"[\w-]+", code, re.ASCII):
         raise InputError(
-            f"this is no state code: one begins with hl{VERSION}- and has no other signs than - and _"
+            f"this is not a state code: one begins with hl{VERSION}- and has only letters, digits, - and _"
         )
     if int(found[1]) > VERSION:
         raise InputError(
             f"the code was made by a newer himpc-lab (format {found[1]}, this one reads {VERSION}): update it"
         )
     if int(found[1]) < 1:
-        raise InputError(f"this is no state code: there is no format {found[1]}, the first one is 1")
+        raise InputError(f"this is not a state code: there is no format {found[1]}, the first one is 1")
     if len(code) > MAX_CODE:
         raise InputError(
             f"the code has {len(code)} characters and at most {MAX_CODE} are allowed: copy it again"
@@ -158,7 +159,7 @@ def _no_constant(constant: str) -> Any:
 
 def _checked(given: Any) -> State:
     if not isinstance(given, dict) or not given.keys() <= set(_KEYS.values()):
-        raise InputError("the code holds something else than a state of himpc-lab: copy it again")
+        raise InputError("the code does not contain a state of himpc-lab: copy it again")
     scene = _text(given, "s", "scene") or ""
     if scene not in SCENES and scene not in VELOCITY_SCENES:
         raise unknown_name("scene", scene, (*SCENES, *VELOCITY_SCENES))
@@ -191,7 +192,7 @@ def _fits(assignments: tuple[str, ...] | list[str]) -> bool:
 
 
 def _wrong(what: str) -> InputError:
-    return InputError(f"the {what} in the code cannot be: copy it again")
+    return InputError(f"the {what} in the code is not valid: copy it again")
 
 
 def _text(given: Mapping[str, Any], key: str, what: str) -> str | None:

@@ -12,8 +12,8 @@ from robots.errors import shortened
 
 
 def check_scene(scene: Scene) -> None:
-    """Raises InputError for a scene that cannot begin, or one of whose events cannot happen; or whatever its
-    own code raises."""
+    """Raises InputError if a scene cannot begin or has an impossible event. Exceptions of the scene's own
+    code are passed on."""
     from lessons.session.start import begin  # a page looks scenes up by name without loading any controller
 
     check_duration(scene.duration)
@@ -42,7 +42,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def check_duration(seconds: Any) -> None:
-    """Raises InputError for what is no number of seconds, more than 0."""
+    """Raises InputError unless `seconds` is a finite number above 0."""
     number = isinstance(seconds, (int, float)) and not isinstance(seconds, bool)
     if not (number and math.isfinite(seconds) and seconds > 0):
         raise InputError(f"duration is {shortened(repr(seconds), 40)}: give seconds, more than 0")

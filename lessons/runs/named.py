@@ -1,4 +1,4 @@
-"""Finds scenes and tasks by name or, if the program was started so, by the path of a file."""
+"""Finds scenes and tasks by name or by the path of a file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from robots import InputError, Robot
 
 TASK_SCENE = "iiwa14-hold"
-"""The scene in which a user's task is tried if no scene is named."""
+"""The scene in which a user's task runs if no scene is named."""
 
 
 def scene_named(
@@ -44,7 +44,7 @@ def scene_named(
 
 @lru_cache(maxsize=64)
 def _scene_of(source: Source) -> Scene:
-    """The scene of a file, tried once per content."""
+    """The scene of a file. Each content of a file is tested only once."""
     module = module_of(source)
     if kind_of(module) == "task":
         return with_task(load_scene(TASK_SCENE), source.path)
@@ -74,7 +74,7 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
     """A scene with the task of a file as a level of its own, below the first one.
 
     Raises:
-        InputError: the file cannot be used, the scene takes velocities, or the Jacobian is not the task's.
+        InputError: the file cannot be used, the scene takes velocities, or the task's Jacobian is wrong.
     """
     scene = as_torque_scene(scene, "a task of your own")
     source, task = read(name), task_in(name)
@@ -88,23 +88,23 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
     """The scene with the tasks of files added to the kinds that its stack may name, if it takes torques.
 
     Raises:
-        InputError: a file cannot be used, or its Jacobian is not the task's.
+        InputError: a file cannot be used, or the task's Jacobian is wrong.
     """
     return with_files(scene, (), files)
 
 
 def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -> Scene:
-    """The scene with users' files attached: those that its controller may be, and those of tasks that its
-    stack may name. A scene at velocity level takes no files.
+    """The scene with users' files attached: files of controllers that it may use, and files of tasks that its
+    stack may name. A scene at velocity level cannot have files.
 
     Raises:
-        InputError: the file of a task cannot be used, or its Jacobian is not the task's.
+        InputError: the file of a task cannot be used, or the task's Jacobian is wrong.
     """
     return attached(scene, controllers, {name: _task_for(scene.robot, name) for name in tasks})
 
 
 def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
-    """By file, the error of its task on a robot."""
+    """Per file whose task cannot be used on a robot, the sentence of the error."""
     found = {}
     for name in files:
         try:
@@ -123,7 +123,7 @@ def _task_for(robot: Robot, name: str) -> Task:
 
 def check_task(task: Task, robot: Robot, name: str) -> None:
     """Raises InputError if value, error, Jacobian and coordinates of a task do not fit together."""
-    Level((task,))  # which looks at its gains
+    Level((task,))  # raises InputError for invalid gains
     rng = np.random.default_rng(0)
     data, h, m = robot.model.createData(), 1e-6, len(task.coordinates(robot))
     low, high = np.maximum(robot.q_lower, -1.5), np.minimum(robot.q_upper, 1.5)
@@ -167,7 +167,7 @@ def _module_of(source: Source) -> ModuleType:
 
 
 def called(source: Source, function: Callable[[], Any]) -> Any:
-    """function(), which runs code of the file. Raises InputError, with the line, for whatever goes wrong."""
+    """Calls a function that runs code of the file. Raises InputError, with the line, for every exception."""
     try:
         with alone(source.path):
             return function()

@@ -58,13 +58,14 @@ def load_scene(
         urdf_text: a URDF's text instead of its path (uploads).
 
     Raises:
-        InputError: unknown scene, a URDF where none fits or none where one is needed, or a bad one.
+        InputError: unknown scene, a URDF for a scene with its own robot, no URDF for "hold", or an invalid
+            one.
     """
     if name not in ALL_SCENES:
         raise unknown_name("scene", name, ALL_SCENES)
     if name == "hold":
         if urdf is None and urdf_text is None:
-            raise InputError("scene 'hold' needs a robot: add --urdf FILE.urdf, or take iiwa14-hold")
+            raise InputError("scene 'hold' needs a robot: add --urdf FILE.urdf, or choose iiwa14-hold")
         return hold(urdf, tip, urdf_text)
     if urdf is not None or urdf_text is not None or tip is not None:
         raise InputError(f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf and --tip")
@@ -72,12 +73,13 @@ def load_scene(
 
 
 def torque_scene(name: str, urdf: str | None = None, tip: str | None = None) -> TorqueScene:
-    """A torque-level scene by its name. Raises InputError also for one of the other kind."""
+    """A torque-level scene by its name. Raises InputError also for a velocity-level scene."""
     return as_torque_scene(load_scene(name, urdf, tip), "this")
 
 
 def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
-    """The scene itself. Raises InputError if it is of the other kind; `what` needs torques."""
+    """The scene itself. Raises InputError if it is a velocity-level scene; the message says that `what` needs
+    torques."""
     if not isinstance(scene, TorqueScene):
         raise InputError(
             f"scene '{scene.name}' is driven by velocities; {what} takes torques: choose e.g. iiwa14-hold"
@@ -86,8 +88,8 @@ def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
 
 
 def attached(scene: Scene, controllers: Iterable[str], tasks: Mapping[str, Task]) -> Scene:
-    """The scene, whose controllers now include those of files, and whose stack may name tasks of one's own by
-    the path of their file, if it takes torques."""
+    """The scene with users' files attached, if it takes torques: its controller may be one of `controllers`,
+    and its stack may name `tasks` by the path of their file."""
     if not isinstance(scene, TorqueScene):
         return scene
     settings = admitted(scene.settings, controllers)
@@ -118,7 +120,7 @@ def admitted(settings: AnySettings, files: Iterable[str]) -> AnySettings:
     """The settings with Python files, given by whoever started the program, that may be their controller.
 
     Raises:
-        InputError: the scene takes velocities, and a controller of one's own gives torques.
+        InputError: the scene takes velocities, but a user's controller gives torques.
     """
     files = tuple(each for each in files if is_file(each))
     if not files:

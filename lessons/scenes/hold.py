@@ -37,7 +37,7 @@ def hold(
     """The hold scene of any robot: a URDF path, a catalog name or a URDF's text; within: as of `load_robot`.
 
     Raises:
-        InputError: the URDF cannot be used, or the tip is no frame of it.
+        InputError: the URDF cannot be used, or it has no frame with the name of the tip.
     """
     robot = load_urdf_text(urdf_text, tip) if urdf_text is not None else load_robot(str(urdf), tip, within)
     plant = PLANAR3_PLANT if robot.name == "planar3" else PlantSettings()
@@ -64,7 +64,7 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
 
 
 def gains(robot: Robot, plant: PlantSettings, T_s: float = 1e-3) -> tuple[float, float]:
-    """K_p and K_v = 2√K_p (critical damping) that suit how fast the robot's M̄ lets the loop follow.
+    """K_p and K_v = 2√K_p (critical damping) that suit the bandwidth which the robot's M̄ allows.
 
     Time-delay estimation delivers a wanted acceleration with a lag of about T_s/λ_min(M⁻¹M̄); with it (4)
     becomes a third-order loop, well damped while √K_p is at most half of that rate. Never above 10 1/s.
@@ -77,7 +77,7 @@ def gains(robot: Robot, plant: PlantSettings, T_s: float = 1e-3) -> tuple[float,
 
 
 def _free_axes(robot: Robot) -> tuple[str, str]:
-    """World axes the tip can move along and turn about at all: a planar arm has no z."""
+    """The world axes along which the tip can move, and about which it can turn: a planar arm has no z."""
 
     def movable(task: type[FramePosition] | type[FrameOrientation], axis: str) -> bool:
         return freedom_left(robot, (Level((task(name="probe", axes=axis),)),)) < robot.n

@@ -33,9 +33,9 @@ NOMINAL = NominalSettings(
 """The nominal model: masses and inertias are 20 % too small, friction is unknown."""
 
 CONFLICT_LIMITS = Limits(velocity_approach=8.0)
-"""Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other, and
-level 1 errs less if it may come up to them less fast than with the default: `himpc-lab reproduce
-himpc-table-3` measures it with 0, 8 and 15 1/s."""
+"""Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other. The
+error of level 1 is smaller if the arm approaches the bounds less fast than with the default: `himpc-lab
+reproduce himpc-table-3` measures it with 0, 8 and 15 1/s."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class CircleOptions(SceneOptions):
     """RT1 and RT2: the EE's circle with q₁ swinging once meanwhile.
 
     Attributes:
-        q1_amplitude_deg: how far q₁ swings and comes back, degrees.
+        q1_amplitude_deg: angle by which q₁ swings before it returns, degrees.
     """
 
     q1_amplitude_deg: Annotated[float, Range(-360.0, 360.0)]
@@ -126,7 +126,7 @@ def planar3_circle() -> TorqueScene:
 
 
 def planar3_conflict() -> TorqueScene:
-    """`planar3-conflict`, RT2: q₁ is asked to swing by −120°, from where the circle cannot be reached.
+    """`planar3-conflict`, RT2: the reference of q₁ swings by −120°, where the circle is out of reach.
 
     Else as `planar3-circle`, with velocity bounds approached more slowly. The paper prints no amplitude; −60°
     and 170° conflict too (`q1_amplitude_deg`). The plant applies any torque, so that the demand of a

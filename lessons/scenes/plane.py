@@ -1,4 +1,4 @@
-"""A scene whose whole QP fits on a sheet of paper: two joints matter, one knot ahead."""
+"""A scene whose whole QP can be drawn in a plane: the increments of two joints, one knot ahead."""
 
 from __future__ import annotations
 

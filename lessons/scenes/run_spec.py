@@ -57,8 +57,8 @@ class RunSpec:
         return with_files(scene, self.files, self.tasks)
 
     def prepared(self, bare: Scene | None = None) -> Scene:
-        """The scene with everything in place but the seed. Raises InputError with one sentence for an invalid
-        run. bare: as for `loaded`.
+        """The scene with controller, assignments, events and duration of the run. Raises InputError with one
+        sentence for an invalid run. bare: as for `loaded`.
         """
         from lessons.scenes.catalog import prepared
 
@@ -79,7 +79,7 @@ class RunSpec:
         return replace(self.but(*assignments), tasks=(*self.tasks, *dict.fromkeys(map(_unquoted, words))))
 
     def command_line(self) -> str:
-        """The line for a shell that does it; events cannot be told there."""
+        """The command for a shell that repeats the run without its events."""
         controller, assignments = self.controller, list(self.set)
         if controller is None and assignments and assignments[0].startswith("controller="):
             controller = assignments.pop(0).partition("=")[2]
@@ -96,7 +96,7 @@ class RunSpec:
 
 
 def _unquoted(word: str) -> str:
-    """The text of a JSON string; what is not one is left for the stack to refuse."""
+    """The text of a JSON string; other texts are returned unchanged, and `read_stack` refuses them."""
     try:
         return json.loads(word)
     except ValueError:

@@ -24,23 +24,23 @@ SIDE = 0.12
 START_S, EDGE_S = 0.3, 1.2
 """s until it starts, and for each edge."""
 _SCRIPT_S = 0.05
-"""s between two places that the script puts the tray's target to."""
+"""s between two targets of the tray in the script."""
 PLANT = PlantSettings(armature=0.1)
 """Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without armature, the inertia of
 an empty gripper is so small that no constant M̄ suits both the wrist and the shoulder.
 """
 NOMINAL = NominalSettings(armature=0.1)
 """M̄ includes the armature, and so do the models of OSF and HQP. The URDF alone gives the last wrist joint
-6e-4 kg·m²: its motor then gets 1/180 of the torque that (4) asks for, and swings around its target with 7 %
-of critical damping (2° after 4 s)."""
+6e-4 kg·m²: its motor then gets 1/180 of the torque that (4) requires, and the joint oscillates around its
+target with 7 % of critical damping (2° after 4 s)."""
 _M_BAR = (0.21, 0.87, 0.143, 0.242, 0.118, 0.134, 0.11) * 2
-"""0.9 of the least 1/(M⁻¹)ᵢᵢ over the work space with that: the loop is stable everywhere."""
+"""0.9 times the least 1/(M⁻¹)ᵢᵢ over the work space with this armature: the loop is stable everywhere."""
 _APART = 0.15
-"""m by which the left hand is asked away from the right one."""
+"""Distance, m, by which the target of the left hand is moved away from the right one."""
 
 
 def baxter_hold() -> TorqueScene:
-    """`baxter-hold`: where both hands are, then how they are turned, then the posture."""
+    """`baxter-hold`: positions of both hands, then their orientations, then the posture."""
     robot, K_p, K_v = _robot()
     levels = (
         Level(
@@ -58,7 +58,7 @@ def baxter_hold() -> TorqueScene:
         Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
     )
     return _scene(
-        robot, "baxter-hold", "Baxter: drag both hands; where they are comes before how they turn", levels
+        robot, "baxter-hold", "Baxter: drag both hands; their positions come before orientations", levels
     )
 
 
@@ -89,8 +89,8 @@ def baxter_tray() -> TorqueScene:
 
 
 def baxter_conflict() -> TorqueScene:
-    """`baxter-conflict`: the hands hold on to each other (level 1), the right one stays (level 2), and the
-    left one is asked away (level 3), which it cannot have."""
+    """`baxter-conflict`: the hands keep their relative pose (level 1), the right one stays (level 2), and the
+    target of the left one (level 3) is elsewhere and cannot be reached."""
     robot, K_p, K_v = _robot()
     levels = (
         Level(_grip(K_p, K_v)),
@@ -100,7 +100,7 @@ def baxter_conflict() -> TorqueScene:
     )
     away = _place(robot, LEFT) + np.array([0.0, _APART, 0.0])
     events = ((0.5, MoveTarget("left", tuple(away.tolist()))),)
-    title = "Baxter: hands that hold on to each other are wanted in two places"
+    title = "Baxter: the hands keep their relative pose, but have targets at two different places"
     return _scene(robot, "baxter-conflict", title, levels, events)
 
 

@@ -19,10 +19,10 @@ HANDOVER_SECONDS = 0.3
 
 
 class Handover:
-    """Two controllers at work, the torque going over from one to the other: τ = (1 − s) τ_old + s τ_new.
+    """Runs two controllers and changes the torque from one to the other: τ = (1 − s) τ_old + s τ_new.
 
-    s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. A controller that computes its torque from a model
-    disagrees with the one before by its model's error; the blend spreads that step. Both see the measured
+    s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. The torques of two controllers differ, for example by
+    the error of a model; the blend spreads this step over time. Both see the measured
     state and the torque that really acted, so each closes its own loop all the time, and their blend lies
     within the torque bounds if both torques do. Evidence and prediction are the new controller's.
     """
@@ -40,7 +40,7 @@ class Handover:
 
     @property
     def done(self) -> bool:
-        """Whether the new controller is on its own."""
+        """Whether only the new controller still acts."""
         return self._old is None
 
     def reset(self, tau_0: Array) -> None:
@@ -49,7 +49,8 @@ class Handover:
         self.new.reset(tau_0)
 
     def configure(self, settings: Settings) -> None:
-        """Both take the settings. If they do not fit the new controller: InputError, and nothing changes."""
+        """Gives the settings to both. Raises InputError, without any change, if they do not fit the new
+        one."""
         self.new.configure(settings)
         if self._old is not None:
             try:

@@ -18,14 +18,14 @@ from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
 LONGEST_TICK = 0.5
-"""s that one call may take itself, sleep included; a control period is a millisecond or a few."""
+"""Time, s, that one call may compute or sleep; a control period is one or a few milliseconds."""
 
 
 def controller_of(settings: TorqueSettings, robot: Robot) -> Controller:
     """The controller that settings name.
 
     Raises:
-        InputError: unknown name, a file that is none, or settings that do not fit the robot.
+        InputError: unknown name, a file without a controller, or settings that do not fit the robot.
     """
     wanted = settings.for_controller()
     if not is_file(settings.controller):
@@ -40,7 +40,7 @@ def controller_of(settings: TorqueSettings, robot: Robot) -> Controller:
 
 
 def _guarded(source: Source, watch: CallDeadline, function: Callable[..., Any], *args: Any) -> Any:
-    """function(*args), at most LONGEST_TICK. Raises OwnFault, with the line, for whatever goes wrong."""
+    """Calls function(*args) for at most LONGEST_TICK. Raises OwnFault, with the line, for every exception."""
     try:
         with alone(source.path):
             return watch.call(function, *args)

@@ -26,8 +26,8 @@ class DelayedTorque:
         """The torque that this tick applies, (n,) N·m.
 
         Args:
-            tau: what the controller found for this tick, (n,) N·m.
-            late: whether it found it after the deadline.
+            tau: the controller's torque for this tick, (n,) N·m.
+            late: whether it was ready only after the deadline.
             before: the torque that acted until now, (n,) N·m; held if this is the first tick.
         """
         if not late:

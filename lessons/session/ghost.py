@@ -29,13 +29,12 @@ def ghost_scene(scene: Scene, leader: SceneSettings, own: Sequence[str]) -> Scen
     Raises:
         InputError: the assignments do not fit the scene.
     """
-    # What the scene's own script does is in the leader's log.
+    # The events of the scene's own script are in the leader's log.
     return replace(_with(scene, leader, own), events=())
 
 
 class GhostDriver:
-    """Runs a ghost's session up to where the leader is, and applies each event at the same tick as the
-    leader.
+    """Runs a ghost's session up to the leader's time, and applies each event at the same tick as the leader.
 
     The ghost's settings are, at any time, the leader's with its own assignments on top: if the leader changes
     a setting that the ghost assigns itself, the ghost does not change; every other change applies to the
@@ -56,7 +55,7 @@ class GhostDriver:
 
     @property
     def behind(self) -> float:
-        """s by which the ghost is behind the leader."""
+        """Time by which the ghost is behind the leader, s."""
         return max(0.0, self._until - self.session.t)
 
     def hear(self, script: Iterable[tuple[float, Event]], until: float) -> None:
@@ -112,7 +111,7 @@ def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...
         the ghost's.
 
     Raises:
-        InputError: an assignment sets more than one value, or fits nothing here.
+        InputError: an assignment sets more than one value, or has an unknown path.
     """
     given = [parse_assignment(text) for text in own]
     places = settings.places()

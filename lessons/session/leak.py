@@ -18,7 +18,7 @@ def dynamic_leak(M: Array, done: AtOnce) -> float:
 
     Args:
         M: the plant's mass matrix, (n, n).
-        done: at least two levels; their increments stand for τ_{≤p}.
+        done: at least two levels, with the increments τ_{≤p} − τ₀ of each.
     """
     first = done.increments
     acceleration = np.linalg.solve(M, (first[-1] - first[:-1]).T).T
@@ -27,10 +27,10 @@ def dynamic_leak(M: Array, done: AtOnce) -> float:
 
 
 def at_once(plan: Plan, stack: Stack, configuration: Configuration) -> AtOnce:
-    """`Plan.at_once` for a controller that does not tell.
+    """`Plan.at_once` for a controller whose plan does not have it.
 
     Args:
-        plan: its levels are all that is read.
+        plan: only its levels are used.
         stack: the levels' tasks.
         configuration: the plant's true positions.
     """

@@ -8,7 +8,8 @@ from himpc.telemetry import Layout
 
 
 class Places(NamedTuple):
-    """Where the fields that a session writes stand in a row; what the plant's M tells stands side by side."""
+    """The indices of the fields that a session writes into a row; values that need the plant's M are
+    adjacent."""
 
     t: int
     late: int
@@ -21,7 +22,7 @@ class Places(NamedTuple):
 
     @classmethod
     def of(cls, layout: Layout) -> Places:
-        """Those of a layout."""
+        """The indices in a layout."""
         fields = layout.fields
         start = fields["dynamic_leak"].start
         joints = (fields[name] for name in cls._fields[3:])

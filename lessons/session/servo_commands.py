@@ -1,4 +1,4 @@
-"""The velocity commands of one control period, as the servos get them."""
+"""The velocity commands that the servos get during one control period."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from himpc.htmpc import VelocityPlan
 Array = NDArray[np.float64]
 
 COMMAND_HZ = 100.0
-"""How often the servos get a new velocity, as on the authors' robot."""
+"""Rate at which the servos get a new velocity, 1/s, as on the authors' robot."""
 
 
 def command_step(period: float) -> tuple[int, float]:
@@ -20,18 +20,18 @@ def command_step(period: float) -> tuple[int, float]:
 
 
 class Commands:
-    """A plan on its way to the servos.
+    """The commands of a plan during one control period.
 
     Attributes:
         plan: the plan.
-        period: s, for which it is carried out.
-        h: s between two commands.
-        last: the last command given, (n,) rad/s (m/s).
+        period: the time for which the plan is carried out, s.
+        h: time between two commands, s.
+        last: the last command, (n,) rad/s (m/s).
         sharpest: the largest |acceleration| so far, (n,) rad/s² (m/s²).
     """
 
     def __init__(self, plan: VelocityPlan, period: float, before: Array) -> None:
-        """before: the command given last, (n,)."""
+        """before: the last command of the previous period, (n,)."""
         self.plan, self.period = plan, period
         self._count, self.h = command_step(period)
         self._given = 0

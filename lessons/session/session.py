@@ -22,18 +22,18 @@ LOST_SPEED = 20.0
 
 
 class Session(ABC):
-    """One learner's run. `tick` advances one control period, `advance` the smallest step there is; events
+    """One learner's run. `tick` advances one control period, `advance` the smallest possible step; events
     wait in the mailbox until a period begins.
 
     Attributes:
-        scene: what it started from.
+        scene: the scene that it started from.
         seed: seed of the run; all randomness comes from it.
         robot: the scene's robot.
         settings: the settings in force.
-        layout: where the fields of a row lie.
+        layout: the indices of the fields of a row.
         plant: the simulation.
         diverged_at: simulated time at which control was lost, s; None if it was not.
-        failure: one sentence on why the user's code no longer controls the robot; None as long as it does.
+        failure: one sentence if the user's code no longer controls the robot; None as long as it does.
         notices: sentences for the learner (refused events, divergence); drain them.
         log: (time, event) of every event that took effect.
     """
@@ -92,7 +92,7 @@ class Session(ABC):
         self._script = deque(self.scene.events)
 
     def _lost(self, t: float, notice: bool = True) -> None:
-        """Control was lost at t."""
+        """Called when control was lost, at time t, s."""
         if notice:
             self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
         self.diverged_at = t
@@ -139,7 +139,7 @@ class Session(ABC):
         """Takes over settings of the scene's kind at once, as an event that changed them would. Raises
         InputError if they do not fit."""
 
-    # ---------------------------------------------------------------- what is there to see
+    # ---------------------------------------------------------------- state for the page
 
     @property
     def settings_now(self) -> SceneSettings:
@@ -148,4 +148,4 @@ class Session(ABC):
 
     @abstractmethod
     def binding(self) -> list[Binding]:
-        """The constraints that bind in the last plan."""
+        """The active constraints of the last plan."""

@@ -45,10 +45,11 @@ def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
 
 
 def carried(old: Task, reference: Reference, task: Task, value: Array) -> Reference:
-    """The reference of a task that took the place of an old one of its name, without a jump.
+    """The reference of a task that replaces an old task of its name, without a jump.
 
-    A task about the same thing keeps it. One that controls other axes of the same has its target where the
-    hand put it along the axes that stay, and where the robot is along those that are new.
+    A task that controls the same coordinates keeps the reference. If the task controls other axes of the same
+    frame, its target keeps its value along the axes that remain, and has the robot's present value along the
+    new axes.
     """
     if essence(old) == essence(task):
         return reference
@@ -73,14 +74,14 @@ def move_target(
     """Moves a task's target: position, point or distance (m), quaternion (x y z w) or joints (rad).
 
     Raises:
-        InputError: no such task, a reference that is no target, or a value that does not fit the task.
+        InputError: no such task, a reference that cannot be moved, or a value that does not fit the task.
     """
     if name not in tasks:
         raise unknown_name("task", name, tasks)
     target = references.get(name)
     if not isinstance(target, Target):
         raise InputError(
-            f"the target of task '{name}' follows a fixed motion in this scene: take a hold scene"
+            f"the target of task '{name}' follows a fixed motion in this scene: choose a hold scene"
         )
     array = np.array(value, float)
     if not np.isfinite(array).all():

@@ -40,7 +40,7 @@ LOST_POSITION = 0.5
 
 
 class Given(NamedTuple):
-    """What a controller was given at a tick: the measured state, (n,) each, and the references' previews."""
+    """The inputs of a controller at a tick: the measured state, (n,) each, and the references' previews."""
 
     q: Array
     v: Array
@@ -53,7 +53,7 @@ class TorqueSession(Session):
 
     Attributes:
         plan: the last plan, None before the first tick.
-        given: what it was made from.
+        given: the inputs from which the controller computed it.
     """
 
     scene: TorqueScene
@@ -116,8 +116,8 @@ class TorqueSession(Session):
         }
 
     def _references_for(self, stack: Stack) -> dict[str, Reference]:
-        """The references that go on under another stack: what is new, or about something else, is held where
-        it is now. A task that was renamed takes its target along."""
+        """The references under another stack. A task that remains or was only renamed keeps its reference;
+        new tasks, and tasks that control something else now, hold their present values."""
         here = Configuration(self.robot, self._data, self.plant.q, self.plant.v)
         old = {task.name: task for task in _tasks(self.settings.levels)}
         new = {task.name for task in _tasks(stack)}
@@ -157,7 +157,7 @@ class TorqueSession(Session):
                 move_target(tasks, self.references, task, value)
             case Push(body, force, torque, seconds):
                 if not (math.isfinite(seconds) and seconds > 0):
-                    raise InputError(f"a push of {seconds} s cannot be: give a time above 0")
+                    raise InputError(f"a push cannot last {seconds} s: give a time above 0")
                 try:
                     self.plant.push(body, np.array(force), np.array(torque))
                 except InputError:
@@ -191,14 +191,15 @@ class TorqueSession(Session):
         self.controller = Handover(self.controller, taking)
 
     def renew(self) -> None:
-        """Switches to the user's changed code without a bump. InputError if it is wrong; the old stays."""
+        """Switches to the user's changed code without a jump in torque. Raises InputError if the code has a
+        fault; the old code then stays."""
         self._hand_over(self._controller_of(self.settings, self.robot))
         self.failure = None
 
     def advance(self) -> Array:
         """One control tick and its row (a buffer: copy it to keep it).
 
-        A row holds the true joint state, the references, what the controller decided, and the torque
+        A row contains the true joint state, the references, the controller's results, and the torque that is
         applied from this tick on.
         """
         if self._mailbox or self._script or self._push_until < math.inf:
@@ -246,7 +247,7 @@ class TorqueSession(Session):
 
     def _is_wild(self, q: Array, v: Array) -> bool:
         share = v / self.robot.v_limit
-        # A comparison with NaN is false, so "not within" also catches what is not finite.
+        # A comparison with NaN is false, so "not within" is also true for values that are not finite.
         slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
         return self.plant.broken or not slow or not math.isfinite(q.dot(q))
 
@@ -271,7 +272,7 @@ class TorqueSession(Session):
         )
 
     def reference_path(self, task: str, points: int = 200) -> Array | None:
-        """One turn of a periodic position reference, (points, 3) m; None for anything else."""
+        """One period of a periodic position reference, (points, 3) m; None for every other reference."""
         reference = self.references.get(task)
         phase = getattr(reference, "phase", None)
         tasks = {each.name: each for each in _tasks(self.settings.levels)}

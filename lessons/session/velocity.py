@@ -41,8 +41,8 @@ class VelocitySession(Session):
 
     Attributes:
         bounds: the bounds in force.
-        roles: the tasks of the scene's levels by name: what a mission can move.
-        progress: how far the mission has come.
+        roles: the tasks of the scene's levels by name; a mission moves their points.
+        progress: the progress of the mission.
         plan: the last plan, None before the first tick.
     """
 
@@ -86,8 +86,8 @@ class VelocitySession(Session):
 
     @property
     def settings_now(self) -> VelocitySettings:
-        """The settings in force. Priorities belong to the run: where a scene can begin with others, those of
-        now stand among the settings."""
+        """The settings in force. If the scene has an option for the order of priorities, it contains the
+        present order of the run."""
         settings, options = self.settings, self.settings.options
         order = tuple(task.name for task in self.progress.mission if task.name in self.roles)
         if not isinstance(options, OrderOptions) or len(order) < len(self.roles):
@@ -129,7 +129,8 @@ class VelocitySession(Session):
         if settings.options.decoupled and self.progress.window:
             base = base_joints(self.robot)
             driving = self.progress.window[0].task.role == "base"
-            # Without turning on the spot an arm that reaches forwards only would not get at what is behind.
+            # The base may turn on the spot: an arm that reaches only forwards could not reach a goal behind
+            # it.
             still = set(range(self.robot.n)) - set(base) if driving else set(base[:2])
             hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
         return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold)
@@ -140,14 +141,16 @@ class VelocitySession(Session):
         self._collision = CollisionModel(self.robot, settings.htmpc.obstacles, settings.htmpc.self_collision)
 
     def _clearance(self) -> float:
-        """m, from the robot to the nearest obstacle; infinite if none is within `CLEARANCE_WITHIN`."""
+        """Distance from the robot to the nearest obstacle, m; infinite if none is within
+        `CLEARANCE_WITHIN`."""
         if self._collision.empty:
             return math.inf
         near = self._collision.clearances(self.plant.q[None], CLEARANCE_WITHIN, gradients=False)
         return float(near.distance.min(initial=math.inf))
 
     def predicted_path(self, role: str) -> Array:
-        """Where the last plan takes a role's point, knots 0 … N, (N+1, m) m; empty before the first tick."""
+        """The positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the first
+        tick."""
         if self.plan is None:
             return np.empty((0, 3))
         task = self.roles[role]
@@ -244,7 +247,7 @@ class VelocitySession(Session):
         return next(level for level in self.settings.htmpc.stack if level.tasks[0].name == role)
 
     def _points(self, q: Array, v: Array) -> tuple[dict[str, Array], dict[str, float]]:
-        """Where each role's point is, and how fast it moves (m/s or rad/s)."""
+        """The position of each role's point, and its speed (m/s or rad/s)."""
         return where(Configuration(self.robot, self._data, q, v), self.roles)
 
     def _is_wild(self, row: Array) -> bool:
@@ -253,5 +256,5 @@ class VelocitySession(Session):
         """
         fields = self.layout.fields
         fastest = float((np.abs(row[fields["v"]]) / self.robot.v_limit).max())
-        # A comparison with NaN is false, so "not within" also catches what is not finite.
+        # A comparison with NaN is false, so "not within" is also true for values that are not finite.
         return not fastest <= LOST_SPEED or not math.isfinite(float(row[fields["q"]].sum()))

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class VelocityController(Protocol):
-    """What a velocity-level session needs of a controller."""
+    """The methods of a controller that a velocity-level session uses."""
 
     @property
     def settings(self) -> HTMPCSettings:
@@ -24,7 +24,8 @@ class VelocityController(Protocol):
         ...
 
     def configure(self, settings: HTMPCSettings) -> None:
-        """Takes new settings at once and bumplessly. If they do not fit: InputError, and nothing changes."""
+        """Applies new settings at once, without a jump. Raises InputError, without any change, if they do not
+        fit."""
         ...
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:

@@ -20,9 +20,9 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 AT_ACCELERATION = AT_TORQUE
-"""Bit of `at_bound`: at velocity level the acceleration is what the torque is at torque level, the input."""
+"""Bit of `at_bound`: at velocity level the input is the acceleration, at torque level it is the torque."""
 _AT = 1e-3
-"""A value this share of its bound away from it is at the bound."""
+"""A value whose distance from its bound is less than this share of the bound counts as at the bound."""
 
 _SCALARS = ("t", "step_us", "priority_leak", "unsolved", "place", "left", "clearance", "manipulability")
 _PER_JOINT = (
@@ -45,14 +45,14 @@ _PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
 
 
 def layout_of(robot: Robot, roles: Stack) -> Layout:
-    """Where each field of a row lies.
+    """The indices of the fields of a row.
 
-    `place` is how many tasks of the mission are completed, `left` how many are not. Per joint besides the
-    usual ones: `tau` is the velocity commanded from that tick on, `tau_demand` the same, `tau_0` the one
-    commanded until then, `acceleration` and
-    `jerk` the command's, `at_bound` the bits AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the
-    fields of a task and `level/<role>`, its place in the window (NaN: it is not in it). Per level of the
-    stack cost, kkt, rung, time_us, the accepted line-search step, the number of active constraints and
+    `place` is the number of completed tasks of the mission, `left` the number of the others. Per joint,
+    besides the usual fields: `tau` is the velocity commanded from that tick on, `tau_demand` the same,
+    `tau_0` the velocity commanded until then, `acceleration` and `jerk` those of the command, `at_bound` the
+    bits AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the fields of a task and `level/<role>`, its
+    place in the window (NaN: it is not in the window). Per level of the stack cost, kkt, rung, time_us, the
+    accepted line-search step, the number of active constraints and
     `bound`, see `write_plan`. `manipulability` is w = √det(J Jᵀ) of the hand's position under the arm's
     joints alone, m³.
     """
@@ -61,14 +61,16 @@ def layout_of(robot: Robot, roles: Stack) -> Layout:
 
 
 FALLBACKS = ("solve", "widened", "keep")
-"""What was needed to solve a level, in the order of need; see `himpc.htmpc.plan.LevelEvidence`."""
+"""The fallbacks with which a level was solved, in the order in which they are tried; see
+`himpc.htmpc.plan.LevelEvidence`."""
 
 
 def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
     """Writes the values of a plan into a row filled with NaN; a level without a role is left out.
 
-    delta: δ of (12), m (or rad). It gives `bound`, what the levels below leave of a level's error at knot 1:
-    ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such bound.
+    delta: δ of (12), m (or rad), which gives `bound`: the bound that the levels below must respect for a
+    level's error at knot 1, ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such
+    bound.
     """
     fields = layout.fields
     row[fields["step_us"]] = plan.step_us
@@ -120,7 +122,8 @@ def write_truth(
 
 
 def manipulability(at: Configuration) -> float:
-    """w = √det(J Jᵀ) with J (3, k) of the tip's position under the joints that are not the base's, m³."""
+    """w = √det(J Jᵀ), m³, with J, (3, k), the Jacobian of the tip's position for the joints of the arm
+    alone."""
     arm = [joint for joint in range(at.robot.n) if joint not in base_joints(at.robot)]
     J = at.frame_jacobians()[0, :3, arm].T
     return float(np.sqrt(max(0.0, np.linalg.det(J @ J.T))))

@@ -30,14 +30,14 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     except ValueError:
         if value.lower() in ("nan", "inf", "-inf", "infinity", ""):
             raise InputError(
-                f"--set {text}: '{value}' is no finite number; give one, e.g. {path}=1"
+                f"--set {text}: '{value}' is not a finite number; give one, e.g. {path}=1"
             ) from None
         return path, value
 
 
 def _refuse_constant(text: str) -> Callable[[str], Any]:
     def refuse(constant: str) -> Any:
-        raise InputError(f"--set {text}: {constant} is no finite number; give one")
+        raise InputError(f"--set {text}: {constant} is not a finite number; give one")
 
     return refuse
 
@@ -50,7 +50,7 @@ def with_assignments(settings: S, assignments: Iterable[str]) -> S:
 
 
 def assignment(path: str, value: Any) -> str:
-    """ "PATH=VALUE" such that `parse_assignment` gives the same value again, to the last bit."""
+    """ "PATH=VALUE" from which `parse_assignment` gets the same value again, to the last bit."""
     if path == "order" and not any("," in name for name in value):
         value = ",".join(value)
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), default=_plain)
@@ -75,11 +75,12 @@ def _parsed(text: str) -> Any:
 def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
     """The assignments that turn a scene's own settings into others of the same scene.
 
-    The controller comes first, so that what else it brings (its rate) is told only where it differs.
+    The controller comes first, so that a setting that changes with it (its rate) is listed only if it
+    differs.
 
     Args:
-        own: of the scene as it is loaded.
-        settings: reached from them by events.
+        own: settings of the scene as it is loaded.
+        settings: settings after some events.
 
     Raises:
         InputError: no assignment can express them.
@@ -102,5 +103,5 @@ def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
     for path, value in now.special_differences(settings):
         tell(path, value)
     if now != settings:
-        raise InputError("these settings cannot be told as assignments: reset them and try again")
+        raise InputError("these settings cannot be written as assignments: reset them and try again")
     return tuple(found)

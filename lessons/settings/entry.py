@@ -15,14 +15,15 @@ class Entry:
     Attributes:
         path: as of `--set`; "*" stands for a name: "levels.*.Q".
         label: a few words or a symbol.
-        help: one sentence or two; empty if the label says it all.
+        help: one or two sentences; empty if the label is enough.
         unit: of the value.
-        low, high, step: of a slider, in `shown`; a value outside widens it. step 0: about a hundredth.
-        log: the slider is logarithmic; low > 0.
-        shown: the unit that the page shows instead, empty: `unit`.
-        factor: how many of `shown` one `unit` is.
-        tries: values worth comparing, as typed; the first is seldom a scene's own.
-        name: used instead of the label where no heading names the group.
+        low, high, step: of a slider, in the unit `shown`; a value outside extends the range. step 0: about a
+            hundredth of the range.
+        log: whether the slider is logarithmic; then low > 0.
+        shown: the unit that the page shows instead; empty: `unit`.
+        factor: the number of `shown` in one `unit`.
+        tries: typical values for comparisons, as typed; the first one is rarely a scene's own value.
+        name: used instead of the label if no heading names the group.
     """
 
     path: str
@@ -40,7 +41,7 @@ class Entry:
 
     @cached_property
     def pattern(self) -> re.Pattern[str]:
-        """What the path matches; its groups are the names."""
+        """A pattern that matches all paths of the entry; its groups are the names."""
         return re.compile("(.+)".join(map(re.escape, self.path.split("*"))))
 
     @property
@@ -50,7 +51,7 @@ class Entry:
         return f"{self.label} [{unit}]" if unit else self.label
 
     def at(self, path: str) -> Entry | None:
-        """The entry of one setting, with names in place of "*"; None if it is another's."""
+        """The entry of one setting, with names instead of "*"; None if the path is that of another entry."""
         found = self.pattern.fullmatch(path)
         if found is None:
             return None
@@ -61,7 +62,7 @@ class Entry:
 
 
 def entry_at(entries: tuple[Entry, ...], path: str) -> Entry:
-    """The entry of a path; one that says its last name only if the table has none."""
+    """The entry of a path; if the table has none, an entry whose label is the last name of the path."""
     for entry in entries:
         found = entry.at(path)
         if found is not None:

@@ -17,7 +17,7 @@ def ordered(stack: Stack, names: Any) -> Stack:
         names: of all of them, highest priority first: "a,b,c" or a list.
 
     Raises:
-        InputError: a name is missing, unknown or there twice.
+        InputError: a name is missing, unknown or given twice.
     """
     levels = {level.name: level for level in stack}
     given = names.split(",") if isinstance(names, str) else names

@@ -14,14 +14,14 @@ _BY_PLACE = re.compile(r"levels\.\d+\.\w+")
 
 @dataclass(frozen=True)
 class SettingLine:
-    """One setting, all of it text.
+    """One setting, as text.
 
     Attributes:
         path: as of `--set`; in a list of several scenes with "*" for a name.
         now: its value, as typed.
-        allowed: what it may be.
+        allowed: the allowed values.
         unit: of the value.
-        help: what it is.
+        help: a description.
     """
 
     path: str
@@ -32,8 +32,8 @@ class SettingLine:
 
 
 def lines(settings: SceneSettings) -> list[SettingLine]:
-    """Every setting of a scene in the order of the page. Levels, which are also known by their place, come by
-    their names."""
+    """Every setting of a scene in the order of the page. Levels are listed by their names only, although a
+    path may also contain their place."""
     paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
     order = [entry.path for entry in settings.entries]
     told = {path: _pattern(settings, path) for path in paths}

@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 Home = Mapping[str, Array]
 Architecture = Literal["hierarchical", "single_task", "decoupled"]
 """How a sequence is carried out: two tasks at a time (L = 2); one at a time by the whole body (L = 1); or one
-at a time by a part of it: the base drives with the arm at rest, then the arm moves and the base may turn. In
-the last one nothing plans for the arm: folded against its limits it may not get to a goal behind it."""
+at a time by a part of it: the base drives with the arm at rest, then the arm moves and the base may turn. The
+last architecture has no plan for the arm: if the arm is folded against its limits, it may not reach a goal
+behind it."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class MissionOptions(ABC):
     """The choices of a scene; each field is a path of its own (`--set peak=[-2,1]`)."""
 
     parts: ClassVar[tuple[str, ...]] = ()
-    """Names of equally long parts of the run that are judged apart."""
+    """Names of equally long parts of the run that are evaluated separately."""
 
     @property
     def part_s(self) -> float:
@@ -39,7 +40,7 @@ class MissionOptions(ABC):
 
     @abstractmethod
     def mission(self, home: Home) -> Mission:
-        """The tasks. Args: home: where each role's point is at the start, (m,) m."""
+        """The tasks. Args: home: position of each role's point at the start, (m,) m."""
 
     @property
     def L(self) -> int:
@@ -66,7 +67,7 @@ class ArchitectureOptions(MissionOptions):
     Attributes:
         architecture: see `Architecture`.
         base_tolerance: a task of the base is completed within this distance of its place, m.
-        base_at_rest: and slower than REST; otherwise at any speed.
+        base_at_rest: whether it must also be slower than REST to be completed.
     """
 
     architecture: Architecture = "hierarchical"
@@ -96,7 +97,7 @@ class OrderOptions(MissionOptions):
     """Scenes whose tasks last for the whole run, so that one may choose which comes first.
 
     Attributes:
-        order: the roles, highest priority first; empty: as the scene has them.
+        order: the roles, highest priority first; empty: the scene's own order.
     """
 
     order: tuple[str, ...] = ()
@@ -204,8 +205,8 @@ class WaypointOptions(ArchitectureOptions):
         ee_2 = MissionTask("ee 2", "ee", Go(second, CRUISE), HAND_TOLERANCE, self.hold_s)
         if self.architecture != "hierarchical":
             return (self.drive("base 1", Go((2.0, 1.4), CRUISE)), ee_1, self.drive("base 2", base), ee_2)
-        # With nothing below it the last EE task would take the base along. It asks for nothing more: the
-        # mission ends with that task, as with one task at a time.
+        # Without a task below it, the last EE task would move the base, too. This task of the base is
+        # completed anywhere: the mission ends with the last EE task, as with one task at a time.
         stay = MissionTask("stay", "base", base, _ANYWHERE)
         return (ee_1, self.drive("base 2", base), ee_2, stay)
 
@@ -226,12 +227,13 @@ MAX_VISITS = 100
 
 @dataclass(frozen=True)
 class DeliveryOptions(ArchitectureOptions):
-    """Section V-D: something is delivered to three people, for some rounds.
+    """Section V-D: balls are delivered to three people, in several rounds.
 
     Attributes:
-        seats: which of SEATS the people sit on, in the order of the visits.
-        rounds: how often everybody is visited.
-        hold_s: s the EE stays at a person's hand; null: until the person takes the ball (event Release).
+        seats: indices in SEATS of the people's places, in the order of the visits.
+        rounds: number of visits to each person.
+        hold_s: time that the EE stays at a person's hand, s; null: until the person takes the ball (event
+            Release).
         cruise: m/s of the planned base paths.
     """
 
@@ -271,7 +273,7 @@ CLUTTER: tuple[Obstacle, ...] = (
     Ball("bin", (1.6, -1.0, 0.3), 0.3),
     Ball("lamp", (3.4, 0.55, 1.3), 0.2),
 )
-"""Obstacles on both sides of the way."""
+"""Obstacles on both sides of the base's path."""
 
 
 @dataclass(frozen=True)
@@ -279,7 +281,7 @@ class ClutteredOptions(MissionOptions):
     """The base is sent past obstacles; the EE goes first to a place beside the way.
 
     Attributes:
-        goal: m, where the base is sent.
+        goal: goal of the base, m.
     """
 
     goal: tuple[float, ...] = (4.0, 0.0)

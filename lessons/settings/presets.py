@@ -7,7 +7,7 @@ from lessons.settings.settings import SceneSettings
 
 
 def usual_settings(settings: SceneSettings) -> tuple[Entry, ...]:
-    """What can usually be compared in a scene, in the order of the page; the controllers are apart."""
+    """The settings of a scene that are often compared, in the order of the page, without the controllers."""
     paths = [path for path, place in settings.places().items() if not place.shorthand]
     found = (entry.at(path) for entry in settings.entries if entry.tries for path in paths)
     return tuple(entry for entry in found if entry is not None)

@@ -1,4 +1,4 @@
-"""What the settings of both kinds of scenes share: paths that reach into them."""
+"""The base class of the settings of both kinds of scenes, and their paths."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ S = TypeVar("S", bound="SceneSettings")
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a path leads.
+    """The value of a path.
 
     Attributes:
-        read: the value in some settings.
-        write: the settings with a value instead, which `fit` returned.
-        form: what the value may be.
-        own_fit: from settings, path and value the value as it is stored, where the form does not tell.
-            Raises InputError for one that cannot be, naming the path.
-        shorthand: a second way to what other paths reach, or to several values at once; `read` then gives the
-            first of them.
+        read: returns the value in some settings.
+        write: returns the settings with another value, which `fit` returned.
+        form: the allowed values.
+        own_fit: returns, from settings, path and value, the value as it is stored, if the form is not enough
+            for this. Raises InputError, which names the path, for a value that is not allowed.
+        shorthand: whether the value has another path, too, or the path stands for several values at once;
+            `read` then returns the first of them.
     """
 
     read: Callable[[Any], Any]
@@ -40,13 +40,13 @@ class Place:
     shorthand: bool = False
 
     def fit(self, settings: Any, path: str, value: Any) -> Any:
-        """The value as some settings store it. Raises InputError, naming the path and what is allowed, for
-        others."""
+        """The value in the form in which the settings store it. Raises InputError, which names the path and
+        the allowed values, for a value that is not allowed."""
         return self.form.fit(path, value) if self.own_fit is None else self.own_fit(settings, path, value)
 
     def element(self, at: int, count: int) -> Place:
-        """Where one of the `count` numbers of a list leads; one number for all is spread over it first, and
-        the last of too few serves the rest."""
+        """The place of one of the `count` numbers of a list. If the settings have fewer numbers, the last one
+        is first repeated."""
 
         def spread(settings: Any) -> list[Any]:
             now = self.read(settings)
@@ -83,12 +83,12 @@ class SceneSettings(ABC):
     @property
     @abstractmethod
     def controllers(self) -> Mapping[str, str]:
-        """One line per controller that fits."""
+        """The controllers for this kind of scene, with one line each."""
 
     @property
     @abstractmethod
     def measures_time(self) -> bool:
-        """Whether the clock on the wall decides anything, so that no two runs are the same."""
+        """Whether measured computing times change the run, so that no two runs are the same."""
 
     @abstractmethod
     def places(self) -> Mapping[str, Place]:
@@ -96,7 +96,7 @@ class SceneSettings(ABC):
         names."""
 
     def elements(self, path: str) -> int:
-        """How many numbers a path has that can be changed one by one, as "M_bar.3"; 0: none."""
+        """The number of elements of a path that can be changed one by one, as "M_bar.3"; 0: none."""
         return 0
 
     def place(self, path: str) -> Place:
@@ -111,7 +111,7 @@ class SceneSettings(ABC):
         if not count:
             raise unknown_name("setting", path, places)
         if not 1 <= int(at[:4]) <= count:
-            raise InputError(f"{path}: there is no place {at[:9]}; give one from 1 to {count}")
+            raise InputError(f"{path}: there is no place {at[:9]}; give a place from 1 to {count}")
         return places[whole].element(int(at) - 1, count)
 
     def entry(self, path: str) -> Entry:
@@ -119,7 +119,8 @@ class SceneSettings(ABC):
         return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
-        """Paths, none of `places`, and values that other settings of the same scene differ in."""
+        """Paths and values in which other settings of the same scene differ, for paths that are not in
+        `places`."""
         return []
 
     def recomposed(self, wanted: Any) -> list[tuple[str, Any]]:
@@ -144,16 +145,17 @@ class SceneSettings(ABC):
         return place.write(self, place.fit(self, path, value))
 
     def as_data(self) -> dict[str, Any]:
-        """All of it as JSON-ready data."""
+        """All settings as JSON-ready data."""
         data = asdict(self)  # pyright: ignore[reportArgumentType]  # every subclass is a dataclass
         return json.loads(json.dumps(data, default=str))
 
     def paths(self) -> list[str]:
-        """Every path that `changed` takes, but for single numbers of lists and for obstacles."""
+        """Every path that `changed` accepts, except paths of single numbers in lists and of obstacles."""
         return list(self.places())
 
     def value_at(self, path: str) -> Any:
-        """The value at a path; of several at once the first one's. Raises InputError like `place`."""
+        """The value at a path; for a path to several values, the first of them. Raises InputError like
+        `place`."""
         return self.place(path).read(self)
 
 
@@ -170,8 +172,8 @@ def field_places(
         owner: the dataclass.
         read: the owner in some settings.
         write: the settings with another owner.
-        prefix: of the paths.
-        without: fields that are no settings.
+        prefix: prefix of the paths.
+        without: fields that are not settings.
     """
 
     def place(name: str, hint: Any) -> Place:
@@ -188,7 +190,8 @@ def field_places(
 
 @dataclass(frozen=True, eq=False)
 class LevelKey:
-    """A key of a level: its value, the level with another one, and as of `Place`."""
+    """A key of a level: functions that return its value and the level with another value, and the form as in
+    `Place`."""
 
     read: Callable[[Level], Any]
     write: Callable[[Level, Any], Level]
@@ -261,11 +264,11 @@ def every_level(key: str, read: Callable[[S], Stack], write: Callable[[S, Stack]
 
 
 def settings_after(settings: S, events: Iterable[Event]) -> S:
-    """The settings that events leave behind when the run is reset. Most change the run alone.
+    """The settings after some events, as they remain when the run is reset. Most events change only the run.
 
     Args:
-        settings: before.
-        events: that took effect, in order.
+        settings: the settings before the events.
+        events: events that took effect, in order.
     """
     for event in events:
         settings = settings.after(event)

@@ -35,17 +35,17 @@ def read_stack(value: Any, before: Stack, own: Own = NONE) -> Stack:
     """A stack from a list with one entry per level, highest priority first.
 
     An entry is a task, {"task": KIND, "name": …, …} with the fields of its kind, K_p and K_v; a list of tasks
-    of equal priority; or {"tasks": […]}. Beside "task" or "tasks" may stand Q, R, horizon and enabled. Where
-    a file of one's own was named at the start, KIND is its path or the name of its task's class.
+    of equal priority; or {"tasks": […]}. An entry may also have Q, R, horizon and enabled. For a user's file
+    that was named at the start, KIND is its path or the name of its task's class.
 
     Args:
         value: the list.
-        before: the stack that is replaced. Its first task's gains, which suit the robot, go to every task
-            that comes without; one that was there keeps its own.
-        own: what else may be named.
+        before: the stack that is replaced. A task without gains keeps its gains in that stack; a new task
+            gets the gains of that stack's first task, which suit the robot.
+        own: tasks of users' files that may be named.
 
     Raises:
-        InputError: one sentence that names what is wrong, and the choices.
+        InputError: one sentence with the fault and the choices.
     """
     if not isinstance(value, (list, tuple)) or not value:
         raise InputError(f"stack is {quoted(value)}: give a list of levels as JSON, e.g. {_EXAMPLE}")
@@ -56,10 +56,10 @@ def read_stack(value: Any, before: Stack, own: Own = NONE) -> Stack:
 
 
 def told(stack: Stack, own: Own = NONE) -> list[dict[str, Any]]:
-    """A stack as data from which `read_stack` makes the same again.
+    """A stack as data from which `read_stack` makes the same stack again.
 
     Raises:
-        InputError: a task is of a kind without a word.
+        InputError: the kind of a task has no name.
     """
     return [_told_level(level, own) for level in stack]
 
@@ -122,15 +122,16 @@ def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
 
 
 def _of_file(word: Any, own: Own) -> Task | None:
-    """The task of a file by its path, by what tells its content in a code, or by its class."""
+    """The task of a user's file, by the path of the file, by its fingerprint in a code, or by the name of its
+    class; None for one of the lab's kinds."""
     if not isinstance(word, str) or word in KINDS:
         return None
     if ".py@" in word:
         return own[with_fingerprint(word, own, "task")]
     if is_file(word) and word not in own:
         raise InputError(
-            f"the kind of task is {shortened(word, 100)}: a file of your own is named when himpc-lab is "
-            "started, by --task FILE.py"
+            f"the kind of task is {shortened(word, 100)}: to use a file of your own, start himpc-lab with "
+            "--task FILE.py"
         )
     return own.get(word) or next((task for task in own.values() if type(task).__name__ == word), None)
 
@@ -180,7 +181,7 @@ def checked(stack: Stack) -> Stack:
     check_names(stack)
     if any(task.name == DAMPING_LEVEL.name for task in tasks):
         raise InputError(
-            "the name 'damping' belongs to the last level, which is added by itself: take another"
+            "the name 'damping' belongs to the last level, which is added automatically: choose another name"
         )
     return stack
 
@@ -199,7 +200,7 @@ def quoted(value: Any) -> str:
 
 
 def one(value: Any) -> Any:
-    """One value for all coordinates, whose number is about to change."""
+    """One value for all coordinates, for a task whose number of coordinates will change."""
     return value[0] if isinstance(value, tuple) else value
 
 
@@ -216,8 +217,8 @@ def _told_task(task: Task, own: Own) -> dict[str, Any]:
         found = next((path for path, each in own.items() if type(each) is type(task)), None)
         if found is None:
             raise InputError(
-                f"task '{task.name}' is of a kind of its own and cannot be told: put it into a file, and "
-                "name that by --task FILE.py"
+                f"task '{task.name}' is not of a kind of the lab and cannot be written as data: put it into "
+                "a file, and name the file by --task FILE.py"
             )
         word, usual = found, vars(own[found])
     values = {each.name: getattr(task, each.name) for each in fields(task) if each.name != "name"}

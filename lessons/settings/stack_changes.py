@@ -16,8 +16,9 @@ from robots.errors import shortened, unknown_name
 
 
 def add(stack: Stack, value: Any, own: Own = NONE) -> Stack:
-    """One more task: {"task": KIND, …}, with "level": its own at that place, 1 the highest; or "with": the
-    name of a task or level whose priority it gets; without either just above the last level."""
+    """Adds a task: {"task": KIND, …}. With "level" it gets a level of its own at that place, 1 being the
+    highest priority; with "with", the name of a task or level, it gets that priority; otherwise it gets a
+    level just above the last one."""
     given = entry_of(value, "stack.add")
     place, beside = given.pop("level", None), given.pop("with", None)
     taken = [task.name for level in stack for task in level.tasks]
@@ -56,7 +57,7 @@ def rename(stack: Stack, value: Any) -> Stack:
 
 
 def edit(stack: Stack, value: Any) -> Stack:
-    """{"name": TASK, FIELD: VALUE, …}: other fields of a task, e.g. its axes or its frame."""
+    """Changes fields of a task, e.g. its axes or its frame: {"name": TASK, FIELD: VALUE, …}."""
     given = entry_of(value, "stack.edit")
     at, task = _find(stack, given.pop("name", None))
     changes = fields_of(type(task), given, f"a task of kind '{word_of(task)}'")
@@ -64,7 +65,7 @@ def edit(stack: Stack, value: Any) -> Stack:
 
 
 def split(stack: Stack, value: Any) -> Stack:
-    """The task of that name gets a level of its own, right below the others of its level."""
+    """Gives a task a level of its own, directly below the other tasks of its level."""
     at, task = _find(stack, value)
     level = stack[at]
     if len(level.tasks) == 1:
@@ -80,7 +81,8 @@ def split(stack: Stack, value: Any) -> Stack:
 
 
 def merge(stack: Stack, value: Any) -> Stack:
-    """[LEVEL, INTO]: the tasks of a level (or of a task's level) join another one, whose weights they get."""
+    """Moves the tasks of a level (or of a task's level) into another level, whose weights they get: [LEVEL,
+    INTO]."""
     if not isinstance(value, (list, tuple)) or len(value) != 2:
         raise InputError(f"stack.merge is {quoted(value)}: give two levels, [LEVEL, INTO]")
     at, into = (_place_of(stack, each) for each in value)
@@ -106,7 +108,7 @@ def _find(stack: Stack, name: Any) -> tuple[int, Task]:
 
 
 def _place_of(stack: Stack, name: Any) -> int:
-    """Place of the level of that name, or of the level that has a task of that name."""
+    """The index of the level of that name, or of the level with a task of that name."""
     for at, level in enumerate(stack):
         if name == level.name or any(task.name == name for task in level.tasks):
             return at

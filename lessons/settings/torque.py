@@ -1,4 +1,4 @@
-"""Everything a learner can change, as one frozen tree, and the paths that reach into it."""
+"""All settings of a torque-level scene, as one frozen tree, and their paths."""
 
 from __future__ import annotations
 
@@ -62,17 +62,19 @@ class TorqueSettings(SceneSettings):
         levels: the stack.
         M_bar: diagonal of M̄ before scaling.
         M_bar_scale: factor on all of it.
-        M_bar_adapt: let the controller fit it to the payload, see `himpc.controllers.adaptation`.
+        M_bar_adapt: whether the controller adapts M̄ to the payload, see `himpc.controllers.adaptation`.
         nominal: the plant as the nominal model of model-based controllers describes it.
-        deadline_ms: a torque that is found later than this after its tick began acts one tick later; see
-            `lessons.session.deadline`. 0: lockstep, simulated time waits while the controller computes.
-        solve_ms_per_knot: how long the computer is assumed to take for each of the N knots, so that runs are
-            the same everywhere. 0: the time it really takes, and then no two runs are the same.
+        deadline_ms: a torque that is ready later than this after the beginning of its tick acts one tick
+            later; see `lessons.session.deadline`. 0: lockstep, simulated time waits while the controller
+            computes.
+        solve_ms_per_knot: assumed computing time for each of the N knots, so that runs are the same
+            everywhere. 0: the measured computing time, and then no two runs are the same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices, if it has any.
-        files: Python files of one's own that may be its controller. No path reaches them: what comes from
-            elsewhere (a code, a page) must not choose which files are run.
-        own_tasks: (path, task) of Python files whose tasks the stack may name; likewise.
+        files: users' Python files that may be its controller. They have no path: data from elsewhere (a
+            code, a page) must not choose which files are run.
+        own_tasks: (path, task) of users' Python files whose tasks the stack may name; they have no path
+            either.
     """
 
     entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
@@ -121,7 +123,7 @@ class TorqueSettings(SceneSettings):
         )
 
     def is_late(self, measured_ms: float) -> bool:
-        """Whether a torque that took so long to compute misses its deadline."""
+        """Whether a torque with this computing time misses its deadline."""
         assumed = self.solve_ms_per_knot * self.horizon
         # Rounding of N times a decimal fraction must not make a torque late that exactly meets its deadline.
         return 0.0 < self.deadline_ms < (assumed or measured_ms) - 1e-9
@@ -143,8 +145,8 @@ class TorqueSettings(SceneSettings):
         `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
-        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". Where a
-        value holds one number per joint, a place 1 … n behind it is that joint's alone: "M_bar.3"."""
+        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". If a
+        value has one number per joint, a place 1 … n after it is the number of that joint: "M_bar.3"."""
         levels = tuple((level.name, tuple(task.name for task in level.tasks)) for level in self.levels)
         return _places(levels, type(self.options), tuple(self.controllers))
 
@@ -179,7 +181,7 @@ def _known(form: Form, path: str, name: Any) -> Any:
         return with_fingerprint(name, form.words, "controller")
     if isinstance(name, str) and is_file(name) and name not in form.words:
         raise InputError(
-            f"{path} is {shortened(name, 100)}: a file of your own is named when himpc-lab is started, by "
+            f"{path} is {shortened(name, 100)}: to use a file of your own, start himpc-lab with "
             "--controller FILE.py"
         )
     return form.fit(path, name)

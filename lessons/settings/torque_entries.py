@@ -48,9 +48,9 @@ TORQUE_ENTRIES = (
               "route, which has its own method, accept daqp only. qpoases needs the extra 'bench'"),
     Entry("R_on", "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ"),
     Entry("damping", "Damp what no level controls",
-          "R weighs changes of torque only, so a direction without a task keeps its torque and runs away "
-              "when pushed. This last level brings it to rest. To see the effect, switch it off and push "
-              "the robot.",
+          "R weighs changes of torque only, so a direction without a task keeps its torque and does not "
+              "stop when pushed. This last level brings it to rest. To see the effect, switch it off and "
+              "push the robot.",
           tries=("false", "true"), name="damping level"),
     Entry("order", "Order", "The levels, highest priority first: a,b,c or a list"),
     Entry("stack", "Stack",
@@ -79,8 +79,8 @@ TORQUE_ENTRIES = (
     Entry("plant.inertia_scale", "Inertia scale", "Factor on the rotational inertia of every link",
           "", 0.2, 3.0, 0.05, tries=("0.8", "1.2", "1"), name="true inertias ×"),
     Entry("plant.diagonal_scale", "M(q) diagonal scale",
-          "Factor on the diagonal of M(q) alone, as the paper's Table V literally says; no real arm is "
-              "like this",
+          "Factor on the diagonal of M(q) alone, as the text of the paper's Table V says; no real arm has "
+              "this property",
           "", 0.5, 2.0, 0.05),
     Entry("plant.encoder_resolution_deg", "Encoder", "Resolution of the joint sensors; 0: ideal sensors",
           "°", 0.0, 20.0, 0.25, shown="10⁻³ °", factor=1e3, tries=("0.005", "0.001", "0.01", "0"),

@@ -55,7 +55,8 @@ class Form:
         return f"a {kind} {self.range}".strip()
 
     def fit(self, path: str, value: Any) -> Any:
-        """The value as it is stored. Raises InputError, naming the path and what is allowed, for others."""
+        """The value in the form in which it is stored. Raises InputError, which names the path and the
+        allowed values, for a value that is not allowed."""
         if value is None and self.null:
             return None
         if isinstance(value, (list, tuple, np.ndarray)) and self.elements is not None:

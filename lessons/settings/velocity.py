@@ -1,4 +1,4 @@
-"""Everything a learner can change in a velocity-level scene, and the paths that reach into it."""
+"""All settings of a velocity-level scene, and their paths."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
 
 STAGE_WEIGHT: dict[str, float] = {"proximal": 10.0, "paper": 1.0}
-"""Q of (8) that each formulation was tuned with; choosing a formulation sets it."""
+"""Q of (8) with which each formulation was tuned; the choice of a formulation sets it."""
 
 _RATE_HZ = {"htidkc": 50.0}
 """Control rate that goes with a controller, 10 Hz for all others; choosing a controller sets it."""
@@ -34,11 +34,12 @@ class VelocitySettings(SceneSettings):
     """Settings of a velocity-level run.
 
     Attributes:
-        htmpc: the controller's; its stack holds one level per role, and the mission's window orders them.
-        controller: which of VELOCITY_CONTROLLERS.
-        compensate_delay: predict the measured state forward by the plant's lag before planning.
-        delay_measured: a plan's commands arrive later by the time its computation really took, on top of
-            `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the same.
+        htmpc: the controller's settings; its stack has one level per role, and the mission's window orders
+            them.
+        controller: one of VELOCITY_CONTROLLERS.
+        compensate_delay: whether the measured state is predicted over the plant's lag before planning.
+        delay_measured: whether the commands of a plan are delayed by its measured computing time in addition
+            to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices.
     """
@@ -109,8 +110,8 @@ class VelocitySettings(SceneSettings):
         return max(len(self.htmpc.gains), len(self.levels)) if path == "gains" else 0
 
     def place(self, path: str) -> Place:
-        """Also "obstacles.NAME": a ball [x, y, z, radius], new or instead of the obstacle of that name, where
-        one is now, [x, y, z], or None to take it away."""
+        """As in `SceneSettings`, and also "obstacles.NAME": [x, y, z, radius] adds a ball or replaces the
+        obstacle of that name, [x, y, z] moves it, and None removes it."""
         head, _, name = path.partition(".")
         if head != "obstacles" or not name:
             return super().place(path)
@@ -124,8 +125,8 @@ class VelocitySettings(SceneSettings):
         return Place(lambda settings: _seen(settings, name), _put(name), _BALL, fit)
 
     def special_differences(self, wanted: VelocitySettings) -> list[tuple[str, Any]]:
-        """Obstacles that went, appeared or were moved: the latter two stand at the end, in the order in which
-        that happened."""
+        """Obstacles that were removed, added or moved; added and moved ones come last, in the order of these
+        changes."""
         left = {each.name for each in wanted.htmpc.obstacles}
         told = [(f"obstacles.{each.name}", None) for each in self.htmpc.obstacles if each.name not in left]
         rest = tuple(each for each in self.htmpc.obstacles if each.name in left)
@@ -142,7 +143,7 @@ class VelocitySettings(SceneSettings):
 
 
 LONGEST_DELAY = 1e3
-"""ms between a command and the plant at most."""
+"""Largest delay of a command, ms."""
 
 
 def _htmpc(settings: VelocitySettings) -> HTMPCSettings:

@@ -1,4 +1,4 @@
-"""A challenge: a measured goal reached by tuning a few settings; more than one way leads there."""
+"""A challenge: a measured goal that can be reached by tuning a few settings, in more than one way."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ class Result:
 
 @dataclass(frozen=True)
 class Challenge:
-    """A goal, the settings it may be reached with, and the run that decides.
+    """A goal, the settings that may be changed to reach it, and the run that decides.
 
     Attributes:
-        text: what to reach; Markdown with equations in $…$.
-        goals: all must hold at the end of the run.
+        text: description of the goal; Markdown with equations in $…$.
+        goals: claims that must all hold at the end of the run.
         knobs: the settings that may be changed; any other change disqualifies the attempt.
-        score: what makes one solution better than another.
+        score: the points for the quality of a solution.
         solutions: at least two different sets of assignments "PATH=VALUE" to knobs that pass. The run with
-            none of them, the start, does not.
+            none of them, the start, does not pass.
         set: assignments on top of the lesson's before the learner begins.
         duration: s.
         events: the script of the run.
@@ -71,10 +71,10 @@ class Challenge:
         return (*(goal.measure for goal in self.goals), self.score.measure)
 
     def grade(self, rows: RunRows) -> Result:
-        """Judges a finished run."""
+        """Evaluates a finished run."""
         return self.result([measure.value(rows) for measure in self.measures])
 
     def result(self, values: list[float]) -> Result:
-        """Judges a run by its `measures`, in their order."""
+        """Evaluates a run from the values of its `measures`, in their order."""
         met = tuple(goal.holds(value) for goal, value in zip(self.goals, values, strict=False))
         return Result(met, self.score.points(values[-1]) if all(met) else 0.0)

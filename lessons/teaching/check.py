@@ -1,4 +1,5 @@
-"""Every lesson, run headless and judged: claims hold, claims can fail, challenges can be solved."""
+"""Runs lessons headless and checks that claims hold, that claims can fail, and that challenges can be
+solved."""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ from lessons.teaching.prediction import Choice, Prediction
 class Outcome:
     """The result of a run. Attributes:
     values: its measures, without a ghost.
-    refused: how many events of the script were not accepted.
-    error: one sentence on why the run failed; None if it did not fail.
+    refused: number of events of the script that were not accepted.
+    error: one sentence if the run failed; None if it did not fail.
     """
 
     values: Mapping[Measure, float]
@@ -36,11 +37,11 @@ class Verdict:
     lesson: name of the lesson.
     where: the step's title, or "challenge".
     what: the claim, prediction, script or solution.
-    value, unit: what was measured; NaN where there is nothing to measure.
+    value, unit: the measured value; NaN if there is nothing to measure.
     condition: the required condition.
-    wrong: the setting a claim must fail under, "" for anything else.
+    wrong: the setting under which a claim must fail; "" for other checks.
     wrong_value: the value measured under that setting.
-    fault: one sentence, empty if everything is sound.
+    fault: one sentence, empty if the check is passed.
     """
 
     lesson: str
@@ -58,7 +59,7 @@ Outcomes = Mapping[RunSpec, Outcome]
 
 
 def measured(piece: tuple[RunSpec, tuple[Measure, ...]]) -> Outcome:
-    """Runs and measures. Raises InputError for a run that is not possible."""
+    """Performs a run and computes its measures. Raises InputError for a run that is not possible."""
     what, measures = piece
     recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}
@@ -71,12 +72,12 @@ def check(
     spread: Spread = on_cores,
     progress: Callable[[float], None] | None = None,
 ) -> list[Verdict]:
-    """Runs everything the lessons state, each run once, and judges it.
+    """Performs all runs that the lessons need, each only once, and checks all statements of the lessons.
 
     Args:
-        lessons: which.
-        spread: how to spread the runs.
-        progress: called after each run with the share that is done.
+        lessons: the lessons.
+        spread: function that spreads the runs.
+        progress: called after each run with the completed share.
 
     Returns:
         one verdict per claim, prediction, script and challenge, in the lessons' order.
@@ -219,11 +220,11 @@ def _challenge(lesson: Lesson, challenge: Challenge, outcomes: Outcomes) -> list
         if outcome.error is not None:
             fault = f"it cannot be run: {outcome.error}"
         elif foreign:
-            fault = f"{foreign[0]} is none of its knobs, or out of their range"
+            fault = f"{foreign[0]} is not one of its knobs, or is outside the knob's range"
         elif assignments and missed:
             fault = f"it does not pass: {'; '.join(missed)}"
         elif not assignments and not missed:
-            fault = "it passes without doing anything"
+            fault = "it passes with its first settings"
         condition = "misses a goal" if not assignments else "meets all goals"
         value = result.score if assignments else math.nan
         found.append(

@@ -1,4 +1,4 @@
-"""A claim: a measurable sentence about a run, which can be false."""
+"""A claim: a sentence about a run that a measurement shows to be true or false."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SIGNS: dict[Relation, str] = {"at most": "≤", "at least": "≥"}
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence, the number it is about, and the bound on that number.
+    """A sentence, the number that decides it, and the bound on that number.
 
     Attributes:
         text: the sentence, for the learner.
@@ -22,7 +22,7 @@ class Claim:
         bound: in the measure's unit.
         fails_with: assignments "PATH=VALUE" on top of the step's own under which the sentence is false.
             Goals of a challenge have none: they fail at the challenge's start.
-        because: why it is false there, in a few words.
+        because: why it is false under that setting, in a few words.
     """
 
     text: str
@@ -33,7 +33,7 @@ class Claim:
     because: str = ""
 
     def holds(self, value: float) -> bool:
-        """Whether a measured value fulfils the claim; NaN does not."""
+        """Whether a measured value fulfils the claim; False for NaN."""
         return holds(value, self.relation, self.bound)
 
     @property
@@ -43,10 +43,10 @@ class Claim:
 
 
 def holds(value: float, relation: Relation, bound: float) -> bool:
-    """Whether a value is at most, or at least, a bound; NaN is neither."""
+    """Whether a value is at most, or at least, a bound; False for NaN."""
     return value <= bound if relation == "at most" else value >= bound
 
 
 def condition(relation: Relation, bound: float, unit: str) -> str:
-    """As an inequality, e.g. "≤ 1 mm"."""
+    """The condition as an inequality, e.g. "≤ 1 mm"."""
     return f"{_SIGNS[relation]} {bound:g} {unit}".rstrip()

@@ -14,14 +14,14 @@ Script = tuple[tuple[float, Event], ...]
 
 @dataclass(frozen=True)
 class Control:
-    """A setting that is offered beside a step.
+    """A setting that the learner can change in a step.
 
     Attributes:
         path: as in `lessons.settings.settings.Settings.changed`.
         words: its label.
         low, high: the ends of a slider; for a number only.
         log: the slider is logarithmic; low > 0.
-        choices: the values to choose from instead; (False, True) is a switch.
+        choices: the values of a menu, instead of a slider; (False, True) gives a switch.
     """
 
     path: str
@@ -45,7 +45,7 @@ class Control:
 
 
 def chosen(settings: SceneSettings, control: Control) -> Any:
-    """The choice of a control that the settings have at present; None if they have none of them."""
+    """The choice of a control that the settings have at present; None if they have another value."""
     fitting = (each for each in control.choices if settings.changed(control.path, each) == settings)
     return next(fitting, None)
 

@@ -21,8 +21,8 @@ class Card:
     Attributes:
         title: a few words.
         question: one sentence.
-        minutes: how long it takes.
-        needs: what one must know before.
+        minutes: duration.
+        needs: required knowledge.
     """
 
     title: str
@@ -56,7 +56,7 @@ class Ghost:
     """A second robot in the same scene: the same events and clock, other settings.
 
     Attributes:
-        words: what it is, for the legend.
+        words: its name in the legend.
         set: assignments on top of the step's.
     """
 
@@ -66,7 +66,7 @@ class Ghost:
 
 @dataclass(frozen=True)
 class Step:
-    """One idea: what to do, what will happen, and why.
+    """One step: an idea, a run, its claims and an explanation.
 
     Texts are Markdown with equations in $…$ (LaTeX), numbered as in the paper; their indentation in the file
     does not count.
@@ -74,16 +74,16 @@ class Step:
     Attributes:
         title: a few words.
         text: the idea.
-        do: what to do by hand once the scripted run was seen.
-        why: shown after the run: why it came out like this.
-        claims: what the run shows.
+        do: a task for the learner after the scripted run.
+        why: explanation of the result, shown after the run.
+        claims: statements about the run.
         set: assignments on top of the lesson's.
         events: the script.
         duration: s.
         prediction: asked before the run.
         ghost: a second robot to compare with.
-        controls: the few settings that matter here.
-        plots: the signals to look at.
+        controls: the few settings that the learner can change.
+        plots: the signals that are plotted.
     """
 
     title: str
@@ -103,21 +103,21 @@ class Step:
         for field in ("text", "do", "why"):
             object.__setattr__(self, field, cleandoc(getattr(self, field)))
         if not self.claims:
-            raise ValueError(f"step '{self.title}' claims nothing")
+            raise ValueError(f"step '{self.title}' has no claims: give at least one Claim(…)")
         for claim in self.claims:
             if not claim.fails_with or not claim.because:
-                raise ValueError(f"claim '{claim.text}' does not say under which setting it fails, and why")
+                raise ValueError(f"claim '{claim.text}' has no fails_with=…, or no explanation for it")
             if claim.measure.over_ghost and self.ghost is None:
-                raise ValueError(f"claim '{claim.text}' compares with a ghost and there is none")
+                raise ValueError(f"claim '{claim.text}' compares with a ghost: give the step ghost=Ghost(…)")
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """A card, a scene and what happens in it.
+    """A card, a scene and the steps in this scene.
 
     Attributes:
         name: its file's name with dashes.
-        card: what it is about.
+        card: title, question, duration and required knowledge.
         scene: name of a scene of `lessons.scenes.catalog.load_scene`.
         steps: in order.
         set: assignments "PATH=VALUE" for all steps.

@@ -1,4 +1,4 @@
-"""Numbers about a run: a signal over time, a window, a statistic. All of it is data."""
+"""Numbers about a run, described as data: a signal over time, a window, a statistic."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Signal:
         name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.layout_of`, and for velocity-level
             scenes `lessons.session.velocity_rows.layout_of`).
         unit: a key of UNITS.
-        column: which component of the field; None: its Euclidean norm.
+        column: index of a component of the field; None: the field's Euclidean norm.
     """
 
     name: str
@@ -67,11 +67,11 @@ class Signal:
 
     def __post_init__(self) -> None:
         if self.unit not in UNITS:
-            raise ValueError(f"signal '{self.name}': unit '{self.unit}' is none of {', '.join(UNITS)}")
+            raise ValueError(f"signal '{self.name}': unit '{self.unit}' is not one of {', '.join(UNITS)}")
 
     @property
     def words(self) -> str:
-        """What it is, for legends."""
+        """Its name in legends."""
         base, _, of = self.name.partition("/")
         plain = f"{base} of {of}" if of else _NAMES.get(base, base.replace("_", " "))
         if self.column is None:
@@ -93,11 +93,11 @@ class Measure:
     """One number about a run.
 
     Attributes:
-        signal: of what.
+        signal: the signal.
         statistic: "largest" absolute value, "rms", "mean", "range" (greatest minus least), "last" (mean over
             the last 50 ticks) or "sum".
         after, until: the window, s.
-        over_ghost: divided by the same number of the ghost's run; its unit is then "×".
+        over_ghost: whether it is divided by the same number of the ghost's run; its unit is then "×".
     """
 
     signal: Signal
@@ -108,7 +108,7 @@ class Measure:
 
     @property
     def words(self) -> str:
-        """What it is, for tables and the page."""
+        """Its name in tables and on the page."""
         since = f" from {self.after:g} s" if self.after > 0 else ""
         until = f" until {self.until:g} s" if math.isfinite(self.until) else ""
         ghost = ", over the ghost's" if self.over_ghost else ""
@@ -116,12 +116,12 @@ class Measure:
 
     @property
     def unit(self) -> str:
-        """Of the value."""
+        """The unit of the value."""
         return "×" if self.over_ghost else self.signal.unit
 
     @property
     def alone(self) -> Measure:
-        """The same without the ghost."""
+        """The measure without the comparison with the ghost."""
         return replace(self, over_ghost=False)
 
     def value(self, rows: RunRows, ghost: RunRows | None = None) -> float:
@@ -160,20 +160,23 @@ _NEAR = math.radians(5.0)
 
 
 def _ahead(rows: RunRows) -> Array:
-    """Distance of each joint from the end of its range that it moves to, (ticks, n) rad; 0 beyond it."""
+    """Distance of each joint from the end of its range towards which it moves, (ticks, n) rad; 0 beyond
+    it."""
     forward = rows["v"] > 0.0
     return np.maximum(np.where(forward, rows["q_upper"] - rows["q"], rows["q"] - rows["q_lower"]), 0.0)
 
 
 def _deceleration_to_stop(rows: RunRows) -> Array:
-    """The largest q̇²/2d with d the distance ahead, (ticks, 1) rad/s²; from 0.05° on it is not defined."""
+    """The largest q̇²/2d with d the distance of `_ahead`, (ticks, 1) rad/s²; it is not defined for distances
+    below 0.05°."""
     ahead = _ahead(rows)
     found = np.where(ahead > _CLOSE, rows["v"] ** 2 / (2.0 * np.maximum(ahead, _CLOSE)), math.nan)
     return np.fmax.reduce(found, axis=1, keepdims=True)
 
 
 def _speed_near_an_end(rows: RunRows) -> Array:
-    """The largest speed of joints less than 5° before an end of their range, (ticks, 1) rad/s; or NaN."""
+    """The largest speed of the joints that are less than 5° before an end of their range, (ticks, 1) rad/s;
+    NaN if there is no such joint."""
     found = np.where(_ahead(rows) < _NEAR, np.abs(rows["v"]), math.nan)
     return np.fmax.reduce(found, axis=1, keepdims=True)
 
@@ -188,25 +191,25 @@ def _at(bit: int) -> Callable[[RunRows], Array]:
 
 
 def _joints_moved(rows: RunRows) -> Array:
-    """How many joints are more than 1° from where they started, (ticks, 1)."""
+    """Number of joints that are more than 1° away from their start, (ticks, 1)."""
     q = rows["q"]
     return (np.abs(q - q[:1]) > math.radians(1.0)).sum(axis=1, keepdims=True).astype(float)
 
 
 def _tip_travel(rows: RunRows) -> Array:
-    """How far the task `position` is from where it started, (ticks, 1) m."""
+    """Distance of the value of the task `position` from its start, (ticks, 1) m."""
     x = rows["x/position"]
     return np.linalg.norm(x - x[:1], axis=1, keepdims=True)
 
 
 def _way_of_the_base(rows: RunRows) -> Array:
-    """How far the base has driven since the first row, along its path, (ticks, 1) m."""
+    """Length of the base's path from the first row on, (ticks, 1) m."""
     steps = np.linalg.norm(np.diff(rows["x/base"], axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])[: len(rows["t"]), None]
 
 
 def _time_at_work(rows: RunRows) -> Array:
-    """t as long as tasks of the mission are left, (ticks, 1) s; then not defined."""
+    """t as long as the mission has tasks that are not completed, (ticks, 1) s; afterwards NaN."""
     return np.where(rows["left"] > 0, rows["t"], math.nan)
 
 
@@ -224,8 +227,8 @@ DERIVED: Mapping[str, Callable[[RunRows], Array]] = {
     "way of the base": _way_of_the_base,
     "time at work": _time_at_work,
 }
-"""Signals that telemetry does not record as they are. Torque shares suppose symmetric bounds; the last two
-are of velocity-level scenes."""
+"""Signals that are computed from the fields of telemetry. Torque shares assume symmetric bounds; the last two
+signals exist in velocity-level scenes only."""
 
 
 def _last(values: Array) -> float:

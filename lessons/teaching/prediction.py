@@ -17,7 +17,7 @@ class PredictionResult:
 
     Attributes:
         score: 0 (far off) to 1 (right).
-        words: one sentence with what was measured.
+        words: one sentence with the measured value.
     """
 
     score: float
@@ -26,7 +26,7 @@ class PredictionResult:
 
 @dataclass(frozen=True)
 class Option:
-    """One answer of a choice: right if the measured number lies in [low, high)."""
+    """One answer of a choice. It is right if the measured number is in [low, high)."""
 
     text: str
     low: float = -math.inf
@@ -40,7 +40,7 @@ class Choice:
     Attributes:
         question: one sentence.
         options: their intervals do not overlap.
-        measure: the number that decides.
+        measure: the number that decides which option is right.
         tempting: index of a wrong answer that many learners give.
     """
 
@@ -50,7 +50,7 @@ class Choice:
     tempting: int
 
     def right(self, value: float) -> int | None:
-        """Index of the option that is right for a measured number; None if there is none."""
+        """Index of the right option for a measured number; None if no option is right."""
         return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
 
     def grade(self, picked: int, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:
@@ -73,9 +73,10 @@ class Value:
 
     Attributes:
         question: one sentence.
-        measure: the number asked for; it is above 0.
+        measure: the number to predict; it is above 0.
         low, high: ends of the scale, 0 < low < high; the scale is logarithmic.
-        factor: a guess within this factor of the truth is right; one off by its square is worth nothing.
+        factor: a guess within this factor of the measured number is right; a guess that is wrong by the
+            square of this factor has the score 0.
     """
 
     question: str
@@ -101,7 +102,7 @@ class Sketch:
 
     Attributes:
         question: one sentence.
-        signal: what is drawn over time.
+        signal: the signal that is drawn over time.
         low, high: the drawing's vertical range, in the signal's unit.
         until: its horizontal range is 0 to this, s.
         band: a point counts as right within this share of the vertical range.
@@ -116,7 +117,7 @@ class Sketch:
 
     @property
     def measure(self) -> Measure:
-        """The largest size of what is drawn: it must have room in the drawing."""
+        """The largest size of the signal, which must fit into the drawing."""
         return Measure(self.signal, until=self.until)
 
     def grade(self, points: Sequence[tuple[float, float]], rows: RunRows) -> PredictionResult:

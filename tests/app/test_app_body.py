@@ -246,5 +246,5 @@ def test_in_a_lesson_the_stack_stays() -> None:
     lesson.handle(Post(Set("stack.remove", "posture")))
     lesson.settle()
     assert lesson.session.settings.levels == before
-    assert "In a lesson the stack stays" in lesson.status().notices[0]
+    assert "The stack cannot be changed in a lesson" in lesson.status().notices[0]
     lesson.close()

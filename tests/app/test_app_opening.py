@@ -123,7 +123,7 @@ def test_who_serves_others_reads_which_address_is_for_whom() -> None:
         assert others[0] == f"  for others:           {server.url}/?himpc-token={token}"
         assert others[1] == f"  through the proxy:    {origin}/?himpc-token={token}"
         assert others[2].startswith("  instructor's token:   ")
-        assert "Keep the first address to yourself" in others[3] and "--no-own-files" in others[3]
+        assert "Keep the first address secret" in others[3] and "--no-own-files" in others[3]
 
 
 def test_no_token_says_what_it_gives_up() -> None:

@@ -77,7 +77,7 @@ def test_own_code_that_is_wrong_leaves_what_ran_before(body: SimulationRunner, f
     own = body.status().own
     assert own is not None
     assert own.fault is not None
-    assert "line 1: expected ':'. What ran before goes on." in own.fault
+    assert "line 1: expected ':'. The previous code continues to run." in own.fault
     assert body.session.failure is None
     file.write_text(HOLDS + "\n")
     assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)

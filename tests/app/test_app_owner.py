@@ -178,9 +178,9 @@ def test_nothing_outside_the_folder_is_opened(own: Path, mark: Path) -> None:
             sentences = set[str]()
             for path in tried:
                 ask(page, field, path, button)
-                told = f"{shortened(str(path), 100)}: only files below"
+                told = f"{shortened(str(path), 100)}: the page opens only files below"
                 assert eventually(lambda told=told: told in said(), 20.0), path
-                sentences.add(said().partition(": only files")[2])
+                sentences.add(said().partition(": the page opens only files")[2])
             assert len(sentences) == 1
             assert str(own.parent) not in sentences.pop()
         assert not mark.exists()

@@ -61,7 +61,7 @@ def test_nobody_waits_for_a_stopped_child(start: Start, monkeypatch: pytest.Monk
     assert any("is lost" in notice for notice in learner.take_messages()[1])
     assert wait_until(lambda: learner.trouble() is not None, LONG)
     said = learner.trouble()
-    assert said is not None and said.state == "SILENT" and "not said a word" in said.sentence
+    assert said is not None and said.state == "SILENT" and "not reported anything" in said.sentence
     assert running(other)
     learner.reset_all()
     assert wait_until(lambda: running(learner), LONG)

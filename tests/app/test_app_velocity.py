@@ -216,7 +216,7 @@ def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
 
             # The message is repeated, because the first one may arrive before the control has a callback.
             assert any(page.turn(RINGS, wanted) or eventually(turned, 10.0) for _ in range(6))
-            assert eventually(lambda: page.shows("turned as its rings are"))
+            assert eventually(lambda: page.shows("orientation of its rings"))
     finally:
         server.close()
 

@@ -144,7 +144,7 @@ def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals
         process.send_signal(stop)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "the same command carries on" in err
+    assert "the same command continues" in err
     assert "Traceback" not in err
     # Python's own helper process ends a moment after its parent.
     assert gone(process.pid, within=30.0)

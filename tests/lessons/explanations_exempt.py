@@ -133,7 +133,7 @@ TEXTS = (
         ("instructors", "A file that is not UTF-8 gets an error message in the table"),
     )),
     Exempt("software", LESSONS + "own_tasks.py::test_a_code_tells_an_own_task_by_its_content", (
-        ("instructors", "A state code (*Export*, *Write it down*) says"),
+        ("instructors", "A state code (*Export*, *Write it down*) contains"),
     )),
     Exempt("software", (
         HIMPC + "adaptation.py::test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one"

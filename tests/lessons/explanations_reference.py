@@ -17,11 +17,7 @@ REFERENCE = (
         ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
         ("himpc/limits/braking.py", "How far the state rows must give way"),
         ("himpc/tasks/pointing.py", "s = Rᵀ(c − p) is the point in the frame's coordinates"),
-        ("lessons/own/files.py", "Where in the file an exception came from"),
-        ("lessons/own/folder.py", "Whether a path leads to below the folder"),
         ("lessons/papers/reproduce.py", "*agrees*: the ratio is within 10 % of 1"),
-        ("lessons/recording/arrays.py", "how: what is worth telling of where it came from"),
-        ("lessons/replay/state.py", "InputError: the robot comes from a file"),
         ("lessons/session/session.py", "seed: seed of the run; all randomness comes from it"),
     )),
     Exempt("purpose", "", (
@@ -31,7 +27,7 @@ REFERENCE = (
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
         ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
-        ("lessons/own/deadline.py", "How long it waited is asked from the first alarm on"),
+        ("lessons/own/deadline.py", "The waiting time is read only after the first alarm"),
         ("lessons/papers/himpc_paper/ablations.py", "All tasks in one cost, one step ahead"),
         ("lessons/scenes/planar.py", "The plant applies any torque"),
         ("lessons/settings/assignments.py", "The controller comes first"),
@@ -143,7 +139,7 @@ REFERENCE = (
     Exempt("software", (
         LESSONS + "export.py::test_a_script_of_measured_deadlines_says_that_it_cannot_repeat"
     ), (
-        ("lessons/replay/script.py", "Measured computing times took part in it"),
+        ("lessons/replay/script.py", "Measured computing times changed the run"),
     )),
     Exempt("software", LESSONS + "switch.py::test_the_torque_goes_from_one_controller_to_the_other", (
         ("lessons/session/bumpless.py", "Both see the measured state and the torque"),
@@ -155,13 +151,10 @@ REFERENCE = (
         ("lessons/settings/missions.py", "All but the tasks in the window is the same"),
     )),
     Exempt("software", LESSONS + "deadline.py::test_the_clock_decides_only_if_asked_to", (
-        ("lessons/settings/settings.py", "Whether the clock on the wall decides anything"),
+        ("lessons/settings/settings.py", "Whether measured computing times change the run"),
     )),
     Exempt("software", LESSONS + "deadline.py::test_the_horizon_decides_what_is_late", (
-        ("lessons/settings/torque.py", "solve_ms_per_knot: how long the computer"),
-    )),
-    Exempt("software", LESSONS + "own.py::test_own_files_are_run_only_where_the_command_line_says_so", (
-        ("lessons/settings/torque.py", "No path reaches them: what comes from elsewhere"),
+        ("lessons/settings/torque.py", "solve_ms_per_knot: assumed computing time"),
     )),
 )
 # fmt: on

@@ -121,7 +121,7 @@ LIMIT_ROWS = (
         HAND, (0.088, 0.102), ("M_bar_scale=0.5",), (0.138, 0.165), of=("T_s=0.001",),
     ),
     Intervention(
-        "sensors-are-coarse/0", "there the noise alone uses up the torque",
+        "sensors-are-coarse/0", "then the noise alone takes all the torque",
         HAND, (20, 200), ("limits.torque_scale=10", "plant.saturate=false"), (0, 0.5),
         of=("plant.encoder_resolution_deg=0.02",),
     ),
@@ -130,7 +130,7 @@ LIMIT_ROWS = (
         HAND, (0.5, 0.7), ("plant.encoder_resolution_deg=0",), (0.5, 0.7), of=("T_s=0.01",), stays=True,
     ),
     Intervention(
-        "sensors-are-coarse/1", "its torque is smoother, and its model knows no friction",
+        "sensors-are-coarse/1", "its torque is smoother, but its model has no friction",
         HAND, (1, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",),
     ),
     # ---------------------------------------- the-model-is-wrong
@@ -173,7 +173,7 @@ LIMIT_ROWS = (
         of=("M_bar_scale=4",), seconds=0.05,
     ),
     Intervention(
-        "the-model-is-wrong/2", "its model knows no friction",
+        "the-model-is-wrong/2", "its model has no friction",
         HAND, (0.9, 1.6), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.6,
     ),
     Intervention(

@@ -49,7 +49,7 @@ MOBILE_ROWS = (
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(
-        "seeing-ahead/0", "it cannot leave for a place that it does not know of",
+        "seeing-ahead/0", "without preview it does not know the next place before 8 s",
         of("way of the base", "m", "range", 6.5, 8.0), (0, 0.05), ("controller=htmpc",), (0.4, 0.8),
         of=("controller=htmpc_wpt",), seconds=8.0,
     ),

@@ -87,7 +87,7 @@ TASK_ROWS = (
     ),
     # ---------------------------------------- two-tasks
     Intervention(
-        "two-tasks/0", "its model knows no friction",
+        "two-tasks/0", "its model has no friction",
         HAND, (0.7, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.6,
     ),
     Intervention(
@@ -146,7 +146,7 @@ TASK_ROWS = (
         stays=True,
     ),
     Intervention(
-        "when-tasks-fight/1", "its model knows no friction",
+        "when-tasks-fight/1", "its model has no friction",
         HAND, (2, 2.7), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.5,
     ),
     Intervention(
@@ -183,15 +183,15 @@ TASK_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "nothing is inverted: without any bound it asks for no more than half",
+        "stretched-out/0", "even without bounds it demands no more than half of the limit",
         of("tau_demand", "N·m", column=1), (1, 2), NO_BOUNDS, (1, 2), of=("controller=himpc",), stays=True,
     ),
     Intervention(
-        "stretched-out/1", "its model knows no friction",
+        "stretched-out/1", "its model has no friction",
         of("error/position", "mm", "largest", 1.0), (2, 3.5), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
     ),
     Intervention(
-        "stretched-out/2", "its model knows no friction, smooth or not",
+        "stretched-out/2", "its model has no friction, whether the start is gentle or not",
         HAND, (0.7, 1.3), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.5,
     ),
     Intervention(

@@ -52,10 +52,10 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
         "no gravity": Mistake("now.gravity +", "", 5, "g(q) is missing"),
         "sign of gravity": Mistake("now.gravity +", "-now.gravity +", 5, "g(q) has the wrong sign"),
-        "gravity of the start": Mistake("", _FROZEN, 7, "g(q) is that of the start"),
+        "gravity of the start": Mistake("", _FROZEN, 7, "g(q) is computed at the start"),
         "no M̄": Mistake("now.M_bar *", "", 5, "M̄ is missing"),
         "no target": Mistake("level.error", 'level.x["posture"]', 5, "q_d is missing"),
-        "holds the torque": Mistake("", _HELD, 2, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 2, "the torque is constant"),
     },
     "null-space": {
         "no J̇q̇": Mistake("- level.J_dot_q_dot", "", 7, "J̇q̇ is missing"),
@@ -67,7 +67,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "not consistent": Mistake(
             "M_inv @ J.T @ L @ J", "np.linalg.pinv(J) @ J", 6, "not dynamically consistent"
         ),
-        "asks twice": Mistake("- level.J @ M_inv @ tau", "", 7, "asked for twice"),
+        "asks twice": Mistake("- level.J @ M_inv @ tau", "", 7, "counted twice"),
         "reverse order": Mistake(
             "in now.levels:", "in now.levels[::-1]:", 3, "the levels are in reverse order"
         ),
@@ -77,12 +77,12 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 3, "K_v has the wrong sign"),
     },
     "time-delay": {
-        "holds the torque": Mistake("", _HELD, 1, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 1, "the torque is constant"),
         "sign of q̈₀": Mistake("- now.q_ddot", "+ now.q_ddot", 3, "q̈₀ has the wrong sign"),
         "no q̈₀": Mistake("- now.q_ddot", "", 3, "q̈₀ is missing"),
         "q̈₀ without T_s": Mistake("- now.q_ddot", "- now.T_s * now.q_ddot", 3, "not divided by T_s"),
-        "the model instead": Mistake("now.tau_0 +", "now.gravity +", 3, "the model stands where τ₀ belongs"),
-        "Ĥ from the model": Mistake("", PD, 3, "the model stands where Ĥ belongs"),
+        "the model instead": Mistake("now.tau_0 +", "now.gravity +", 3, "the model is used instead of τ₀"),
+        "Ĥ from the model": Mistake("", PD, 3, "the model is used instead of Ĥ"),
         "gravity as well": Mistake("now.tau_0 +", "now.tau_0 + now.gravity +", 2, "g(q) is in τ₀ already"),
         "no M̄": Mistake("now.M_bar *", "", 3, "M̄ is missing"),
         "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 3, "K_p has the wrong sign"),
@@ -108,26 +108,28 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "sign of f": Mistake("G.T @ (level.Q * e)", "-G.T @ (level.Q * e)", 2, "f has the wrong sign"),
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 9, "R is missing"),
         "no Q": Mistake("level.Q * e", "e", 5, "Q is missing in f"),
-        "references of now": Mistake("_d[1]", "_d[0]", 6, "this tick's"),
+        "references of now": Mistake("_d[1]", "_d[0]", 6, "those of this tick"),
         "no M̄": Mistake("level.J / now.M_bar", "level.J", 3, "M̄ is missing in G"),
-        "holds the torque": Mistake("", _HELD, 3, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 3, "the torque is constant"),
         "increments alone": Mistake("now.tau_0 + solve_qp", "solve_qp", 3, "τ₀ is missing"),
     },
     "two-levels": {
         "weighted, not strict": Mistake("if torques:", "if False:", 3, "the equality (33) is missing"),
-        "J instead of J M̄⁻¹": Mistake("now.levels[0].J / now.M_bar", "now.levels[0].J", 5, "J₁ stands where"),
+        "J instead of J M̄⁻¹": Mistake(
+            "now.levels[0].J / now.M_bar", "now.levels[0].J", 5, "has J₁ instead of"
+        ),
         "equal to zero": Mistake("B @ U]", "0 * B @ U]", 4, "is set to zero"),
         "no bounds": Mistake(
             "= bounds(now)", "= bounds(now)\n        lower, upper = lower - 1e3, upper + 1e3", 7, "no bound"
         ),
-        "references of now": Mistake("_d[1]", "_d[0]", 7, "this tick's"),
+        "references of now": Mistake("_d[1]", "_d[0]", 7, "those of this tick"),
         "reverse order": Mistake(
             "in now.levels:", "in now.levels[::-1]:", 3, "the levels are in reverse order"
         ),
         "only one level": Mistake(
             "in now.levels:", "in [now.levels[0]] * 2:", 5, "the second level is left out"
         ),
-        "holds the torque": Mistake("", _HELD, 2, "the torque is held"),
+        "holds the torque": Mistake("", _HELD, 2, "the torque is constant"),
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 7, "R is missing"),
     },
 }

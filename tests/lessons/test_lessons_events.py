@@ -34,7 +34,7 @@ def test_events_survive_json(event: Event) -> None:
 
 @pytest.mark.parametrize("data", [{}, {"event": "Explode"}, {"event": "Set"}, {"event": "Reset", "when": 3}])
 def test_what_is_no_event_is_refused(data: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match="no event"):
+    with pytest.raises(InputError, match="not an event"):
         from_data(data)
 
 

@@ -167,7 +167,7 @@ def test_a_controller_without_such_a_qp_says_so() -> None:
     with pytest.raises(InputError, match="choose himpc"):
         plane_of(session, JOINTS, "applied")
     fresh = TorqueSession(torque_scene("planar3-plane"))
-    with pytest.raises(InputError, match="Nothing was solved yet"):
+    with pytest.raises(InputError, match="No QP was solved yet"):
         plane_of(fresh, JOINTS, "applied")
     fresh.advance()
     fresh.post(Set("horizon", 2))

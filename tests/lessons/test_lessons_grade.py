@@ -155,7 +155,7 @@ def test_the_file_with_the_hole_runs_and_its_grade_is_not_full(exercise: str) ->
 
 MISBEHAVING = {
     "syntax": ("def torque(now)\n", "expected ':'"),
-    "no exercise": ("def torque(now):\n    return now.bias\n", "does not say which exercise"),
+    "no exercise": ("def torque(now):\n    return now.bias\n", "has no name of an exercise"),
     "leaves": ("import os\nEXERCISE = 'joint-pd'\nos._exit(0)\n", "ends its own process (exit code 0)"),
     "crashes": ("import os\nEXERCISE = 'joint-pd'\nos.abort()\n", "ends its own process (signal 6)"),
 }
@@ -283,7 +283,7 @@ def test_grades_of_a_folder_are_carried_on(tmp_path: Path, marked) -> None:
 
 @pytest.mark.parametrize(
     ("name", "text", "words"),
-    [("empty", None, "no Python file"), ("other", "a,b\n1,2\n", "is no table of himpc-lab grade")],
+    [("empty", None, "no Python file"), ("other", "a,b\n1,2\n", "is not a table of himpc-lab grade")],
 )
 def test_a_folder_that_cannot_be_graded_is_a_sentence(name, text, words, tmp_path: Path) -> None:
     out = tmp_path / "grades.csv"

@@ -120,7 +120,7 @@ CHEATS = {
 def test_a_grade_cannot_be_taken_from_the_grader(cheat: str, now: View) -> None:
     """The process of a submission contains nothing of the grader."""
     refused = not CHEATS[cheat].startswith("def")
-    assert ("is not there when it is graded" in said(CHEATS[cheat], now)) == refused
+    assert ("cannot be imported during grading" in said(CHEATS[cheat], now)) == refused
     assert refused or said(CHEATS[cheat], now) == ""
 
 
@@ -263,7 +263,7 @@ def test_a_table_of_grades_is_no_program_of_a_spreadsheet(tmp_path: Path) -> Non
     assert {row["points"] for row in rows} == {"0"}
     cells = [line.split(",")[0] for line in out.read_text().splitlines()[1:]]
     assert sorted(cells)[:4] == ["'+1.py", "'-1.py", "'=1+cmd|calc.py", "'@x.py"]
-    assert any("is no text in UTF-8" in row["error"] for row in rows)
+    assert any("is not text in UTF-8" in row["error"] for row in rows)
     before = out.read_text()
     grade_folder(folder, None, 0, out, one_by_one, lambda _: None)
     assert out.read_text() == before

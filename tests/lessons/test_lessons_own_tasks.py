@@ -89,7 +89,7 @@ def test_an_own_task_is_run_only_if_it_was_named_at_the_start(tmp_path: Path) ->
     """A code, an event or a page cannot choose a file of the computer."""
     path = tmp_path / "evil.py"
     path.write_text("import os\nos._exit(1)\n")
-    with pytest.raises(InputError, match=r"named when himpc-lab is started, by --task FILE\.py"):
+    with pytest.raises(InputError, match=r"start himpc-lab with --task FILE\.py"):
         RunSpec("iiwa14-hold", set=(stack(str(path)),)).prepared()
     with pytest.raises(InputError, match=r"evil\.py: loading it ends the program"):
         RunSpec("iiwa14-hold", tasks=(str(path),)).loaded()

@@ -156,17 +156,17 @@ def packed(data: Any) -> str:
 
 
 BAD: dict[str, tuple[str, str]] = {
-    "nothing": ("", "no state code"),
-    "words": ("give me a robot", "no state code"),
-    "a link": ("https://example.org/?state=" + GOOD, "no state code"),
+    "nothing": ("", "not a state code"),
+    "words": ("give me a robot", "not a state code"),
+    "a link": ("https://example.org/?state=" + GOOD, "not a state code"),
     "of the future": ("hl2" + GOOD[3:], "newer"),
     "of the past": ("hl0" + GOOD[3:], "format 0"),
     "too long": ("hl1-" + "A" * MAX_CODE, "characters"),
     "a bomb": (packed(b'{"s":"' + b"A" * 5_000_000 + b'"}'), "incomplete"),
     "no JSON": (packed(b"import os"), "incomplete"),
     "nested": (packed(b"[" * 50_000), "incomplete"),
-    "a list": (packed([1, 2]), "something else"),
-    "a stranger's key": (packed({"s": "planar3-hold", "x": 1}), "something else"),
+    "a list": (packed([1, 2]), "does not contain a state"),
+    "a stranger's key": (packed({"s": "planar3-hold", "x": 1}), "does not contain a state"),
     "NaN": (packed(b'{"s":"planar3-hold","n":NaN}'), "incomplete"),
     "no scene": (packed({}), "no scene"),
     "an unknown scene": (packed({"s": "planar4-hold"}), "planar3-hold"),
@@ -249,7 +249,7 @@ def test_what_a_code_cannot_carry_is_said() -> None:
     first, *others = hold.settings.levels
     own = replace(first, tasks=(OwnKind(name="position"),))
     other = replace(hold.settings, levels=(own, *others))
-    with pytest.raises(InputError, match="cannot be told"):
+    with pytest.raises(InputError, match="cannot be written"):
         state_of(RunSpec("planar3-hold"), other)
 
 

@@ -182,7 +182,7 @@ def test_a_sweep_notices_that_a_file_of_ones_own_was_changed(tmp_path: Path) -> 
         file.write_text("def torque(now):\n    return 3 * now.bias\n")
         yield from outcomes
 
-    with pytest.raises(InputError, match=r"mine\.py@\w+: was changed while it was swept"):
+    with pytest.raises(InputError, match=r"mine\.py@\w+: was changed during the sweep"):
         carry_on(sweep, tmp_path / "other", saved_meanwhile)
 
 

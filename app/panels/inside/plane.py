@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 TITLE = "The QPs of this tick"
 _APPLIED = "what is applied"
-_EMPTY = "Nothing was solved yet: run (Space), or take one tick (T)."
+_EMPTY = "No QP was solved yet: run (Space), or take one tick (T)."
 _SHIFT = 1.0  # N·m
 
 
@@ -54,7 +54,7 @@ class PlanePanel:
         self._fewer = gui.add_button(
             "Look one knot ahead (N = 1)",
             visible=False,
-            hint="Then the plane is all of the QP, not a cut of it",
+            hint="There are no later knots then, and the plane of two joints shows more of the QP",
         )
         with gui.add_folder("Which cut", expand_by_default=False):
             self._pair = gui.add_dropdown(
@@ -63,7 +63,7 @@ class PlanePanel:
             self._through = gui.add_dropdown(
                 "Others held at",
                 (_APPLIED, *levels),
-                hint="Where the other joints' Δτ, and later knots, are held: at the solution of one level",
+                hint="The level at whose solution the other joints' Δτ, and later knots, are held",
             )
             self._shift = gui.add_slider(
                 "Shifted by [N·m]",
@@ -71,7 +71,7 @@ class PlanePanel:
                 max=_SHIFT,
                 step=0.01,
                 initial_value=0.0,
-                hint="The other joints' Δτ, away from there",
+                hint="Offset of the other joints' Δτ from that solution",
             )
 
         on_click(self._fewer, lambda: post(Set("horizon", 1)))
@@ -122,13 +122,13 @@ class PlanePanel:
                 f"contours of its cost; the disc is its optimum; (33) leaves {left}"
             )
         lines.append(
-            f'<span style="color:{css(BAD)}">▭</span> the box of bounds; what is red cannot be asked for'
+            f'<span style="color:{css(BAD)}">▭</span> the box of bounds; the red area violates a bound'
         )
         lines.append(f'<span style="color:{css(GHOST)}">◆</span> one weighted cost of all; no priorities')
         if plane.osf is not None:
-            outside = "outside the box" if not plane.box.inside(plane.osf) else "in the box this time"
-            lines.append(f'<span style="color:{css(BAD)}">▲</span> OSF asks for this: {outside}')
+            outside = "outside the box" if not plane.box.inside(plane.osf) else "inside the box in this tick"
+            lines.append(f'<span style="color:{css(BAD)}">▲</span> the increment of OSF: {outside}')
         lines.append(f"Geometry and solver agree to <b>{figure(max(plane.apart, 1e-16), 'N·m')}</b>.")
         if several:
-            lines.append("Later knots are held where the solution has them.")
+            lines.append("Later knots are held at their values in the solution.")
         return block("<br>".join(lines))

@@ -65,7 +65,7 @@ def markup(values: np.ndarray | Sequence[float]) -> str:
     parts.append(
         f'<text x="{x0}" y="{SIZE[1] - 18}" text-anchor="middle" font-weight="600">{_verdict(worst)}</text>'
         f'<text x="{x0}" y="{SIZE[1] - 4}" text-anchor="middle">'
-        "A millisecond multiplies each part of the error by its eigenvalue.</text>"
+        "Each tick multiplies each part of the error by its eigenvalue.</text>"
     )
     return "".join(parts)
 

@@ -31,8 +31,8 @@ def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
     done = sum(name in progress.seen for name in COURSE)
     gui.add_html(
         block(
-            f"<b>{len(COURSE)} lessons</b>, each a question, a robot and a measurement: predict, run, see. "
-            f"{done} of them begun. What you did is kept in this browser."
+            f"<b>{len(COURSE)} lessons</b>, each with a question, a robot and a measurement: predict, run, "
+            f"compare. {done} of them begun. Your progress is stored in this browser."
         )
     )
     for number, name in enumerate(COURSE, start=1):
@@ -48,7 +48,7 @@ def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
     gui.add_html(
         _framed(
             glyph("laboratory"),
-            "<b>Free laboratory</b><br>Any robot, any scene, every setting: no questions asked.",
+            "<b>Free laboratory</b><br>Any robot, any scene, every setting, without a lesson.",
         )
     )
     _button(gui, "Go to the laboratory", LABORATORY, choose)

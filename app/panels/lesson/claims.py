@@ -72,19 +72,21 @@ def after(part: Part, lecture: Lecture) -> str:
 def _free(lecture: Lecture) -> str:
     judged = "your last run" if lecture.changed else "the scripted run"
     if lecture.lost_at is not None:
-        return f"The robot stands where it was lost: run again. The marks above judge {judged}."
-    return f"The robot is free now; the marks above judge {judged}."
+        return f"The robot lost control and stopped: run again. The marks above judge {judged}."
+    return f"You can move the robot now; the marks above judge {judged}."
 
 
 def _progress(lecture: Lecture) -> str:
     share = lecture.t / lecture.duration
     match lecture.phase:
         case "waiting":
-            words = "Set the knobs, then start the run."
+            words = "Choose the settings, then start the run."
         case "preparing":
-            words = "One moment: the ghost is still being computed."
+            words = "The run starts when the ghost has been computed."
         case "running":
-            words = f"{badge('RUNNING', GOOD)} {lecture.t:.2f} of {lecture.duration:g} s, judged as it goes"
+            words = (
+                f"{badge('RUNNING', GOOD)} {lecture.t:.2f} of {lecture.duration:g} s, judged during the run"
+            )
         case "done":
             words = f"{badge('DONE', LEVELS[1])} judged on the first {lecture.t:.3g} s of the run"
     if lecture.lost_at is not None:

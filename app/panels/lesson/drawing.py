@@ -130,7 +130,7 @@ class _Frame(NamedTuple):
         return self.height - 14 - (self.height - 14 - self.top) * min(max(share, 0.0), 1.0)
 
     def axes(self, low: str, high: str) -> list[str]:
-        """The axes, with their ends in words."""
+        """The axes, with the labels of their ends."""
         corner = f"M{self.left} {self.top}V{self.height - 14}H{_W - 6}"
         return [
             f'<path d="{corner}" stroke="{css(BOUND)}" fill="none"/>',

@@ -16,7 +16,7 @@ def exercise_cards() -> str:
     """The cards of all exercises, in order."""
     said = (
         f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own; "
-        "what you save runs here, and the last command judges what the robot does."
+        "this page runs the file whenever you save it, and the last command judges the robot's motion."
     )
     return block(said) + "".join(card(load_exercise(name)) for name in EXERCISES)
 
@@ -45,7 +45,7 @@ def _judged_by(exercise: Exercise) -> str:
         f"<li>{esc(each.text)} {esc(readable(each.condition))} {badge(f'{each.points}', DAMPING)}</li>"
         for each in exercise.checks(0)
     )
-    return f"<details><summary>What it is judged by, with points</summary><ul>{lines}</ul></details>"
+    return f"<details><summary>The criteria and their points</summary><ul>{lines}</ul></details>"
 
 
 def _hints(hints: Sequence[str], number: int = 1) -> str:

@@ -147,7 +147,7 @@ class Asking:
             self._picture.content = html
 
     def _pictured(self, lecture: Lecture | None) -> str:
-        """lecture: given after the run was graded; an input that came too late is not part of it."""
+        """lecture: given after the run was graded; it does not contain an input that came too late."""
         truth, mine = (math.nan, self._mine) if lecture is None else (lecture.truth, lecture.answer)
         match self._prediction:
             case Choice() as choice:
@@ -170,7 +170,7 @@ def _options(choice: Choice, picked: Answer | None, truth: float) -> str:
         mine = k == picked
         note = ""
         if right is not None:
-            note = " <b>✓ so it was</b>" if k == right else " <b>✗ not so</b>" if mine else ""
+            note = " <b>✓ measured</b>" if k == right else " <b>✗ not measured</b>" if mine else ""
         colour = css(GOOD, 0.2) if k == right else css(LEVELS[0], 0.18) if mine else "transparent"
         rows += (
             f'<div style="background:{colour};border-radius:4px;padding:0.1em 0.4em">'

@@ -87,7 +87,7 @@ class LessonPanel:
                     add_control(gui, self._bindings, knob, self._settings())
         self._run = gui.add_button("Run this step", color=LEVELS[1], hint="Key P")
         self._hurry = gui.add_checkbox(
-            "As fast as it goes", self._fast, hint="Instead of real time: for those who have seen it"
+            "As fast as possible", self._fast, hint="Instead of real time: if you have seen the run before"
         )
         self._state = gui.add_html("")
         self._after = gui.add_html("")

@@ -18,9 +18,10 @@ class BindingPanel:
     def __init__(self, gui: viser.GuiApi, colours: dict[str, RGB]) -> None:
         self._colours = colours
         gui.add_html(
-            block("A bound <b>binds</b> when the plan stops at it. The multiplier is the bound's price: "
-                  "how fast the level's cost would fall if it gave way, twice as fast for costs without a "
-                  "half, such as (31). The slack says how far it was softened.")
+            block("A bound <b>binds</b> (is active) when the plan stops at it. The multiplier is the rate at "
+                  "which the level's cost would fall if the bound were moved outwards; for costs without the "
+                  "factor ½, such as (31), the rate is twice the multiplier. The slack is the distance by "
+                  "which the bound was softened.")
         )  # fmt: skip
         with gui.add_folder("Binding now"):
             self._now = gui.add_html("")

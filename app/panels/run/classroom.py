@@ -43,13 +43,13 @@ def add_watching(gui: viser.GuiApi, give: Callable[[str], bool]) -> None:
     """Adds the top of the panel for a page in a classroom.
 
     Args:
-        gui: where.
+        gui: the page's controls.
         give: takes a token and returns whether it was the right one.
     """
     gui.add_html(
         block(
-            "<b>Classroom: you are watching.</b> The instructor steers this robot; the view, the "
-            "tabs and the plots are yours."
+            "<b>Classroom: you are watching.</b> Only the instructor can control this robot; you can change "
+            "the view, the tabs and the plots of your page."
         )
     )
     token = gui.add_text("Instructor's token", "", hint="Printed where himpc-lab was started.")

@@ -45,7 +45,7 @@ class ComparePanel:
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
         self._start = gui.add_button("Start the ghost", color="violet")
         self._swap = gui.add_button(
-            "Swap robot and ghost", hint="What is different changes sides; both start again", visible=False
+            "Swap robot and ghost", hint="Each gets the other's settings; both start again", visible=False
         )
         self._end = gui.add_button("Remove the ghost", visible=False)
         self._table = gui.add_html("", visible=False)
@@ -194,8 +194,8 @@ def _milliseconds(value: float) -> str:
 
 
 _INTRO = block(
-    "<b>A second robot does the same with other settings.</b> Say what is different about it; both start "
-    "together, see the same targets and pushes, and share one clock. Whatever else you change while it runs "
-    "changes for both.",
+    "<b>A second robot does the same with other settings.</b> Choose the settings in which it differs. Both "
+    "start together, get the same targets and pushes, and share one clock. If you change another setting "
+    "during the run, it changes for both.",
     "padding-top:0.5em",
 )

@@ -34,7 +34,11 @@ class ExportPanel:
         for label, make, hint in (
             ("Rows as .npz", self._npz, "NumPy arrays with the names of himpc-lab run --npz"),
             ("Rows as .csv", self._csv, "One line per row, for a spreadsheet; SI units"),
-            ("Plots as .png", self._png, "Errors, joints inside their bounds, time; the ghost dashed"),
+            (
+                "Plots as .png",
+                self._png,
+                "Errors, joints with their bounds, computing time; the ghost dashed",
+            ),
         ):
             self._button(gui, label, make, hint)
 
@@ -98,7 +102,7 @@ class ExportPanel:
 
 
 _INTRO = block(
-    f"<b>Take the run with you.</b> The page keeps up to {RATE:g} rows per second, each exactly as the "
-    "simulation wrote it, and of a long run every second, fourth, … of them.",
+    f"<b>Download the run.</b> The page keeps up to {RATE:g} rows per second, each exactly as the simulation "
+    "wrote it; of a long run it keeps every second, fourth, … of these rows.",
     "padding-top:0.5em",
 )

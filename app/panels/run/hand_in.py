@@ -14,7 +14,7 @@ from robots import InputError
 
 def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
     """Adds a folder to the current container. The text is made on request, on viser's threads."""
-    with gui.add_folder("Hand in what you did", expand_by_default=False):
+    with gui.add_folder("Hand in your progress", expand_by_default=False):
         gui.add_html(block(_SIGNED if notebook.signs else _NOT_SIGNED))
         name = gui.add_text("Your name", "")
         make = gui.add_button("Write the text")

@@ -13,39 +13,45 @@ _KEYS = (
     ("T", "a single control tick (pauses first)"),
     ("R", "robot back to its start, settings kept"),
     ("J, K", "while paused: look back and forward, with Shift in larger steps"),
-    ("G", "pull by hand or not: drag any link, the red arrow is the force"),
-    ("F", "the camera finds all of the robot again"),
+    ("G", "switch pulling by hand on or off: drag any link, the red arrow is the force"),
+    ("F", "turn the camera to the whole robot"),
     ("L", "all lessons"),
-    ("P, N, B", "in a lesson: play the step's script, next step, step before"),
+    ("P, N, B", "in a lesson: play the step's script, next step, previous step"),
     ("?", "this help"),
     ("1 … 9", "switch the level at that place on or off"),
     ("Ctrl K", "every command, searchable"),
     ("W A S D Q E", "the camera goes forward, left, back, right, down, up; the arrow keys turn it"),
-    ("", "a field or a checkbox you just used keeps the keys: click beside it first"),
+    ("", "after you have used a field or a checkbox, click beside it first: it receives all keys until then"),
 )
 _MARKS = (
     ("Q, R", "weights of the residual and of the changes of torque"),
     (
         "dynamic leak",
-        "the leak with the plant's true inertia instead of M̄: what the wrong M̄ costs",
+        "the leak with the plant's true inertia instead of M̄: the effect of the wrong M̄",
     ),
-    ("rung", "what was applied when a QP had no sound solution; anything but 'solved' is shown in red"),
-    ("δ", "HTMPC: by how much lower levels may enlarge a higher level's error; |e*| + δ is its bound"),
-    ("window", "HTMPC: the tasks of the mission that the controller has now, the first one highest"),
+    (
+        "rung",
+        "the fallback that was applied when a QP had no valid solution; all but 'solved' are shown in red",
+    ),
+    (
+        "δ",
+        "HTMPC: the amount by which lower levels may enlarge a higher level's error; its bound is |e*| + δ",
+    ),
+    ("window", "HTMPC: the tasks of the mission that the controller has now, highest priority first"),
     ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
 )
 _DRAWN = (
     (
         "ball with arrows",
-        "the target your hand holds; arrows along the world's axes move it, rings turn it while the "
-        "orientation level is on",
+        "the target that you can drag: the arrows move it along the world's axes, the rings turn it while "
+        "the orientation level is on",
     ),
-    ("small frame with a ball", "the filtered target the controller follows (speed, acceleration capped)"),
-    ("large thin frame", "the actual hand"),
-    ("line behind the hand", "where it went in the last seconds"),
-    ("pink line", "the predicted path of the hand, motion enlarged as its label says"),
+    ("small frame with a ball", "the filtered target for the controller (limited speed, acceleration)"),
+    ("large thin frame", "the actual pose of the hand"),
+    ("line behind the hand", "the path of the hand in the last seconds"),
+    ("pink line", "the predicted path of the hand, enlarged by the factor in its label"),
     ("ball, disc with arrows", "mobile robots: the goals of the current tasks of the hand and of the base"),
-    ("circle", "mobile robots: how far the arm reaches about the base"),
+    ("circle", "mobile robots: the reach of the arm around the base"),
 )  # fmt: skip
 
 

@@ -25,7 +25,8 @@ _RUG = 0.035  # height of the mark "at its bound", as a share of the axis
 
 @dataclass(frozen=True, eq=False)
 class _Quantity:
-    """values, lower, upper: (rows, n), NaN or infinite where unknown; fallback (2, n): the data sheet's."""
+    """values, lower, upper: (rows, n), NaN or infinite where unknown; fallback: (2, n), the bounds of the
+    data sheet."""
 
     title: str
     values: np.ndarray

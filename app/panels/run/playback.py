@@ -42,7 +42,7 @@ class PlaybackPanel:
             "Playback",
             (_PAUSE, _STEP, _RESET, _RESET_ALL),
             hint="Space: run or pause · T: one control tick · R: robot back to its start. "
-            "Reset all also brings every setting back.",
+            "Reset all also restores every setting.",
         )
         self._speed = gui.add_slider(
             "Speed",
@@ -85,7 +85,7 @@ class PlaybackPanel:
             learner.reset_all()
 
     def show_trouble(self, trouble: Trouble | None) -> None:
-        """Shows that a simulation stopped, hangs or takes long; None removes the message."""
+        """Shows the problem of a simulation that stopped, hangs or takes long; None removes the message."""
         self._trouble.visible = trouble is not None
         self._again.visible = trouble is not None and trouble.offer is not None
         if trouble is None:

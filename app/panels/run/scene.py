@@ -110,7 +110,7 @@ class RobotPanel:
             name = path.value.strip()
             self._wait(answer)
             if not is_file(name):
-                self.refuse("No Python file was named: write its path, which ends with .py, first.")
+                self.refuse("There is no path of a Python file: first write the path, which ends with .py.")
                 return
             try:
                 choice = current.with_file(own_files.admits(name))
@@ -123,7 +123,7 @@ class RobotPanel:
     def _ask_file(self, answer: viser.GuiHtmlHandle, own_files: Folder, path: str, tip: str | None) -> None:
         self._wait(answer)
         if not path:
-            self.refuse("No file was named: write the path of a URDF file first.")
+            self.refuse("There is no path of a file: first write the path of a URDF file.")
             return
         try:
             run = RunSpec("hold", own_files.admits(path), tip)
@@ -144,7 +144,7 @@ class RobotPanel:
         try:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
-            self.refuse("The file is not text: upload the URDF file itself, not a mesh or an archive.")
+            self.refuse("The file is not text: upload the URDF file itself instead of a mesh or an archive.")
             return
         self._ask(answer, RunSpec("hold", tip=tip), text)
 
@@ -184,8 +184,8 @@ def _answer(gui: viser.GuiApi) -> viser.GuiHtmlHandle:
 
 
 _FILES = (
-    "A controller, scene, lesson or task, by what the file defines. It is read on this machine, from "
-    "below the folder that himpc-lab was started in (or --own-files DIR), and never uploaded. Only the page "
-    "of the address that was printed for whoever started it offers this. "
-    "<code>himpc-lab new</code> writes one to begin with."
+    "The content of the file decides whether it is a controller, scene, lesson or task. It is read on this "
+    "machine, in or below the folder in which himpc-lab was started (or --own-files DIR), and never "
+    "uploaded. Only the page of the first address that himpc-lab printed offers this. "
+    "<code>himpc-lab new</code> writes a template."
 )

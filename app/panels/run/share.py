@@ -54,7 +54,7 @@ class SharePanel:
         told = self._learner.ask()
         try:
             if told is None:
-                raise InputError("the simulation does not answer: press Reset all first")
+                raise InputError("the simulation does not answer: press Reset all, then try again")
             make(told)
         except InputError as error:
             _refuse(client, error)
@@ -92,7 +92,8 @@ def _state(told: Told) -> State:
 def _from_a_name(choice: SceneChoice) -> SceneChoice:
     if choice.urdf_text is not None:
         raise InputError(
-            "this robot was uploaded, and nobody else has its file: save it and start himpc-lab with --urdf"
+            "a code cannot contain this robot, which was uploaded: save its file and "
+            "start himpc-lab with --urdf"
         )
     return choice
 
@@ -103,6 +104,6 @@ def _refuse(client: viser.ClientHandle | None, error: InputError) -> None:
 
 
 _INTRO = block(
-    "Scene, robot, controller and everything that was changed, as a line for a terminal and as a code for "
-    "somebody else's page. The script repeats what has happened since the last reset, too."
+    "Scene, robot, controller and every changed setting, as a command line for a terminal and as a code for "
+    "another page. The script also repeats the events since the last reset."
 )

@@ -16,7 +16,7 @@ from app.panels.widgets.command import add_command, on_click
 
 _STEP = 0.05  # s
 _SHORT, _LONG = 0.1, 1.0  # s per key press
-_LEAST = 0.2  # s: less is not worth a slider
+_LEAST = 0.2  # s: the slider is shown for a longer history only
 
 
 class TimeLine:
@@ -35,7 +35,7 @@ class TimeLine:
             step=_STEP,
             initial_value=0.0,
             visible=False,
-            hint="Robot, targets, traces and plots as they were, up to a minute ago. "
+            hint="Shows robot, targets, traces and plots at an earlier time, up to a minute ago. "
             f"J and K: {_SHORT:g} s, with Shift {_LONG:g} s; in the slider also ← and →.",
         )
         self._live = gui.add_button("Back to now", visible=False)

@@ -53,8 +53,9 @@ class ControllerPanel:
         with gui.add_folder("Why M̄ matters", expand_by_default=False):
             gui.add_html(
                 formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
-                + block("Time-delay estimation: the torque and acceleration of the tick before stand for the "
-                        "whole dynamics, M̄ for the inertia. The estimation error dies out if")
+                + block("Time-delay estimation: torque and acceleration of the previous tick replace a model "
+                        "of the whole dynamics, and M̄ replaces the inertia. The estimation error decays to "
+                        "zero if")
                 + formula(r"\rho(I - M^{-1} \bar M) < 1")
             )  # fmt: skip
 
@@ -69,8 +70,8 @@ class ControllerPanel:
             f"{bar(radius / 2, GOOD if radius < 1 else BAD, 0.5)}"
             f"norm ‖I − M⁻¹M̄‖₂: <b>{norm:.3f}</b>{_verdict(norm)}"
             f"{bar(norm / 2, GOOD if norm < 1 else BAD, 0.5)}"
-            "The line marks 1. Below it the estimation error dies out; a norm below 1 says so at once, "
-            "the radius decides."
+            "The line marks 1. The estimation error decays to zero if the radius is below 1; a norm below 1 "
+            "implies this."
         )
 
 

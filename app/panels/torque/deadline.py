@@ -35,7 +35,7 @@ class DeadlineFolder:
         if now.settings.deadline_ms == 0:
             text = "Lockstep: no torque is ever late."
         elif ran == 0:
-            text = "Late torques: none counted yet."
+            text = "Late torques: no tick counted yet."
         else:
             text = f"Late torques: <b>{(late - first_late) / ran:.0%}</b> of the last {ran} ticks."
         self._line.content = block(text)

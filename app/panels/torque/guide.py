@@ -14,13 +14,13 @@ from himpc.stack import Level
 def guide(
     tasks: tuple[TaskView, ...], levels: Sequence[Level], colours: Mapping[str, RGB], dragged: bool
 ) -> str:
-    """HTML of what to try, with the present names and places of the levels.
+    """HTML that suggests what to try next, with the present names and places of the levels.
 
     Args:
         tasks: of the stack.
         levels: the stack, disabled ones included: they keep their places.
         colours: per level.
-        dragged: whether the first thing has been done, so that the next can be offered.
+        dragged: whether the target has been dragged, so that the next suggestion is shown.
     """
     places = {level.name: place for place, level in enumerate(levels, start=1) if level.enabled}
     position = draggable(tasks)[0]
@@ -30,7 +30,7 @@ def guide(
 
 
 def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
-    ball = f"It is the {swatch(colours.get(position.level, BOUND))}ball that carries them"
+    ball = f"The arrows are at the {swatch(colours.get(position.level, BOUND))}ball"
     if position.level not in places:
         return _DRAG, f"{ball}. Its level is switched off: switch it on in <b>Tasks</b>."
     own = places[position.level]
@@ -62,11 +62,11 @@ def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[
 def _next(places: Mapping[str, int]) -> tuple[str, str]:
     rest = "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Plant</b>."
     if len(places) < 2:
-        return "Now ask for more.", f"Add a level in the tab <b>Tasks</b>, {rest}"
+        return "Now add a task.", f"Add a level in the tab <b>Tasks</b>, {rest}"
     (top, first), (lower, place), *_ = places.items()
     told = (
         f"Open <b>Tasks</b> (or press {place}) and switch off {_name(lower, place)}: its error may grow. "
-        f"Does {_name(top, first)} notice? Then {rest}"
+        f"Does the error of {_name(top, first)} change? Then {rest}"
     )
     return "Now switch a level off.", told
 

@@ -33,8 +33,8 @@ def add_joint_targets(
     """Adds a folder with a slider per joint for every joint-space task whose target can be moved, if there is
     one.
 
-    targets: the present ones. A target is sent as a whole: if several sliders move at once, each change
-    includes those that the other sliders have already requested.
+    targets: returns the present targets. A target is sent as a whole: if several sliders move at once, each
+    change includes the changes that the other sliders have already requested.
     """
     tasks = [task for task in level.tasks if isinstance(task, (Joints, Posture)) and task.name in targets()]
     if not tasks:
@@ -77,7 +77,7 @@ def _add_slider(
         max=max(value, -_inside(-(far if unbounded else high), factor, digits)),
         step=step,
         initial_value=value,
-        hint="Where the task wants the joint, within its limits",
+        hint="Target position of the joint, within the joint's limits",
     )
 
     def event(given: float) -> MoveTarget:

@@ -98,9 +98,9 @@ def _title(place: int, name: str) -> str:
 
 
 def _rank(found: tuple[int, int] | None) -> str:
-    """The number of directions that the level gets of those it asks for."""
+    """A sentence with the number of directions that the level gets, and the number of its rows."""
     if found is None:
         return ""
     rank, rows = found
-    short = "" if rank == rows else ": the rest is taken by the levels above, or the arm cannot"
+    short = "" if rank == rows else ": the levels above use the others, or the arm cannot move in them"
     return f"<br>gets {rank} of {rows} directions{short}"

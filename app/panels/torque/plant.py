@@ -15,7 +15,9 @@ def add_plant(
     gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings, robot: Robot
 ) -> None:
     """Adds the controls of the plant's settings."""
-    gui.add_html(block("This is the truth in the simulation. The controller sees none of it."))
+    gui.add_html(
+        block("These are the true values of the simulated robot. The controller does not know them.")
+    )
     controls = Controls(gui, bindings, settings)
     controls.add("plant.payload_kg", "plant.friction", "plant.damping", "plant.armature")
     # One factor per link, named by the joint that moves the link.

@@ -17,9 +17,9 @@ _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
 
 
 class LevelPlots:
-    """Plots with logarithmic axes, which show a micrometre as well as a lost level without changing their
-    range. The curves of a ghost are dashed; the page's loop rebuilds the charts when a ghost starts or
-    ends."""
+    """Plots with logarithmic axes of fixed range, which show an error of a micrometre and the large error of
+    a level without control. The curves of a ghost are dashed; the page's loop rebuilds the charts when a
+    ghost starts or ends."""
 
     def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
         self._gui, self._in_view = gui, in_view

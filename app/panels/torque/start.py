@@ -54,8 +54,8 @@ class StartPanel:
             self.clamp = gui.add_checkbox(
                 "Keep within reach",
                 True,
-                hint="On: the controller gets the nearest point the robot can reach. "
-                "Off: it gets your point as it is, and you see what a singular arm does.",
+                hint="On: the controller gets the nearest point that the robot can reach. "
+                "Off: it gets your point unchanged, and you can see how a singular arm moves.",
             )
             recall = gui.add_button("Bring the target to the hand")
         with gui.add_folder("Push the robot"):
@@ -68,10 +68,10 @@ class StartPanel:
             self.pull = gui.add_checkbox(
                 "Pull by hand",
                 False,
-                hint="Drag any link with the mouse: it pulls like a rubber band. Key G. While this is on, a "
-                "link in front of the target keeps the mouse from it.",
+                hint="Drag any link with the mouse: the force grows with the distance, like that of a rubber "
+                "band. Key G. While this is on, you cannot drag the target through a link in front of it.",
             )
-            self._load = gui.add_button(_PICK_UP, hint="The controller is not told")
+            self._load = gui.add_button(_PICK_UP, hint="The controller does not know about the payload")
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand", True)
             self.prediction = gui.add_checkbox("Predicted path", True)
@@ -79,8 +79,8 @@ class StartPanel:
             self.ellipsoids = gui.add_checkbox(
                 "Manipulability ellipsoids",
                 False,
-                hint="How fast each level could move its frame with joints of unit speed, by what the levels "
-                "above leave it; flat where it cannot",
+                hint="The speed at which each level can move its frame with joints of unit speed, within the "
+                "freedom that the levels above leave. The ellipsoid is flat in directions without motion",
             )
         self.dark = gui.add_checkbox("Dark theme", dark)
 
@@ -122,10 +122,10 @@ class StartPanel:
             text = f"Out of reach by {quantity(verdict.missing, 'm')}. " + (
                 "The controller gets the nearest point instead (the ball without arrows)."
                 if clamped
-                else "The controller gets it all the same."
+                else "The controller gets your point unchanged."
             )
         if verdict.turned_away > 0:
-            text += " This orientation cannot be met there: the lower level gives way."
+            text += " The robot cannot have this orientation there: the lower level keeps an error."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
     def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:

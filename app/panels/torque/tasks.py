@@ -41,7 +41,11 @@ class TasksPanel:
         self._robot, self._in_lesson = robot, in_lesson
         self._post, self._edited = bindings.post, ""
         gui.add_html(
-            block("The most important level first: each gets what the levels above leave."), order=-1.0
+            block(
+                "The level with the highest priority is first. Each level gets the freedom that the levels "
+                "above leave."
+            ),
+            order=-1.0,
         )
         self._place = gui.add_folder(None, order=0.0)
         self._build(current())
@@ -50,7 +54,7 @@ class TasksPanel:
                 "Damp what no level controls",
                 current().damping,
                 hint="R weighs changes of torque only, so a direction without a task keeps its torque and "
-                "runs away when pushed. This last level brings it to rest. Switch it off and push.",
+                "does not stop when pushed. This last level brings it to rest. Switch it off and push.",
             )
             self._damping = gui.add_html("")
         bindings.bind(damping, lambda s: s.damping, lambda on: Set("damping", bool(on)))
@@ -59,8 +63,8 @@ class TasksPanel:
             gui.add_html(formula(r"\sum_j Q \lVert e_{k+j} \rVert^2 + R \lVert \Delta\tau_{k+j} \rVert^2"))
             gui.add_html(
                 block(
-                    "subject to every bound, and without changing any <i>e</i> of the levels above: that is "
-                    "what makes the priority strict."
+                    "subject to every bound, and without changing any <i>e</i> of the levels above. This "
+                    "condition makes the priority strict."
                 )
             )
 

@@ -53,7 +53,7 @@ class HtmpcPanel:
                     formula(r"|e_p| \le |e_p^*| + \delta \quad \text{for every level } p \text{ above}")
                 )
                 gui.add_html(
-                    block("The errors a level above could reach are a bound for the levels below it.")
+                    block("The errors that a level above can reach become a bound for the levels below it.")
                 )
         self._weights()
         with gui.add_folder("Limits"):
@@ -106,11 +106,11 @@ class HtmpcPanel:
         self._lag.content = block(
             f"Lag of the plant: <b>{lag:g} ms</b>{_compensated(settings)}. The last control step took "
             f"{step_ms:.1f} ms of {1e3 * htmpc.period:.3g} ms; "
-            + ("the robot feels that, too." if settings.delay_measured else "simulated time waits for it.")
+            + ("the robot has this delay, too." if settings.delay_measured else "simulated time waits.")
         )
 
 
 def _compensated(settings: VelocitySettings) -> str:
     if settings.plant.latency_ms == 0.0 and not settings.delay_measured:
         return ""
-    return ", predicted away" if settings.compensate_delay else ", not compensated"
+    return ", compensated by prediction" if settings.compensate_delay else ", not compensated"

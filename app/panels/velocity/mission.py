@@ -173,7 +173,7 @@ def _where(goal: tuple[float, ...] | None) -> str:
     if goal is None:
         return "a given trajectory"
     if len(goal) == 4:
-        return "turned as its rings are"
+        return "orientation of its rings"
     return "(" + ", ".join(f"{x:.2f}" for x in goal) + ") m"
 
 

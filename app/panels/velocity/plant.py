@@ -19,5 +19,7 @@ def add_servo_plant(
     gui: viser.GuiApi, bindings: Bindings[VelocitySettings], settings: VelocitySettings
 ) -> None:
     """Adds the controls of the plant's settings."""
-    gui.add_html(block("This is the truth in the simulation. Of it the controller knows the lag at most."))
+    gui.add_html(
+        block("These are the true values of the simulated robot. The controller knows at most the lag.")
+    )
     Controls(gui, bindings, settings).add(*(f"plant.{name}" for name in _SHOWN))

@@ -19,8 +19,8 @@ _W = (1e-4, 1e1)  # m³
 
 
 class TrackingPlots:
-    """Plots with a logarithmic error axis, which shows a millimetre as well as three metres without changing
-    its range."""
+    """Plots with a logarithmic error axis of fixed range, which shows a millimetre as well as three
+    metres."""
 
     def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
         self._in_view, self._tasks = in_view, ready.tasks
@@ -30,8 +30,8 @@ class TrackingPlots:
         self._charts: list[Chart] = []
         self._build(ghost=False)
         gui.add_html(
-            block("Dashed: the bound under which the levels below must keep a task's error, one knot ahead; "
-                  "the last level has none.")
+            block("Dashed: the upper bound that the levels below must respect for a task's error, one knot "
+                  "ahead; the last level has no bound.")
         )  # fmt: skip
 
     def _build(self, ghost: bool) -> None:

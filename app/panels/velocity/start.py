@@ -49,7 +49,7 @@ class BeginPanel:
             "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
         )
         self._clear = gui.add_button(
-            "Take the last ball away", hint="Of those that the robot keeps clear of", visible=False
+            "Take the last ball away", hint="The obstacle that was added last", visible=False
         )
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand and the base", True)
@@ -96,9 +96,9 @@ class BeginPanel:
         place, error = now.number(f"level/{role}"), now.error(role)
         if place != place:
             return f"{head}: has no task now"
-        text = f"{head} (level {place:.0f}): <b>{quantity(error, unit)}</b> off what is asked of it now"
+        text = f"{head} (level {place:.0f}): <b>{quantity(error, unit)}</b> from its present reference"
         if unit == "m" and error > _FAR and place > 1 and bool((abs(now.field("v")) < _STILL).all()):
-            text += ". It rests: going on would disturb level 1"
+            text += ". It rests: any further motion would disturb level 1"
         return text
 
 
@@ -108,13 +108,13 @@ def last_ball(settings: VelocitySettings) -> Ball | None:
 
 
 def guide(scene: str, drives: bool, places: Mapping[str, float], dragged: bool) -> str:
-    """HTML of what to try.
+    """HTML that suggests what to try next.
 
     Args:
         scene: its name.
         drives: whether there is a mobile base.
         places: the level that each role is now, 1 the highest; NaN: it has no task.
-        dragged: whether the first thing has been done, so that the next can be offered.
+        dragged: whether a target has been dragged, so that the next suggestion is shown.
     """
     first = _FIRST.get(scene, _WATCH if drives else _FIRST_ARM)
     then = _NEXT_DRAG if scene in _FIRST else _NEXT_MISSION if drives else _NEXT_ARM
@@ -131,8 +131,8 @@ def guide(scene: str, drives: bool, places: Mapping[str, float], dragged: bool) 
 _FIRST = {
     "ridgeback-ur10-drag": (
         "Drag the two targets by their arrows.",
-        "The orange ball is for the robot's hand: {ee}. The blue disc on the floor is for its base: {base}. "
-        "Drag the disc so far from the ball that the arm is too short for both.",
+        "The orange ball is the target of the robot's hand: {ee}. The blue disc on the floor is the target "
+        "of its base: {base}. Drag the disc so far from the ball that the arm is too short for both.",
     ),
     "ridgeback-ur10-square": (
         "Watch the base stop where the arm is stretched.",
@@ -147,20 +147,20 @@ _WATCH = (
 )
 _NEXT_DRAG = (
     "Now swap which comes first.",
-    "As long as the hand comes first, the base stops where the arm is stretched. Swap, and the base goes and "
-    "takes the hand along. Then put δ and N to the test in <b>Control</b>.",
+    "As long as the hand comes first, the base stops where the arm is stretched. Swap, and the base reaches "
+    "its target and takes the hand along. Then change δ and N in <b>Control</b>.",
 )
 _NEXT_MISSION = (
     "Now change the mission.",
-    "Tasks can be moved, put earlier or later, removed and added in the tab <b>Mission</b>, and a hold that "
-    "waits for somebody is ended there by <b>Release</b>.",
+    "In the tab <b>Mission</b> you can move tasks, put them earlier or later, remove and add them. There "
+    "<b>Release</b> also ends a hold that lasts until somebody releases it.",
 )
 _FIRST_ARM = (
     "Drag the target by its arrows, turn it by its rings.",
-    "Where the hand is: {position}. How it is turned: {orientation}. Level 2 gets only the freedom that "
-    "level 1 leaves.",
+    "The position of the hand: {position}. Its orientation: {orientation}. Level 2 gets only the freedom "
+    "that level 1 leaves.",
 )
 _NEXT_ARM = (
     "Now swap which comes first.",
-    "Then drag the target out of reach, or bound the speed in the tab <b>Control</b>.",
+    "Then drag the target out of reach, or limit the speed in the tab <b>Control</b>.",
 )

@@ -33,8 +33,8 @@ class RolesPanel:
         self._order = tuple(level.name for level in settings.levels)
         self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
         gui.add_html(
-            block("The levels come in the order of the tasks in the mission's window: change it in the tab "
-                  "<b>Mission</b>. The numbers are keys.")
+            block("The levels have the order of the tasks in the mission's window, which you can change in "
+                  "the tab <b>Mission</b>. The number of a level is the key that switches it on or off.")
         )  # fmt: skip
         self._cards = [
             _Card(gui, bindings, settings, level, colours[level.name], place)
@@ -91,10 +91,10 @@ class _Card:
         text = f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
         bound = now.number(f"bound/{level.name}")
         if bound == bound:
-            text += f", levels below may bring it to {quantity(bound, task.unit)}"
+            text += f", levels below may increase it to {quantity(bound, task.unit)}"
         notes = "" if level.enabled else " " + badge("OFF", DAMPING)
         if not inside:
-            text, notes = "no task of it in the window", ""
+            text, notes = "has no task in the window", ""
         fallback = now.number(f"rung/{level.name}")
         if fallback == fallback and fallback > 0:
             notes += " " + badge(FALLBACKS[int(fallback)], BAD)

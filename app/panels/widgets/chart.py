@@ -21,7 +21,7 @@ _NUDGE = 10
 """Number of updates after which the curves are sent even if they have not changed, with an invisible change
 of the time axis. Without it, a chart that was laid out while its panel had no width would never get ticks."""
 _AROUND = 60  # px of a chart's height that the title and the time axis take
-_FINE = 0.35  # px: what is closer to a curve lies on it
+_FINE = 0.35  # px: a point that is closer to a curve counts as a point of the curve
 _TOP = 30_000.0
 """The largest value of every axis as it is sent, in two bytes per value; the smallest is 0. No screen has
 more pixels."""
@@ -34,7 +34,7 @@ _TIMES: uplot.Axis = {
 }
 _PATIENCE = 12
 """Number of updates without a value after which a text explains why the chart is empty."""
-_NOTHING = block("Nothing has happened yet: run (Space), or take single ticks (T), to see a curve.")
+_NOTHING = block("No tick has run yet: run (Space), or take single ticks (T), to see a curve.")
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ class Controls(Generic[S]):
         Args:
             entry: its path must be a setting's.
             read: the value shown, instead of the setting's own.
-            make: the setting's value from a number, where that is not the number.
+            make: returns the setting's value for a slider's number; None: the value is the number.
         """
         place = self._settings.place(entry.path)
         read = place.read if read is None else read

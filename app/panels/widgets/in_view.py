@@ -1,4 +1,4 @@
-"""Finds out which charts the browser shows, so that nothing is sent for the others."""
+"""Finds out which charts the browser shows, so that no data are sent for the others."""
 
 from __future__ import annotations
 

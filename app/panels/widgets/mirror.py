@@ -71,7 +71,7 @@ class Bindings(Generic[S]):
         self._loop.call_soon_threadsafe(unless_removed, self._write, present)
 
     def close(self) -> None:
-        """Called before the controls are removed: nothing is written any more."""
+        """Called before the controls are removed; from then on no value is written to them."""
         self._closed = True
 
     def _write(self, present: S) -> None:

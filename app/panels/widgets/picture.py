@@ -14,9 +14,9 @@ from app.panels.widgets.in_view import InView
 
 _EVERY = 0.15  # s between two updates: a picture in motion has several kilobytes per second
 _AGAIN = 15
-"""Number of updates after which the whole picture is sent again, since a tab that was closed has lost it."""
+"""Number of updates after which the whole picture is sent again: a tab that was closed no longer has it."""
 
-# If the panel is folded or its tab is hidden, the element does not exist and nothing is drawn.
+# If the panel is folded or its tab is hidden, the element does not exist, and the script does nothing.
 _PAINT = """
 window.__himpcLabPaint = (title, count, changes) => {
   for (const each of document.querySelectorAll("[data-chart]")) {

@@ -1,5 +1,5 @@
-"""Follows the run of an exercise in the simulation process: records it, judges it, and says when it has
-ended.
+"""Follows the run of an exercise in the simulation process: records it, evaluates its claims, and reports its
+end.
 
 A run lasts from t = 0 to the exercise's duration. Afterwards the robot can be moved freely, and the measured
 values stay.
@@ -27,9 +27,9 @@ from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError
 
 _JUDGE_EVERY = 5  # reports: twice a second
-_CHUNK = 0.01  # s of the ghost's computation before commands are looked at again
+_CHUNK = 0.01  # s: the longest computation of the ghost between two checks for commands
 FAST = 50.0
-"""Simulation speed for a run that should end as soon as possible: faster than any computer here can be."""
+"""Simulation speed for a run that should end as soon as possible: more than any computer can reach."""
 
 Array = np.ndarray
 
@@ -147,8 +147,8 @@ class Lecturer:
         return True
 
     def _foreign_change(self) -> str:
-        """Why an attempt at a challenge cannot count: a setting that is not one of its knobs differs, or a
-        knob is outside its range."""
+        """A sentence if an attempt at a challenge cannot count, because a setting that is not one of its
+        knobs differs, or a knob is outside its range; "" otherwise."""
         assert isinstance(self._part, Challenge)
         now = self._session.settings
         allowed = self._own
@@ -156,9 +156,9 @@ class Lecturer:
             value: Any = now.value_at(knob.path)
             if value != self._own.value_at(knob.path):
                 if not within(now, knob):
-                    return f"{knob.words} is outside the range this challenge allows."
+                    return f"{knob.words} is outside the range that this challenge allows."
                 allowed = allowed.changed(knob.path, value)
-        return "" if allowed == now else "A setting was changed that is none of this challenge's."
+        return "" if allowed == now else "A setting was changed that does not belong to this challenge."
 
     # ---------------------------------------------------------------- reports
 
@@ -211,11 +211,11 @@ class Lecturer:
 
     def _words_of_change(self) -> str:
         if isinstance(self._part, Challenge):
-            moved = "Something was changed or moved while the run went on; only what stands before it counts."
+            moved = "You changed or moved something during the run; only the part before that counts."
             return self._foreign or (moved if self._touched else "")
         if self._differs:
-            return "Your run: its settings are not the lesson's."
-        return "Your run: you changed or moved something while it went on." if self._touched else ""
+            return "Your run: its settings differ from the lesson's."
+        return "Your run: you changed or moved something during it." if self._touched else ""
 
     def _weigh_prediction(self) -> None:
         """Grades the prediction, which is about the lesson's own run and is measured in it."""

@@ -16,8 +16,8 @@ Stamp = tuple[str, int, int]
 
 
 class File:
-    """Checks the file from time to time. A new text is first judged on a thread, which takes a second, and
-    then replaces the running code without a jump in torque. If the new text is wrong, the running code
+    """Checks the file from time to time. A new version is first tested on a thread, which takes a second, and
+    then replaces the running code without a jump in torque. If the new version has a fault, the running code
     stays."""
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class File:
             judged(read(path))
             self._fault = None
         except InputError as error:
-            self._fault = f"{error}. What ran before goes on."
+            self._fault = f"{error}. The previous code continues to run."
 
     def _take(self, session: TorqueSession) -> None:
         if self._fault is not None:
@@ -58,13 +58,14 @@ class File:
         try:
             session.renew()
         except InputError as error:
-            self._fault = f"{error}. What ran before goes on."
+            self._fault = f"{error}. The previous code continues to run."
         else:
             self._saves, self._taken_at = self._saves + 1, session.t
 
 
 def _stamp(path: str) -> Stamp | None:
-    """None while the file does not exist, which happens for a moment while it is saved."""
+    """The stamp of a file; None while the file does not exist, which happens for a moment while it is
+    saved."""
     try:
         found = os.stat(path)
     except OSError:

@@ -1,4 +1,4 @@
-"""What the simulation process reports about a session of either kind."""
+"""The reports of the simulation process about a session of either kind."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ class SessionReport(ABC):
         self.watch = InsideRequest()
 
     def own(self) -> OwnCode | None:
-        """For a controller from a file: whether it runs. Code that was saved meanwhile takes effect."""
+        """The state of a controller from a file; None for a controller of the lab. Code that was saved since
+        the last call takes effect."""
         return None
 
     @abstractmethod

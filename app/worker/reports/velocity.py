@@ -110,8 +110,8 @@ class VelocityRun(SessionReport):
         )
 
     def _people(self) -> tuple[Person, ...]:
-        """The persons. Each stands behind the hand-over point, seen from the place to which the base drives
-        for it."""
+        """The persons. Each stands behind its hand-over point, as seen from the place to which the base
+        drives for this hand-over."""
         options, progress = self.session.settings.options, self.session.progress
         visits: dict[int, list[tuple[MissionTask, bool]]] = {}
         beside: np.ndarray | None = None

@@ -6,10 +6,10 @@ Minutes: 5
 You need: nothing
 """
 
-# The text above is the lesson's card: title, question, how long it takes, what one must know before.
+# The text above is the lesson's card: title, question, duration in minutes, required knowledge.
 #
 #     himpc-lab --lesson FILE.py             opens it
-#     himpc-lab lessons --check FILE.py runs every claim, and shows that it fails under its `fails_with`
+#     himpc-lab lessons --check FILE.py tests every claim, and tests that it fails under its `fails_with`
 
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
@@ -20,14 +20,14 @@ from lessons.teaching.prediction import Choice, Option
 HAND = Signal("error/position", "mm")  # a field of a run's rows: himpc-lab run --npz FILE lists them
 
 LOAD = Step(
-    title="A load nobody told of",
+    title="An unknown load",
     # Markdown, with equations in $…$.
     text=r"""
-    The hand carries 2 kg from the start, and the controller does not know. It estimates all forces from
-    what happened a millisecond ago: $\hat H = \tau_0 - \bar M \ddot q_0$.
+    The hand carries 2 kg from the start, and the controller does not know it. The controller estimates all
+    forces from the torque and the acceleration one millisecond ago: $\hat H = \tau_0 - \bar M \ddot q_0$.
     """,
     do="Change the load while the robot holds, and watch the hand.",
-    why="What no model says, the last millisecond does: the hand stays within a tenth of a millimetre.",
+    why="The estimate contains the load: the hand stays within a tenth of a millimetre.",
     prediction=Choice(
         "How far does the hand move, at most?",
         (Option("less than 1 mm", high=1.0), Option("a few centimetres", low=1.0)),
@@ -42,7 +42,7 @@ LOAD = Step(
             0.1,
             # A claim names a setting under which it is false; the check runs this setting, too.
             fails_with=("controller=osf",),
-            because="OSF believes in its model, and the load is not in it",
+            because="OSF computes its torque with a model that does not contain the load",
         ),
     ),
     set=("plant.payload_kg=2",),

@@ -12,7 +12,7 @@ from himpc.references import Circle, Phase
 from lessons import load_scene
 from lessons.events import Push
 
-# Begin with an existing scene (himpc-lab scenes lists them) and change its fields.
+# Start from an existing scene (himpc-lab scenes lists them) and change its fields.
 START = load_scene("planar3-hold")
 
 

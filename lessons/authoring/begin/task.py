@@ -2,8 +2,8 @@
 
     himpc-lab run FILE.py
 
-runs it on the iiwa, on a level of its own below the hand's position. Whether the Jacobian is that of the
-value is checked with finite differences before anything moves.
+runs it on the iiwa, on a level of its own below the hand's position. Before the robot moves, finite
+differences of the value are compared with the Jacobian.
 """
 
 from dataclasses import dataclass

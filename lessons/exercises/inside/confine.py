@@ -37,7 +37,7 @@ _SYSCALLS = (
     *("fork", "vfork", "execve", "execveat", "ptrace", "process_vm_readv", "process_vm_writev"),
     *("kill", "tkill", "rt_sigqueueinfo", "rt_tgsigqueueinfo", "pidfd_open", "pidfd_send_signal"),
     *("pidfd_getfd", "process_madvise", "setpriority", "sched_setattr", "ioprio_set", "kcmp"),
-    # the network and what else goes round a pipe
+    # the network and other means of communication besides a pipe
     *("socket", "socketpair", "io_uring_setup", "mq_open", "shmget", "semget", "msgget", "memfd_create"),
     # files
     *("creat", "mkdir", "mkdirat", "rename", "renameat", "renameat2", "unlink", "unlinkat", "rmdir", "link"),
@@ -55,7 +55,7 @@ class RefusedCalls(list[str]):
 
 
 def limited(memory: int, parent: int) -> None:
-    """Ends with the parent; so many bytes of memory, and no files written."""
+    """Limits this process: it ends with its parent, has at most `memory` bytes, and writes no files."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DIES, signal.SIGKILL)
         if os.getppid() != parent:
@@ -76,7 +76,8 @@ def limited(memory: int, parent: int) -> None:
 
 
 def readable() -> list[Path]:
-    """Where a solution's imports may read: Python, the installed packages but the lab's, and libraries."""
+    """The places that imports of a solution may read: Python, libraries, and installed packages except the
+    lab's."""
     found = [Path(each) for each in _SINGLE]
     folders = [Path(each) for each in (*sys.path, *(f"{base}/lib" for base in (sys.base_prefix, sys.prefix)))]
     for folder in dict.fromkeys((*folders, *map(Path, _LIBRARIES))):
@@ -86,21 +87,24 @@ def readable() -> list[Path]:
 
 
 def _hidden(path: Path) -> bool:
-    """The lab itself, and folders that hold packages, whose children are looked at one by one."""
+    """Whether an entry of a folder is left out: the lab itself, tests, and folders of packages, whose entries
+    are checked one by one."""
     name = path.name
     return name in (*LAB, "site-packages", "dist-packages") or name.startswith(("python", "tests"))
 
 
 def confine(places: Sequence[Path]) -> tuple[str, ...]:
-    """Gives up files, but for reading in some places, the network and other processes for good. Returns what
-    of the system sees to it."""
+    """Gives up, for the rest of this process, all access to the network, to other processes, and to files
+    except for reading in some places. Returns the names of the mechanisms of the operating system that
+    enforce this."""
     calls = _calls()  # before Landlock: loading it looks for a library
     steps = (("Landlock", partial(_files, places)), ("seccomp", calls))
     return tuple(name for name, step in steps if step())
 
 
 def _files(places: Sequence[Path]) -> bool:
-    """Reading elsewhere and all writing, signals to others and TCP, by Landlock."""
+    """Forbids reading outside `places`, all writing, signals to other processes and TCP, by Landlock; returns
+    whether that was possible."""
     try:
         from py_landlock import AccessFs, Landlock
     except ImportError:
@@ -119,7 +123,7 @@ def _files(places: Sequence[Path]) -> bool:
 
 
 def _calls() -> Callable[[], bool]:
-    """Loads seccomp, and returns what then uses it."""
+    """Loads seccomp, and returns the function that applies it."""
     try:
         import pyseccomp
     except (ImportError, RuntimeError, OSError):
@@ -128,7 +132,8 @@ def _calls() -> Callable[[], bool]:
 
 
 def _without_calls(sec: Any) -> bool:
-    """What starts, signals or reads other processes, opens sockets or changes files, by seccomp."""
+    """Forbids, by seccomp, all calls that start, signal or read other processes, open sockets or change
+    files; returns whether that was possible."""
     no, unknown = sec.ERRNO(EPERM), sec.ERRNO(ENOSYS)
     thread = 0x10000  # CLONE_THREAD
     try:
@@ -160,24 +165,25 @@ class _Hidden(importlib.abc.MetaPathFinder):
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> None:
         if fullname.partition(".")[0] in LAB:
             raise ImportError(
-                f"{fullname} is not there when it is graded: a solution has what is installed, and himpc.qp"
+                f"{fullname} cannot be imported during grading: use installed packages and himpc.qp only"
             )
 
 
 def hide_the_lab() -> None:
-    """From now on nothing of the lab can be imported but `HANDED`."""
+    """Makes every import of the lab's modules fail from now on, except those in `HANDED`."""
     for name in [each for each in sys.modules if each.partition(".")[0] in LAB and each not in HANDED]:
         del sys.modules[name]
     sys.meta_path.insert(0, _Hidden())
 
 
 def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
-    """From now on Python itself refuses what the system may not: opening files that no import reads,
-    programs, signals, the network; in every thread. On its own it does not stop hostile code.
+    """Makes Python itself refuse, in every thread, to open files that no import reads, to start programs, to
+    send signals and to use the network, because the operating system may not refuse them. This alone does not
+    stop hostile code.
 
     Args:
-        places: where imports may read.
-        refused: where it is noted.
+        places: places that imports may read.
+        refused: list to which refused calls are added.
     """
     archives = (each for each in sys.path if not os.path.isdir(each))
     allowed = tuple(os.path.realpath(str(each)) for each in (*places, *archives))

@@ -1,4 +1,4 @@
-"""`now` as numbers: taken apart on the lab's side, put together again in the process of the submission."""
+"""Converts `now` to numbers on the lab's side, and back in the process of the submission."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Ask = Callable[[str, int, list[Array]], Array]
-"""Calls a function of the model on the lab's side: its name, the level it is about, its arguments."""
+"""Calls a function of the model on the lab's side: its name, the number of the level, its arguments."""
 
 OF_TICK = ("q", "q_dot", "q_ddot", "tau_0", "M_bar", "M", "bias", "gravity")
 OF_BOUNDS = ("tau_lower", "tau_upper", "v_lower", "v_upper", "q_lower", "q_upper")
@@ -45,7 +45,7 @@ def shape_of(now: Any) -> dict[str, Any]:
 
 
 def _read_only(_: object, name: str, __: Any) -> None:
-    raise AttributeError(f"what a controller sees is read-only: {name} cannot be set")
+    raise AttributeError(f"the data of a controller are read-only: {name} cannot be set")
 
 
 @final
@@ -69,7 +69,7 @@ class Now(SimpleNamespace):
         return self.q.size
 
     def level(self, name: str) -> Part:
-        """A level by its name. Raises KeyError, naming the levels there are."""
+        """A level by its name. Raises KeyError with the names of all levels."""
         for level in self.levels:
             if level.name == name:
                 return level

@@ -1,12 +1,12 @@
-"""The process of a submission: numbers of `now` come in, a torque goes out.
+"""The process of a submission: it receives the numbers of `now` and answers with a torque.
 
-It imports what a solution may need, and nothing that runs or judges a robot: the plant, the checks and the
-right answers are in another process, which a submission cannot read, replace or end.
+It imports everything that a solution may need, and no code that runs or judges a robot: the plant, the checks
+and the right answers are in another process, which a submission cannot read, replace or end.
 """
 
 from __future__ import annotations
 
-import ctypes.util  # noqa: F401  # loaded before it is refused
+import ctypes.util  # noqa: F401  # loaded now, because it will be refused later
 import json
 import os
 import sys
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-import himpc.qp  # noqa: F401  # what a solution may import of the lab
+import himpc.qp  # noqa: F401  # the only module of the lab that a solution may import
 from lessons.exercises.inside import wire
 from lessons.exercises.inside.confine import RefusedCalls, confine, hide_the_lab, limited, readable, refuse
 from lessons.exercises.inside.now import Now, rebuilt
@@ -33,9 +33,9 @@ def serve(parent: int, memory: int, kernel: bool) -> None:
     """Answers messages until the pipe closes.
 
     Args:
-        parent: process with which it ends.
-        memory: bytes of address space it may have.
-        kernel: whether the system's own means are to be used; else Python's alone.
+        parent: id of the process with which this one ends.
+        memory: bytes of address space that it may have.
+        kernel: whether to use the mechanisms of the operating system besides Python's.
     """
     heard, told = os.dup(0), os.dup(1)
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -47,7 +47,7 @@ def serve(parent: int, memory: int, kernel: bool) -> None:
     _, data = wire.read(heard)
     source = Source(*json.loads(data))
     refused = RefusedCalls()
-    np.linalg.inv(np.eye(2))  # what libraries set up when first used
+    np.linalg.inv(np.eye(2))  # libraries load parts of themselves at the first use
     hide_the_lab()
     places = readable()
     in_force = confine(places) if kernel else ()
@@ -103,4 +103,4 @@ def _answered(found: Any) -> tuple[bytes, bytes]:
 
 
 def _nothing(_: Now) -> None:
-    """The law before there is one."""
+    """The control law before a file was loaded."""

@@ -15,19 +15,19 @@ Array = NDArray[np.float64]
 LOAD = b"L"
 """To the submission: execute the file anew. The answer is READY or FAULT."""
 SHAPE = b"S"
-"""To the submission: how the numbers of the next ticks are to be read, see `now.described`. No answer."""
+"""To the submission: the description of the numbers of the next ticks, see `now.shape_of`. No answer."""
 TICK = b"T"
 """To the submission: the numbers of a tick. The answer is TORQUE, OTHER or FAULT, after any ASK."""
 REPLY = b"R"
-"""To the submission: the matrix it asked for."""
+"""To the submission: the requested matrix."""
 READY = b"Y"
-"""From the submission: JSON of what the file says about itself."""
+"""From the submission: JSON with the data of the file, such as its exercise."""
 TORQUE = b"U"
 """From the submission: an array."""
 OTHER = b"O"
-"""From the submission: what it returned is no array; the name of its type."""
+"""From the submission: the type of a returned value that is not an array of numbers."""
 FAULT = b"F"
-"""From the submission: one sentence about what it did wrong."""
+"""From the submission: one sentence about its fault."""
 ASK = b"A"
 """From the submission: JSON of a function of the model that is to be called. The answer is REPLY or FAULT."""
 
@@ -53,7 +53,7 @@ def of_array(values: Array) -> bytes:
 
 
 def array_of(data: bytes) -> Array:
-    """The array, read-only. Raises ValueError for bytes that are none."""
+    """The array, read-only. Raises ValueError for bytes that do not contain an array."""
     if not data or len(data) < 1 + 4 * data[0]:
         raise ValueError("no shape")
     begin = 1 + 4 * data[0]

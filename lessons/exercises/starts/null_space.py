@@ -22,7 +22,7 @@ def torque(now):
             - level.J_dot_q_dot
         )
         Lambda = np.linalg.pinv(J @ M_inv @ J.T, rcond=1e-9, hermitian=True)
-        # TODO: project J into what the levels above leave free, and do not ask twice for what they do.
+        # TODO: project J on the freedom that the levels above leave, and subtract their effect on ẍ.
         tau = tau + J.T @ Lambda @ wanted
         torques.append(now.bias + tau)
     return torques  # one row per level: the last one acts

@@ -3,7 +3,7 @@
     himpc-lab grade FILE.py
     himpc-lab --scene iiwa14-hold --controller FILE.py
 
-τ = M̄ q̈_wanted + Ĥ, and Ĥ is what the last tick tells: τ₀ = M̄ q̈₀ + Ĥ.
+τ = M̄ q̈_wanted + Ĥ. The last tick gives Ĥ: τ₀ = M̄ q̈₀ + Ĥ.
 """
 
 EXERCISE = "time-delay"

@@ -17,7 +17,7 @@ from robots.errors import unknown_name
 
 @dataclass(frozen=True)
 class Cell:
-    """A finished cell: the run's summary without its timing, or why there is none."""
+    """A finished cell: the run's summary without its timing, or the error of a run without a summary."""
 
     index: int
     summary: dict[str, Any] | None

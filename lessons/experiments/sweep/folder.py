@@ -1,6 +1,6 @@
 """Stores the finished cells of a sweep in a folder; a stopped sweep continues from there.
 
-It holds `sweep.json` (what is swept), `cells.jsonl` (one line per finished cell, appended as it finishes)
+It holds `sweep.json` (the definition), `cells.jsonl` (one line per finished cell, appended as it finishes)
 and, at the end, `results.json` (the cells in the order of the grid).
 """
 
@@ -69,16 +69,16 @@ def carry_on(
     """Runs the cells that are missing and writes `results.json`.
 
     Args:
-        sweep: what is swept.
-        folder: where its cells are kept.
-        spread: how the work is spread.
+        sweep: the sweep.
+        folder: folder in which its cells are stored.
+        spread: function that spreads the work.
         progress: called with (finished cells, all cells).
 
     Returns:
-        all cells in the order of the grid. Interrupted, everything finished so far is in the folder.
+        all cells in the order of the grid. After an interruption, the folder contains all finished cells.
 
     Raises:
-        InputError: as `finished_cells`; or a file of one's own that is swept was changed meanwhile.
+        InputError: as `finished_cells`; or a user's file that takes part was changed during the sweep.
     """
     cells = finished_cells(sweep, folder)
     total, files = len(sweep.points), sweep.files()
@@ -90,8 +90,8 @@ def carry_on(
         for place, outcome in outcomes:
             if sweep.files() != files:
                 raise InputError(
-                    f"{', '.join(files['files'])}: was changed while it was swept, and cells of two contents "
-                    "are no map: repeat the command with another folder for --out"
+                    f"{', '.join(files['files'])}: was changed during the sweep, and the cells before and "
+                    "after cannot be compared: repeat the command with another folder for --out"
                 )
             if isinstance(outcome, FailedJob):
                 cell = Cell(missing[place], None, outcome.reason)

@@ -1,4 +1,4 @@
-"""What is swept: every combination of the values of one or more settings, on top of one run."""
+"""The grid of a sweep: every combination of the values of one or more settings, on top of one run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is swept: every combination of the axes' values on top of a run."""
+    """A sweep: every combination of the axes' values on top of a run."""
 
     base: RunSpec
     axes: tuple[Axis, ...]
@@ -49,7 +49,7 @@ class Sweep:
         return self.base.but(*(f"{axis.path}={value!r}" for axis, value in at))
 
     def as_data(self) -> dict[str, Any]:
-        """As JSON-ready data; two sweeps with equal data have equal cells."""
+        """The sweep as JSON-ready data; two sweeps with equal data have equal cells."""
         base = self.base
         return {
             "scene": base.scene,
@@ -62,8 +62,8 @@ class Sweep:
         }
 
     def files(self) -> dict[str, list[str]]:
-        """Which files of one's own take part, and what tells their content; nothing if none does. Raises
-        InputError if one cannot be read."""
+        """The fingerprints of the user's files that take part; empty if there are none. Raises InputError if
+        one cannot be read."""
         base = self.base
         own = [each for each in (base.scene, base.controller or "", *base.tasks) if is_file(each)]
         return {"files": [fingerprint(each) for each in own]} if own else {}
@@ -72,11 +72,11 @@ class Sweep:
 def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
     """A sweep from "PATH=lo:hi:n" texts.
 
-    Values go in equal steps, or in equal ratios if hi ≥ 10 lo > 0 and fractions are allowed there;
-    "PATH=lo:hi:n:lin" and "…:log" decide it. Settings that take whole numbers get whole numbers.
+    Values have equal steps, or equal ratios if hi ≥ 10 lo > 0 and the setting may have fractions;
+    "PATH=lo:hi:n:lin" and "…:log" choose explicitly. Settings of whole numbers get whole numbers.
 
     Raises:
-        InputError: a text that cannot be read, a path or value the scene refuses, or no or too many cells.
+        InputError: a text that cannot be read, a path or value that the scene refuses, no cells or too many.
     """
     if not over:
         raise InputError("--over is missing: give at least one, e.g. --over M_bar_scale=0.2:4:20")
@@ -87,7 +87,7 @@ def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
         raise InputError(f"--over names {max(paths, key=paths.count)} twice: give each path once")
     cells = math.prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:
-        raise InputError(f"--over asks for {cells} cells: at most {MAX_CELLS}; take fewer values")
+        raise InputError(f"--over gives {cells} cells: at most {MAX_CELLS} are possible; give fewer values")
     return Sweep(base, axes)
 
 
@@ -110,11 +110,11 @@ def _axis(text: str, settings: SceneSettings) -> Axis:
     whole = settings.place(path).form.kind == WHOLE
     log = parts[3] == "log" if parts[3:] else low > 0 and high >= _DECADE * low and not whole
     if log and low <= 0:
-        raise InputError(f"--over {text}: equal ratios need lo above 0; take …:lin")
+        raise InputError(f"--over {text}: equal ratios need lo above 0; use …:lin for equal steps")
     spaced = np.geomspace(low, high, count) if log else np.linspace(low, high, count)
     values = tuple(round(float(value)) if whole else float(f"{value:.9g}") for value in spaced)
     if len(set(values)) < count:
-        raise InputError(f"--over {text}: {path} takes whole numbers, and {count} do not fit between them")
+        raise InputError(f"--over {text}: {path} has whole numbers, and the range has fewer than {count}")
     for value in values:
         settings.changed(path, value)
     return Axis(path, values, log)

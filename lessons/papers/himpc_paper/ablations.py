@@ -20,7 +20,7 @@ from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
 _FAINTEST = 1e-3
-"""mm: errors below are drawn here, since a logarithmic axis has no zero."""
+"""mm: smaller errors are drawn at this value, since a logarithmic axis has no zero."""
 
 
 def _level_1(run: JobResult, scale: float = 1e3) -> float:
@@ -39,7 +39,8 @@ def _line(runs: Mapping[float, JobResult], label: str, colour: str) -> PlotCurve
 
 _N = 20
 _SHORTER = {False: (20, 10, 5, 2, 1), True: (20, 5, 1)}
-"""Knots of the lower levels; by whether the quick version is asked for, as below."""
+"""Numbers of knots of the lower levels; the key says whether it is the quick version, also in the tables
+below."""
 
 
 def _shorter(knots: int, timed: bool) -> Job:

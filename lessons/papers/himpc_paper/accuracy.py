@@ -1,4 +1,4 @@
-"""Section III-B, measured: what the incremental model and the nominal one get wrong."""
+"""Measures the errors of the incremental and of the nominal model, section III-B."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RT4 = Job(
     RunSpec("iiwa14-circle", controller="himpc", set=("nominal.mass_scale=0.8", "nominal.inertia_scale=0.8"))
 )
 _EVERY = 4
-"""Ticks from one evaluated tick to the next: neighbours say the same."""
+"""Number of ticks from one evaluated tick to the next, since neighbouring ticks are nearly equal."""
 
 
 def _at_period(ms: float) -> Job:
@@ -119,9 +119,9 @@ def _section(results: Results, quick: bool) -> Section:
     caption = "Errors of the nominal model (20 % light, friction unknown) and of the incremental one on RT1."
     return Section(
         notes=(
-            "What each model gets wrong about the next acceleration along HIMPC's own motion, from the "
-            "definitions of the errors. The nominal model is 20 % light and knows no friction. On the iiwa "
-            "the advantage is smaller: bounds that come and go change q̈ from tick to tick, and M̄ is far "
+            "The error of each model's next acceleration along HIMPC's own motion, from the definitions of "
+            "the errors. The nominal model is 20 % too light and has no friction. On the iiwa the advantage "
+            "is smaller: bounds that become active and inactive change q̈ from tick to tick, and M̄ is far "
             "below M.",
         ),
         tables=(table,),

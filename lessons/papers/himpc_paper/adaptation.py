@@ -22,11 +22,11 @@ class Case(NamedTuple):
     """A run with and without adaptation.
 
     Attributes:
-        words: what is unusual about it.
-        controller: which.
-        scene: where.
+        words: the name of the case.
+        controller: name of the controller.
+        scene: name of the scene.
         set: assignments.
-        payload_later: kg at the flange from 2 s on; None: as before.
+        payload_later: payload at the flange from 2 s on, kg; None: the payload does not change.
     """
 
     words: str

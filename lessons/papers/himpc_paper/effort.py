@@ -20,21 +20,21 @@ from robots import Plant
 Array = NDArray[np.float64]
 
 _LOST = 0.5
-"""m or rad: an error above this is loss of control."""
+"""m or rad: an error above this counts as loss of control."""
 
 
 @final
 @dataclass(frozen=True)
 class EffortJob(Work):
-    """A scene's tasks in one cost, one step ahead, no bounds, no priorities: the least the argument needs.
+    """A run with all tasks of a scene in one cost, one step ahead, without bounds and priorities.
 
     min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental system and
     N = 1. In the paper's weights R stands for R_i/Q_i, 0.05.
 
     Attributes:
-        effort: what R weighs: the "increment" Δτ or the whole "torque" τ.
+        effort: the quantity that R weighs: the "increment" Δτ or the whole "torque" τ.
         R: its weight.
-        hold_deg: stay at these joint angles, degrees, instead of following the scene's references.
+        hold_deg: joint angles to hold, degrees, instead of following the scene's references.
     """
 
     effort: Literal["increment", "torque"] = "increment"
@@ -80,7 +80,7 @@ class EffortJob(Work):
 
     @property
     def words(self) -> str:
-        """The run in words: no command does it alone."""
+        """The run in words, because no single command repeats it."""
         what = "still" if self.hold_deg else "moving"
         return f"{self.spec.scene}, {what}, R = {self.R:g} on the {self.effort}"
 
@@ -97,7 +97,7 @@ def _residual(
 
 
 def _summary(form: StackForm, t: Array, errors: Array, lost: bool) -> dict[str, Any]:
-    """As much of a run's summary as `Run.error_of` needs."""
+    """The part of a run's summary that `JobResult.error_of` needs."""
     late = errors[t >= 1.0]
     rmse = np.sqrt((late**2).mean(axis=0)) if len(late) and not lost else np.full(errors.shape[1], np.nan)
     ends = np.cumsum(form.sizes)

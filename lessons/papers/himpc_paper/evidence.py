@@ -22,7 +22,7 @@ from robots import Plant, convergence_gauge
 DEG = 180 / np.pi
 
 _LARGE = 5.0
-"""deg: an error of q₁ above this is large; from 1° to 5° ours takes 0.2 s."""
+"""deg: an error of q₁ above this counts as large; in our run it grows from 1° to 5° in 0.2 s."""
 _HALF_SWING = "q1_amplitude_deg=-60"
 _SOFT = "R=1e5"
 _BARE = "plant.friction=0"
@@ -88,7 +88,7 @@ def _conflict(results: Results, quick: bool) -> Section:
 
 
 def _swing(run: JobResult, start: float, end: float) -> tuple[float, float]:
-    """Of joint 3: the largest speed, deg/s, and half its changes of direction per second."""
+    """The largest speed of joint 3, deg/s, and half the number of its changes of direction per second."""
     v = DEG * run.column("v", 2)[(run.t >= start) & (run.t <= end)]
     if not len(v):
         return math.nan, math.nan
@@ -96,13 +96,13 @@ def _swing(run: JobResult, start: float, end: float) -> tuple[float, float]:
     return float(np.abs(v).max()), 0.5 * turns / (end - start)
 
 
-# ------------------------------------------------------------------------ what R is against Q
+# ------------------------------------------------------------------------ R compared with Q
 
 
 def weakest(scene: str) -> float:
-    """Q/R·σ²: how far the first increment's effect on e outweighs its cost, in the direction of level 1 in
-    which it does least, at the start. σ² is the least eigenvalue of c₀² J₁ M̄⁻² J₁ᵀ, c₀ = 1 + K_V T_s; a tick
-    leaves 1/(1 + Q/R·σ²) of e there."""
+    """Q/R·σ²: the effect of the first increment on e over its cost, at the start, in the direction of level 1
+    in which the effect is smallest. σ² is the least eigenvalue of c₀² J₁ M̄⁻² J₁ᵀ, c₀ = 1 + K_V T_s; in that
+    direction a tick leaves 1/(1 + Q/R·σ²) of e."""
     ready = prepared(torque_scene(scene), "himpc", ())
     robot, settings = ready.robot, ready.settings
     (task,) = settings.levels[0].tasks

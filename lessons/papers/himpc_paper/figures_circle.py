@@ -28,7 +28,7 @@ INCREMENTAL = ("tdeosf", "hiqp", "himpc")
 
 
 def encoder_runs(controllers: Sequence[str]) -> tuple[Job, ...]:
-    """RT1 with the paper's encoder: where controllers differ in how rough their torque is."""
+    """RT1 with the paper's encoder, with which the roughness of the torque differs between controllers."""
     return tuple(rt1(controller, *ENCODER) for controller in controllers)
 
 

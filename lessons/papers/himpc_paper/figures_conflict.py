@@ -62,7 +62,7 @@ def _fig_11(results: Results, quick: bool) -> Section:
 
 
 def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
-    """What the paper says of the figure, which has no readable numbers."""
+    """Rows for the statements of the paper about the figure, which has no readable numbers."""
     says = printed("himpc_text")
     lines = (
         ("HIMPC: level-1 RMSE in RT2 over RT1", growth["himpc"], "conflict_himpc", "nearly not affected"),
@@ -96,7 +96,7 @@ def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
 
 
 _CHATTER = (0.5, 1.6)
-"""Of HQP, which switches to and fro, and HIMPC: a broad line would be a block."""
+"""Line widths of HQP and HIMPC: HQP's torque chatters, and a broad line would fill an area."""
 
 
 def _fig_12(results: Results, quick: bool) -> Section:
@@ -125,7 +125,7 @@ def skeleton(robot: Robot, q: Array) -> Array:
 
 
 def _time_beside(tip: Array, path: Array, t: float) -> tuple[float, float, str]:
-    """When the tip was there, written outside the path."""
+    """The position and text of a label with the time of a pose, outside the path."""
     outward = tip[:2] - path.mean(axis=0)
     x, y = tip[:2] + 0.045 * outward / (np.linalg.norm(outward) or 1.0) - (0.03, 0.015)
     return float(x), float(y), f"{t:.1f} s"
@@ -152,7 +152,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             span = slice(chosen[0], chosen[-1] + 1)
             x_d = run["x_d/position"][span]
             path = PlotCurve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
-            # The last pose is the first of the other panel, or where that began.
+            # The last pose has no label: it is also a pose of the other panel.
             notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
     caption = f"HIMPC on RT3 in {POSES} poses; straight and singular in the 1st, 10th and 19th (thick)."

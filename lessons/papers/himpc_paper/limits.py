@@ -16,8 +16,9 @@ MODES = {
     "barrier": ("limits.position=paper", "limits.velocity_approach=15"),
     "barrier and margin": (),
 }
-"""Rows as printed; velocity bounds approached at 15 1/s; besides, position limits as the speed from which one
-can stop, 7 mrad before the limit and with a third of a second of reaction, which is the lab's default."""
+"""Three kinds of limits: rows as printed; velocity bounds approached at 15 1/s; and in addition, which is the
+lab's default, position limits as the velocity from which the joint can still stop 7 mrad before the limit,
+with a reaction time of a third of a second."""
 PLANTS = {
     "nominal": (),
     "payload 1 kg": ("plant.payload_kg=1",),
@@ -91,12 +92,13 @@ def _section(results: Results, quick: bool) -> Section:
     checks += (between("nominal, as printed: speed over its limit", _over(printed, "velocity"), 1.05, 2.0),)
     return Section(
         notes=(
-            "RT4 from rest under the data sheet's limits: joint 1 cannot turn as fast as asked, and joints "
-            "come near the ends of their ranges. As printed, speeds are overrun and a few QPs have no "
-            "solution. A barrier on speed alone makes it worse: a slow joint cannot obey a position row that "
-            "wants it to turn back within 5 ms. With position limits that one can stop before, position is "
-            "kept and every QP has a solution; speed is kept to 1 %, but for 2 kg that nobody told of: with "
-            "them from the start on none of the three keeps level 1. The constants are settings.",
+            "RT4 from rest under the data sheet's limits: the reference is too fast for joint 1, and joints "
+            "come near the ends of their ranges. As printed, speeds exceed their limits and a few QPs have "
+            "no solution. A barrier on speed alone makes it worse: a slow joint cannot obey a position row "
+            "that requires it to turn back within 5 ms. With position limits before which the joint can "
+            "stop, position is kept and every QP has a solution; speed is kept to 1 %, except with an "
+            "unknown payload of 2 kg: with it from the start on, none of the three keeps level 1. The "
+            "constants are settings.",
         ),
         rows=tuple(rows),
         tables=(Table("Violations, errors and QPs without a solution", columns, lines),),

@@ -1,4 +1,4 @@
-"""Table III: properties of the controllers, decided from runs."""
+"""Table III: properties of the controllers, determined from runs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ACCURATE = 5e-4
 LOST_LEVEL_1 = 0.03
 """m: a level-1 error above this means that level 1 was lost."""
 LOST_TORQUE = 4.0
-"""A torque demand above this many times the bound means the same."""
+"""A torque demand above this multiple of the bound also means that level 1 was lost."""
 
 CRITERIA = {
     "High accuracy": f"RT1, nominal model 20 % off: RMSE of x and of y after 1 s at most {ACCURATE:g} m",
@@ -40,7 +40,8 @@ CRITERIA = {
 
 @dataclass(frozen=True)
 class PropertyResult:
-    """Whether a property holds, None if a run it needs failed, and the numbers that decided it."""
+    """holds: whether a property holds, None if a run that it needs failed; and the numbers that decided
+    it."""
 
     holds: bool | None
     numbers: str
@@ -201,7 +202,7 @@ def _conflict_checks(results: Results) -> Sequence[PaperCheck]:
                 f"{name(controller)}, RT2: loses level 1 (error > 3 cm, or torque demand > 4 × its bound)",
                 demand,
                 bool(error > LOST_LEVEL_1 or demand > LOST_TORQUE),
-                band=None,  # how long a run lasts before it loses control is chance
+                band=None,  # the time at which a run loses control is random
             )
         )
     return checks

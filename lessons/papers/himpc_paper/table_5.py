@@ -19,7 +19,7 @@ _READINGS = {
     "diag M(q) scaled": (f"plant.diagonal_scale={DISTURBED}",),
 }
 _CHECKED = ("links' rotational inertia scaled", "diag M(q) scaled")
-"""The two readings of the paper's words; links of another density are a third plant, for comparison."""
+"""Two interpretations of the paper's text; links of another density are a third plant, for comparison."""
 _WRIST = "[1,1,1,1,{0},{0},{0}]"
 _HALF, _LIGHT_WRIST, _TWICE = (
     "all links of half the mass and inertia",
@@ -35,7 +35,7 @@ _OTHERS = {
     _TWICE: ("M_bar_scale=2",),
     "position limits as the velocity from which one can stop": ("limits.position=viability",),
 }
-"""Other plants and settings, to see what the errors hang on."""
+"""Other plants and settings, which show what the errors depend on."""
 
 
 def _table_5_jobs(quick: bool) -> tuple[Job, ...]:
@@ -89,8 +89,8 @@ def _why_table_5(task: str, reading: str) -> str:
     if reading == "diag M(q) scaled":
         return "our errors scale with diag M(q): estimation errors do, and the printed ones do not"
     if task == "orientation":
-        return "hangs on the wrist's unprinted inertias: see the lighter wrist below"
-    return "hangs on the unprinted inertias and M̄, but not on a common factor: see the other plants below"
+        return "depends on the wrist's unprinted inertias: see the lighter wrist below"
+    return "depends on the unprinted inertias and M̄, but not on a common factor: see the other plants below"
 
 
 def _topic(task: str, reading: str) -> str:
@@ -102,7 +102,7 @@ def _topic(task: str, reading: str) -> str:
 def _change_row(
     results: Results, reading: str, extra: tuple[str, ...], label: str, task: str, k: int, unit: str
 ) -> Row:
-    """Disturbed over nominal: what the table is about."""
+    """A row with the error of the disturbed plant over that of the nominal one, the subject of the table."""
     paper = printed("himpc_table_5")
     nominal, disturbed = results[rt4()], results[rt4("himpc", *extra)]
     return Row(
@@ -126,7 +126,7 @@ def _shares(results: Results, words: str) -> dict[str, float]:
 
 
 def _share_rows(results: Results) -> list[Row]:
-    """Those of the shares that the explanations rest on."""
+    """Rows with the shares to which the explanations refer."""
     rows = []
     for words in (_HALF, _TWICE):
         shares = [share for label, share in _shares(results, words).items() if label != "q₁"]
@@ -141,7 +141,7 @@ def _share_rows(results: Results) -> list[Row]:
 
 
 def _others(results: Results) -> Table:
-    """What the errors hang on, as shares of the nominal ones."""
+    """A table of the errors with other plants and settings, as shares of the nominal ones."""
     rows = []
     for words, extra in _OTHERS.items():
         shares = _shares(results, words).values()

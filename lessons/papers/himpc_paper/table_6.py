@@ -17,8 +17,8 @@ _ON = {
     "Δτ, as printed": (),
     "M̄⁻¹Δτ, with viability": ("R_on=acceleration", "limits.position=viability"),
 }
-"""What R weighs. On accelerations the controller is soft, and soft it cannot keep the printed position rows:
-with them x is off by 5 mm at N = 5."""
+"""The quantity that R weighs. With R on accelerations the controller reacts so slowly that it cannot keep the
+printed position rows: with them the error of x is 5 mm at N = 5."""
 
 
 _N = 5
@@ -32,7 +32,7 @@ def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: boo
 
 
 def horizons(controller: str, quick: bool) -> tuple[int, ...]:
-    """Horizons that are run: the quick version leaves out what takes minutes."""
+    """The horizons of the runs; the quick version leaves out those that take minutes."""
     if controller == "nhimpc":
         return (10,) if quick else (10, 20, 30)
     return (5, 10, 20) if quick else (5, 10, 20, 30)
@@ -84,7 +84,7 @@ def _table_6(results: Results, quick: bool) -> Section:
             chain = [base, *errors.values()] if controller == "nhimpc" else list(errors.values())
             worst = float(np.max([b / a for a, b in pairwise(chain)]))
             text = f"R on {what}: {name(controller)}'s RMSE of x, next N over this N, at worst"
-            # In 2 s no joint comes near its limit: what is left of a gain, as printed, comes from there.
+            # In 2 s no joint comes near its limit, and with R as printed the gain comes from the limits only.
             checks.append(between(text, worst, 0.8, 1.0 if extra or not quick else 1.01))
     return Section(
         notes=(

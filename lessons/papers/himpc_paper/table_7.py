@@ -88,7 +88,7 @@ def _table_7(results: Results, quick: bool) -> Section:
 
 
 MACHINE = 9.0
-"""A time may be ten times longer or shorter on another machine, or on this one under load."""
+"""Factor by which a time may be longer or shorter on another machine, or on this one under load."""
 
 
 def _iterations(run: JobResult) -> tuple[float, float, float]:

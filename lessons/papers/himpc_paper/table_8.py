@@ -14,7 +14,7 @@ from lessons.papers.printed import printed
 from lessons.papers.words import trouble
 
 _FREE = ("limits.position=off",)
-"""A state bound that is active hides the sensor's noise: Table VIII is about noise."""
+"""Settings without state bounds: an active bound would hide the sensor noise, which Table VIII measures."""
 
 
 def resolution_job(thousandths: float, quick: bool = False) -> Job:

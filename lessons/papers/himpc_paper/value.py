@@ -14,7 +14,8 @@ from lessons.scenes.run_spec import RunSpec
 Array = NDArray[np.float64]
 
 _JOB = Job(RunSpec("iiwa14-circle", controller="himpc", duration=1.5))
-"""From rest, while the reference starts with a velocity: V_N begins far above where it settles."""
+"""The run starts from rest, but the reference starts with a velocity, so that V_N begins far above its final
+value."""
 _LEVELS = ("position", "orientation", "q1")
 _SETTLED_AFTER = 1.0
 _FAR = 10.0
@@ -24,8 +25,8 @@ _FAR = 10.0
 def decrease(V: Array, t: Array) -> tuple[float, float]:
     """(ε_N, α) such that V(k+1) − V(k) ≤ −α V(k) + ε_N on all ticks far from the reference, see (39).
 
-    ε_N is the largest value after it has settled; α the least relative decrease over the ticks before, as
-    long as V > 10 ε_N, with ε_N granted. α > 0: V decreases there. NaN without such ticks.
+    ε_N is the largest value after V has settled. α is the least value for which (39) holds with this ε_N at
+    the ticks before, as long as V > 10 ε_N. If α > 0, V decreases there. NaN without such ticks.
     """
     late = V[t >= _SETTLED_AFTER]
     if not len(late):

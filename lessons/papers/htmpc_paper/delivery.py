@@ -23,7 +23,7 @@ RULES = {"80 cm": (), "5 cm, at rest": ("base_tolerance=0.05", "base_at_rest=tru
 ARCHITECTURES = {"HT": "hierarchical", "ST": "single_task", "decoupled": "decoupled"}
 CASES = (
     *((a, rule) for rule in RULES for a in ("HT", "ST")),
-    ("decoupled", "5 cm, at rest"),  # from 80 cm away an arm that is folded does not get to every hand
+    ("decoupled", "5 cm, at rest"),  # 80 cm away from its goal, a folded arm cannot reach every hand
 )
 EVERY = 6
 """Of the 20 layouts of three seats out of six these are measured: a hundred such runs take long."""
@@ -95,8 +95,9 @@ def _report(results: Results, quick: bool) -> Section:
 
 
 def _ratios(time: dict[tuple[str, str], Array]) -> tuple[Row, ...]:
-    """The paper compares with a decoupled robot and does not print when a base counts as there; so each rule
-    stands beside its number, and then what comes of a rule for each."""
+    """Rows with ratios of execution times. The paper compares with a decoupled robot and does not print when
+    a base counts as arrived; so its number is compared with ours under each rule, then with a different rule
+    for each architecture."""
     strict, own = "5 cm, at rest", "80 cm"
     paper = printed("htmpc_text")["delivery_time_ratio"]
     unprinted = (

@@ -17,7 +17,7 @@ SOURCE = "HTMPC paper, section V"
 SQUARE = "ridgeback-ur10-square"
 PEAKS_SEED = 0
 EE_HOME = np.array([1.490, 0.174])
-"""m: about it the peaks lie."""
+"""m: the point around which the peaks lie."""
 METHODS = {"htmpc": "HTMPC", "htmpc_wpt": "HTMPC_WPT", "htidkc": "HTIDKC"}
 
 

@@ -75,7 +75,7 @@ def _fig_3(results: Results, quick: bool) -> Section:
 
 def _fig_4(results: Results, quick: bool) -> Section:
     runs = {words: results[example(controller)] for controller, words in METHODS.items()}
-    # Until shortly before 8 s HTMPC and HTMPC_WPT do the same: the first is broad.
+    # HTMPC's curve is broad, because HTMPC and HTMPC_WPT coincide until shortly before 8 s.
     weights = dict.fromkeys(runs, 1.0) | {"HTMPC": 2.6}
     base = tuple(
         PlotCurve(run.t, normalised(run), words, run.controller, weight=weights[words])
@@ -208,14 +208,14 @@ def _strip(title: str, values: dict[str, Array]) -> Panel:
         if np.isfinite(each).all() and np.ptp(each) > 0:
             curves.append(_violin(place, each))
         curves.append(PlotCurve(np.full(len(each), float(place)), each, "", str(place), "dots"))
-        across = np.linspace(place - 0.2, place + 0.2, 20)  # so many that none is drawn as a dot
+        across = np.linspace(place - 0.2, place + 0.2, 20)  # enough points that they are drawn as a line
         curves.append(PlotCurve(across, np.full(20, each.mean()), "", str(place)))
     return Panel("base error (1)", tuple(curves), "method", title=title, x_names=tuple(values))
 
 
 def _violin(place: int, values: Array) -> PlotCurve:
     """The outline of the fitted density, from the smallest to the largest value."""
-    from scipy.stats import gaussian_kde  # here: it takes longer than all that the papers' jobs load
+    from scipy.stats import gaussian_kde  # imported here, because its import takes long
 
     y = np.linspace(values.min(), values.max(), 60)
     density = gaussian_kde(values)(y)

@@ -15,7 +15,7 @@ DELTAS = {"low": 0.001, "high": 0.01}
 FORMULATIONS = {"paper": "A, as printed", "proximal": "C, the default"}
 _TOPIC = {"paper": "hand-under-11-and-12", "proximal": "proximal-hand"}
 _WHY = {
-    "paper": "the paper does not print its peak target, nor all its weights, and the numbers hang on them",
+    "paper": "the numbers depend on the peak target and on weights that the paper does not print",
     "proximal": "not the paper's formulation: upper levels keep to their plan",
 }
 
@@ -25,7 +25,7 @@ _OWN = ("formulation=proximal", "lexicographic=per_coordinate", "delta_m=0.01")
 
 def _job(formulation: str, equation: str, tolerance: str) -> Job:
     asked = (f"formulation={formulation}", f"lexicographic={equation}", f"delta_m={DELTAS[tolerance]}")
-    # What is the scene's own anyway is the example of Figs. 3 and 4.
+    # The scene's own settings are not assigned, so that this is the same run as the example of Figs. 3 and 4.
     return example("htmpc", *(() if asked == _OWN else asked))
 
 
@@ -69,7 +69,7 @@ def _table(results: Results, quick: bool) -> Section:
 
 
 def _order(results: Results, f: str, d: str) -> Row:
-    """What the table is about: which constraint is better for the hand."""
+    """The row with the table's subject: the hand's error with (12) over that with (11)."""
     paper = printed("htmpc_table_1")
     mean = {e: hand_mm(results[_job(f, e, d)])[0] for e in EQUATIONS}
     return Row(

@@ -46,7 +46,7 @@ def test_a_page_can_open_at_a_lesson(learner_page: Page) -> None:
     expect_part(learner_page, lesson, lesson.steps[1])
     expect(learner_page.get_by_text("PAUSED", exact=True).first).to_be_visible()
     key(learner_page, "p")
-    expect(learner_page.get_by_text("First say what you expect:")).to_be_visible()
+    expect(learner_page.get_by_text("Make a prediction first:")).to_be_visible()
     key(learner_page, "b")
     expect_part(learner_page, lesson, lesson.steps[0])
     key(learner_page, "n")
