@@ -32,7 +32,7 @@ def braking(rows: Rows) -> Array:
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest
     w = _walk(rows, rest)
     U = _steps(_steps(w))
-    if len(rows.kinds) == 3:
+    if len(rows.constraints) == 3:
         for joint in np.flatnonzero(missed(rows, U).max(axis=0) > _MET).tolist():
             found = _closest(rows, joint, rest[:, joint])
             if found is not None:
@@ -44,7 +44,7 @@ def braking(rows: Rows) -> Array:
 def missed(rows: Rows, U: Array) -> Array:
     """Returns the violation of rows by increments (N, n), (r, n) ≥ 0 N·m; 0 up to the rounding of the
     sums."""
-    value, summed = rows.L @ U, rows.L @ np.abs(U)
+    value, summed = rows.values(U), rows.sizes(U)
     excess = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
     excess[excess <= 1e-14 * len(rows.L) * summed] = 0.0
     return excess
@@ -58,7 +58,7 @@ def least_slack(rows: Rows) -> Array:
     """
     slack = missed(rows, braking(rows))
     slack[: rows.L.shape[1]] = 0.0
-    if len(rows.kinds) == 3:
+    if len(rows.constraints) == 3:
         slack[slack <= _MET] = 0.0
     return slack
 
@@ -74,7 +74,7 @@ def _walk(rows: Rows, rest: Array) -> Array:
     w, before, position = np.empty_like(rest), np.zeros(rest.shape[1]), np.zeros(rest.shape[1])
     for j in range(N):
         wanted = _within(rest[j], low[j], high[j])
-        if len(rows.kinds) == 3 and j + 1 < N:
+        if len(rows.constraints) == 3 and j + 1 < N:
             row = 2 * N + j + 1
             wanted = _within(wanted, rows.lower[row] - position, rows.upper[row] - position)
         before = w[j] = _within(wanted, before + least[j], before + most[j])

@@ -11,7 +11,9 @@ from himpc.formulation.settings import Settings
 from himpc.kinematics.configuration import joint_indices
 from himpc.kinematics.geometry import geometry
 from himpc.limits import LimitsInForce
-from himpc.limits.rows import approached, reaction, toeplitz
+from himpc.limits.constraints import imposed
+from himpc.limits.rows import profiles
+from himpc.limits.velocity import approached, reaction
 from himpc.references import Preview, Reference
 from himpc.references.curve import curve_of
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
@@ -48,9 +50,9 @@ def arena_for(
     """
     tasks = (*form.tasks, *off)
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
-    paper = settings.limits.position == "paper"
+    constraints = imposed(settings.limits)
     N, solved = settings.horizon, sum(form.sizes)
-    bounds = (3 if paper else 2) * N
+    bounds = len(constraints) * N
     arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds)
     f = arena.f
     model = form.model
@@ -61,7 +63,7 @@ def arena_for(
         write_effects(arena, level.rows, level.root_Q, level.weighted_C)
     write_levels(arena, levels)
     limits = settings.limits
-    f["L"][:] = toeplitz(N, ("torque", "velocity", "position") if paper else ("torque", "velocity"))
+    f["L"][:] = profiles(N, constraints)
     f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
     f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
     f["nothing"][:] = np.nan

@@ -12,7 +12,8 @@ from himpc.cascade.last_resort import containing, last_resort, softened, towards
 from himpc.cascade.level import FALLBACKS, NO_ROWS, Fallback, Point
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
-from himpc.limits.rows import Kind, coming_to_rest
+from himpc.limits.constraint import Constraint
+from himpc.limits.rows import coming_to_rest
 from himpc.prediction.joint import JointState
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array
@@ -43,7 +44,7 @@ class FallbackBudget:
 
 
 def solve_levels(
-    arena: Arena, kinds: tuple[Kind, ...], budget: FallbackBudget
+    arena: Arena, constraints: tuple[Constraint, ...], budget: FallbackBudget
 ) -> list[tuple[Fallback, float]]:
     """Solves all levels of an arena whose problems have been written; returns for each level the fallback
     that gave its U ("solve" if none was needed) and its time, microseconds.
@@ -56,7 +57,7 @@ def solve_levels(
     Args:
         arena: filled by `linearize`. The rows may be wider afterwards: levels below keep what a fallback
             needed.
-        kinds: kinds of the rows.
+        constraints: those whose rows the arena holds.
         budget: the budget of this tick, from which every printed QP is deducted.
     """
     found: list[tuple[Fallback, float]] = []
@@ -66,16 +67,18 @@ def solve_levels(
             np.nan
         )  # where the kernel gets nowhere, what it found before is no way to go
         solved = solve_level(*arena.arguments, place, 0.0)
-        fallback = "solve" if solved else _climb_down(arena, place, kinds, budget)
+        fallback = "solve" if solved else _climb_down(arena, place, constraints, budget)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = FALLBACKS.index(fallback), time_us
         found.append((fallback, time_us))
     return found
 
 
-def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], budget: FallbackBudget) -> Fallback:
+def _climb_down(
+    arena: Arena, place: int, constraints: tuple[Constraint, ...], budget: FallbackBudget
+) -> Fallback:
     f = arena.f
-    rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
+    rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), constraints)
     wanted = f["U"][place].copy()
     point = _as_printed(arena, place, rows, budget)
     if point is not None:

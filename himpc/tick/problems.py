@@ -23,7 +23,7 @@ def solve_problems(
 ) -> list[LevelSolution]:
     """`himpc.cascade.cascade.solve_cascade` by the kernel; arguments as there."""
     arena = arena_of(problems, rows, previous)
-    fallbacks = solve_levels(arena, rows.kinds, FallbackBudget())
+    fallbacks = solve_levels(arena, rows.constraints, FallbackBudget())
     finish_tick(*arena.arguments, False)
     return solutions([problem.name for problem in problems], arena.found(), fallbacks)
 

@@ -13,7 +13,7 @@ from himpc.formulation.forms import StackForm
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
-from himpc.limits.rows import Kind
+from himpc.limits.constraints import imposed
 from himpc.plan import AtOnce, Evidence, Plan
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.tasks import Damping, Task
@@ -59,9 +59,7 @@ class CompiledTick:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
         self._given = GivenRows(robot, self.arena, self._spans)
-        self._kinds: tuple[Kind, ...] = ("torque", "velocity")
-        if settings.limits.position == "paper":
-            self._kinds = ("torque", "velocity", "position")
+        self._constraints = imposed(settings.limits)
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
@@ -173,7 +171,7 @@ class CompiledTick:
             if not linearize(*arena.arguments):
                 return None
             self._looked = True
-            fallbacks = solve_levels(arena, self._kinds, budget) if self._levels else []
+            fallbacks = solve_levels(arena, self._constraints, budget) if self._levels else []
             iterations += 1
             once = self._most == 1
             if not finish_tick(*arena.arguments, once):
@@ -196,7 +194,7 @@ class CompiledTick:
         f["q"][:], f["v"][:], f["tau_0"][:] = q, v, tau_0
         if limits is not self._limits:
             self._limits = limits
-            write_limits(self.arena, limits, len(self._kinds) == 3)
+            write_limits(self.arena, limits, self._settings.limits.position == "paper")
         references: Mapping[str, Reference] = {}
         t = 0.0
         if isinstance(previews, Outlook):
@@ -278,7 +276,7 @@ class CompiledTick:
                 task.name: R[place] if task.name in self._given.turning else value[span]
                 for place, task, span in self._spans
             },
-            rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._kinds, stopping),
+            rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._constraints, stopping),
         )
 
     def _at_once(self) -> AtOnce:

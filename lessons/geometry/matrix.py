@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.explicit import quadratic
 from himpc.cascade.level import LevelProblem, LevelSolution
-from himpc.limits.rows import Kind, Rows
+from himpc.limits import Rows
 
 LARGEST = 64
 """Rows and columns that are shown; of a larger Hessian as many whole knots as fit, the first ones."""
@@ -25,7 +25,7 @@ class ActiveRow:
 
     joint: int
     knot: int
-    kind: Kind
+    kind: str
     upper: bool
     multiplier: float
 
@@ -81,7 +81,7 @@ def _active(rows: Rows, solution: LevelSolution, N: int) -> Sequence[ActiveRow]:
         ActiveRow(
             joint=int(joint),
             knot=int(row) % N,
-            kind=rows.kind(int(row), int(joint), bool(multiplier > 0)),
+            kind=rows.constraint(int(row), int(joint), bool(multiplier > 0)).label,
             upper=bool(multiplier > 0),
             multiplier=abs(float(multiplier)),
         )

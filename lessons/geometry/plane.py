@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
 from himpc.constants import RANK_TOLERANCE
-from himpc.limits.rows import Kind, Rows
+from himpc.limits import Rows
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class TorqueBox:
 
     lower: Array
     upper: Array
-    kinds: tuple[tuple[Kind | None, Kind | None], tuple[Kind | None, Kind | None]]
+    kinds: tuple[tuple[str | None, str | None], tuple[str | None, str | None]]
 
     def inside(self, w: Array, room: float = 0.0) -> bool:
         """Whether w is in the box, or no farther outside than `room`, N·m."""
@@ -202,12 +202,14 @@ def _box(rows: Rows, pair: list[int], held: Array) -> TorqueBox:
     rest[0, pair] = 0.0
     touching = np.flatnonzero(rows.L[:, 0])
     slope = rows.L[touching, 0][:, None]
-    taken = (rows.L @ rest)[touching][:, pair]
+    taken = rows.values(rest)[touching][:, pair]
     lower, upper = ((side[touching][:, pair] - taken) / slope for side in (rows.lower, rows.upper))
 
-    def kind(values: Array, k: int, up: bool) -> Kind | None:
+    def kind(values: Array, k: int, up: bool) -> str | None:
         row = int(values[:, k].argmin() if up else values[:, k].argmax())
-        return rows.kind(int(touching[row]), pair[k], up) if np.isfinite(values[row, k]) else None
+        if not np.isfinite(values[row, k]):
+            return None
+        return rows.constraint(int(touching[row]), pair[k], up).label
 
     return TorqueBox(
         lower.max(axis=0),
