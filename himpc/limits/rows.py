@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.limits.constraint import Constraint, Directions, Moment
-from himpc.limits.constraints import imposed
+from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.limits import Limits, LimitsInForce
 from himpc.limits.position import POSITION
 from himpc.limits.velocity import VELOCITY
@@ -60,6 +60,11 @@ class Rows(NamedTuple):
                 D = np.abs(directions.D) if absolute else directions.D
                 value[block] = value[block] @ D.T
         return value
+
+    @property
+    def bits(self) -> NDArray[np.intp]:
+        """The bit in `at_bound` of each row, (r,)."""
+        return np.repeat([bit_of(each) for each in self.constraints], self.L.shape[1])
 
     @property
     def is_hard(self) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from himpc.formulation.settings import Settings
 from himpc.kinematics.configuration import joint_indices
 from himpc.kinematics.geometry import geometry
 from himpc.limits import LimitsInForce
-from himpc.limits.constraints import imposed
+from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.rows import profiles
 from himpc.limits.velocity import approached, reaction
 from himpc.references import Preview, Reference
@@ -23,7 +23,7 @@ from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
-from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
+from himpc.tick.tables import LevelTable, given_of, sizes, write_effects, write_levels
 from robots import Robot
 
 Span = tuple[int, Task, slice]
@@ -52,8 +52,8 @@ def arena_for(
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
     constraints = imposed(settings.limits)
     N, solved = settings.horizon, sum(form.sizes)
-    bounds = len(constraints) * N
-    arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds)
+    bounds, directed = len(constraints) * N, len(given_of(constraints))
+    arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds, directed)
     f = arena.f
     model = form.model
     f["M_bar"][:] = settings.M_bar
@@ -64,6 +64,7 @@ def arena_for(
     write_levels(arena, levels)
     limits = settings.limits
     f["L"][:] = profiles(N, constraints)
+    arena.i["bit"][:] = np.repeat([bit_of(each) for each in constraints], N)
     f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
     f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
     f["nothing"][:] = np.nan
@@ -79,6 +80,7 @@ def write_tasks(
     solved: int,
     levels: int = 0,
     bounds: int = 0,
+    directed: int = 0,
 ) -> tuple[Arena, list[Span]]:
     """An arena with the geometry of a robot and its tasks, and where the rows of each task are.
 
@@ -88,7 +90,7 @@ def write_tasks(
         counts: rows of each.
         N: knots.
         solved: rows of the tasks that are solved for; they come first.
-        levels, bounds: how many.
+        levels, bounds, directed: how many, see `sizes`.
     """
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
     given = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
@@ -102,6 +104,7 @@ def write_tasks(
         len(tasks),
         max(len(frames), 1),
         max(given, 1),
+        directed,
     )
     _write_geometry(arena, robot, frames)
     spans, start, given = [], 0, 0

@@ -12,7 +12,6 @@ from himpc.cascade.last_resort import containing, last_resort, softened, towards
 from himpc.cascade.level import FALLBACKS, NO_ROWS, Fallback, Point
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
-from himpc.limits.constraint import Constraint
 from himpc.limits.rows import coming_to_rest
 from himpc.prediction.joint import JointState
 from himpc.tick.kernel.arena import Arena
@@ -43,9 +42,7 @@ class FallbackBudget:
         return self.left >= 2
 
 
-def solve_levels(
-    arena: Arena, constraints: tuple[Constraint, ...], budget: FallbackBudget
-) -> list[tuple[Fallback, float]]:
+def solve_levels(arena: Arena, like: Rows, budget: FallbackBudget) -> list[tuple[Fallback, float]]:
     """Solves all levels of an arena whose problems have been written; returns for each level the fallback
     that gave its U ("solve" if none was needed) and its time, microseconds.
 
@@ -57,7 +54,7 @@ def solve_levels(
     Args:
         arena: filled by `linearize`. The rows may be wider afterwards: levels below keep what a fallback
             needed.
-        constraints: those whose rows the arena holds.
+        like: rows with the constraints, directions and L of the arena; their bounds do not count.
         budget: the budget of this tick, from which every printed QP is deducted.
     """
     found: list[tuple[Fallback, float]] = []
@@ -67,18 +64,16 @@ def solve_levels(
             np.nan
         )  # where the kernel gets nowhere, what it found before is no way to go
         solved = solve_level(*arena.arguments, place, 0.0)
-        fallback = "solve" if solved else _climb_down(arena, place, constraints, budget)
+        fallback = "solve" if solved else _climb_down(arena, place, like, budget)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = FALLBACKS.index(fallback), time_us
         found.append((fallback, time_us))
     return found
 
 
-def _climb_down(
-    arena: Arena, place: int, constraints: tuple[Constraint, ...], budget: FallbackBudget
-) -> Fallback:
+def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) -> Fallback:
     f = arena.f
-    rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), constraints)
+    rows = like._replace(lower=f["lower"].copy(), upper=f["upper"].copy())
     wanted = f["U"][place].copy()
     point = _as_printed(arena, place, rows, budget)
     if point is not None:

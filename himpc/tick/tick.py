@@ -22,6 +22,7 @@ from himpc.tick.configure import arena_for, write_curve, write_limits, write_pre
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
+from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
 from himpc.tick.kernel.arrays import NOW, Array
 from himpc.tick.kernel.finish_tick import finish_tick
@@ -59,7 +60,9 @@ class CompiledTick:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
         self._given = GivenRows(robot, self.arena, self._spans)
-        self._constraints = imposed(settings.limits)
+        constraints, f = imposed(settings.limits), self.arena.f
+        self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
+        self._given_bounds = GivenBounds(self.arena, settings, constraints)
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
@@ -168,10 +171,11 @@ class CompiledTick:
             else:
                 before = None
             self._given.write(previews)
+            self._rows = self._given_bounds.write(self._rows, limits)
             if not linearize(*arena.arguments):
                 return None
             self._looked = True
-            fallbacks = solve_levels(arena, self._constraints, budget) if self._levels else []
+            fallbacks = solve_levels(arena, self._rows, budget) if self._levels else []
             iterations += 1
             once = self._most == 1
             if not finish_tick(*arena.arguments, once):
@@ -276,7 +280,7 @@ class CompiledTick:
                 task.name: R[place] if task.name in self._given.turning else value[span]
                 for place, task, span in self._spans
             },
-            rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._constraints, stopping),
+            rows=self._rows._replace(lower=found("lower"), upper=found("upper"), stopping=stopping),
         )
 
     def _at_once(self) -> AtOnce:
