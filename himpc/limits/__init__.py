@@ -6,6 +6,7 @@ from himpc.limits.position import POSITION
 from himpc.limits.ramp import ramp
 from himpc.limits.rows import Rows, build_rows
 from himpc.limits.torque import TORQUE
+from himpc.limits.torque_rate import TORQUE_RATE
 from himpc.limits.velocity import VELOCITY, reaction
 from himpc.limits.viability import viability_bounds
 
@@ -14,6 +15,7 @@ __all__ = [
     "POSITION",
     "POSITION_MARGIN",
     "TORQUE",
+    "TORQUE_RATE",
     "VELOCITY",
     "Limits",
     "LimitsInForce",

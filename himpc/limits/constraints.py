@@ -6,12 +6,14 @@ from himpc.limits.constraint import Constraint
 from himpc.limits.limits import Limits
 from himpc.limits.position import POSITION
 from himpc.limits.torque import TORQUE
+from himpc.limits.torque_rate import TORQUE_RATE
 from himpc.limits.velocity import VELOCITY
 
 CONSTRAINTS: tuple[Constraint, ...] = (
     TORQUE,
     VELOCITY,
     POSITION,
+    TORQUE_RATE,
 )
 """In the order of their rows. Place k has bit 2ᵏ in telemetry's `at_bound`."""
 

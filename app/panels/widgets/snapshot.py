@@ -15,8 +15,8 @@ S_co = TypeVar("S_co", bound=SceneSettings, covariant=True)
 
 @dataclass(frozen=True, eq=False)
 class SessionSnapshot(Generic[S_co]):
-    """latest: the last telemetry row; bound_seconds (n, 3): s each joint spent at its torque, velocity and
-    position bound since the last reset."""
+    """latest: the last telemetry row; bound_seconds: s each joint spent at the bound of each of himpc's
+    `CONSTRAINTS` since the last reset, (n, number of constraints)."""
 
     ready: Ready
     settings: S_co
