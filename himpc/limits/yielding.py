@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.limits.rows import Rows
-from himpc.limits.torque import TORQUE, summed
+from himpc.limits.torque import TORQUE
+from himpc.limits.torque_rate import TORQUE_RATE
 from himpc.limits.velocity import summed_twice
 from himpc.qp import solve_qp
 
@@ -19,9 +20,10 @@ MET = 1e-7
 """N·m: a row with a smaller violation counts as satisfied."""
 _ITERATIONS = 300
 """Largest number of iterations of one QP."""
-_UNKNOWNS = 120
-"""Largest number of unknown increments of joints that depend on each other. Longer plans move at fewer
-knots."""
+_WORK = 40_000
+"""Largest product of unknowns and rows, over all QPs. Longer plans move at fewer knots."""
+_ROWS = 1000
+"""Joints that depend on each other and have more rows brake within torque and its rate alone."""
 _FAINT = 1e-5
 """Weight of coming to rest while rows give way by least squares."""
 
@@ -51,12 +53,15 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
 
     Joints that share a direction are a group; each group is a strictly convex QP. If no increments meet all
     rows, those that are not hard give way by least squares. If no increments meet the hard rows, those give
-    way by least squares that do not bound the torque. Beyond _UNKNOWNS unknowns the torque changes at some
-    knots only, the first among them, evenly spaced.
+    way by least squares that do not bound the torque. Beyond _WORK the torque changes at some knots only, the
+    first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds within its iterations,
+    rows of torque and of its rate hold if any increments meet them, see `_within`.
     """
-    U = np.zeros_like(rest)
+    U = _steps(_steps(rest))
     for group in groups(rows, rest.shape[1]):
         part = _part(rows, group)
+        if len(part.A) > _ROWS:
+            continue
         x = _closest(part, rest[:, group])
         if x is None:
             if _closest(_up_to(part, 1), rest[:, group]) is None:
@@ -65,7 +70,7 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
             x = _closest(part, rest[:, group])
         if x is not None:
             U[:, group] = part.T @ x.reshape(-1, len(group))
-    return _within_torque(rows, U)
+    return _within(rows, np.cumsum(U, axis=0))
 
 
 def groups(rows: Rows, n: int) -> list[list[int]]:
@@ -86,7 +91,7 @@ def groups(rows: Rows, n: int) -> list[list[int]]:
 
 def _part(rows: Rows, group: list[int]) -> _Part:
     N, c = rows.L.shape[1], len(group)
-    moves = max(1, min(N, _UNKNOWNS // c))
+    moves = max(1, min(N, _WORK // (rows.lower.size * c)))
     if moves == N:
         # The unknowns are the values of the velocity rows.
         T, G = np.eye(N) - 2.0 * np.eye(N, k=-1) + np.eye(N, k=-2), np.eye(N)
@@ -151,10 +156,34 @@ def _given_way(part: _Part, rank: int) -> _Part:
     return part._replace(lower=part.lower - wider, upper=part.upper + wider)
 
 
-def _within_torque(rows: Rows, U: Array) -> Array:
-    """The increments with what the solver leaves of the torque rows taken off."""
-    if rows.constraints[0] is not TORQUE:
-        return U
-    N = len(U)
-    torque = np.minimum(np.maximum(summed(N) @ U, rows.lower[:N]), rows.upper[:N])
-    return np.diff(torque, axis=0, prepend=np.zeros((1, U.shape[1])))
+def _within(rows: Rows, wanted: Array) -> Array:
+    """Increments whose torques are close to `wanted`, (N, n), and that meet the rows of torque and of its
+    rate whenever any increments do; those of torque always.
+
+    Going back from the last knot, the torques from which all later rows can still be met are an interval.
+    """
+    N = len(wanted)
+    blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}
+    infinite = np.full(wanted.shape, np.inf)
+    least, most = -infinite, infinite
+    if TORQUE_RATE in blocks:
+        least, most = rows.lower[blocks[TORQUE_RATE]], rows.upper[blocks[TORQUE_RATE]]
+    lowest, highest = -infinite, infinite
+    if TORQUE in blocks:
+        lowest, highest = rows.lower[blocks[TORQUE]], rows.upper[blocks[TORQUE]]
+    low, high = lowest.copy(), highest.copy()
+    for j in range(N - 2, -1, -1):
+        behind_low, behind_high = low[j + 1] - most[j + 1], high[j + 1] - least[j + 1]
+        low[j] = np.minimum(np.maximum(behind_low, lowest[j]), highest[j])
+        high[j] = np.minimum(np.maximum(behind_high, lowest[j]), highest[j])
+    torque, before = np.empty_like(wanted), np.zeros(wanted.shape[1])
+    for j in range(N):
+        near = np.minimum(np.maximum(wanted[j], low[j]), high[j])
+        near = np.minimum(np.maximum(near, before + least[j]), before + most[j])
+        before = torque[j] = np.minimum(np.maximum(near, lowest[j]), highest[j])
+    return _steps(torque)
+
+
+def _steps(x: Array) -> Array:
+    """x_j − x_{j−1}, where x_{−1} = 0."""
+    return np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1])))

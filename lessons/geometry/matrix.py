@@ -79,11 +79,12 @@ def _active(rows: Rows, solution: LevelSolution, N: int) -> Sequence[ActiveRow]:
     found = solution.active
     return [
         ActiveRow(
-            joint=int(joint),
+            joint=joint,
             knot=int(row) % N,
-            kind=rows.constraint(int(row), int(joint), bool(multiplier > 0)).label,
+            kind=rows.constraint(int(row), int(column), bool(multiplier > 0)).label,
             upper=bool(multiplier > 0),
             multiplier=abs(float(multiplier)),
         )
-        for row, joint, multiplier in zip(found.row, found.joint, found.multiplier, strict=True)
+        for row, column, multiplier in zip(found.row, found.joint, found.multiplier, strict=True)
+        for joint in rows.joints_of(int(row), int(column))
     ]

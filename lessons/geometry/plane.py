@@ -2,8 +2,8 @@
 
 Everything else that a QP decides about (the other joints, later knots) is held where one level's solution has
 it. In that cut the cost of a level is (w − c)ᵀ P (w − c) + least, w = (Δτ_a, Δτ_b) of knot 0 in N·m; the
-bounds are a box, since no row couples two joints; and what (33) leaves is the plane, a line, a point or
-nothing.
+bounds are a box, since no row couples two joints (rows of constraints that do are left out); and what (33)
+leaves is the plane, a line, a point or nothing.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def _cost(problem: LevelProblem, pair: list[int], held: Array) -> tuple[Array, A
 def _box(rows: Rows, pair: list[int], held: Array) -> TorqueBox:
     rest = held.copy()
     rest[0, pair] = 0.0
-    touching = np.flatnonzero(rows.L[:, 0])
+    touching = np.array([row for row in np.flatnonzero(rows.L[:, 0]) if rows.directions_of(row) is None])
     slope = rows.L[touching, 0][:, None]
     taken = rows.values(rest)[touching][:, pair]
     lower, upper = ((side[touching][:, pair] - taken) / slope for side in (rows.lower, rows.upper))

@@ -104,14 +104,9 @@ def test_joints_that_share_a_direction_are_a_group() -> None:
     assert sorted(groups(rows, 5)) == [[0, 3, 4], [1], [2]]
 
 
-@pytest.mark.parametrize("hard", [False, True])
-def test_a_long_plan_of_many_joints_moves_at_fewer_knots(hard: bool) -> None:
-    """The number of unknowns is bounded, hard rows hold."""
-    rows = random_rows(3, 7, 60, hard, missed=0.0)
-    room = np.where(rows.is_hard, 1.0, 1e3)[:, None]
-    rows = rows._replace(lower=np.minimum(rows.lower, -room), upper=np.maximum(rows.upper, room))
-    U = braking(rows)
-    assert excess(rows, U)[rows.is_hard].max() <= 2e-7
-    group = max(groups(rows, 7), key=len)
-    assert len(group) > 2
-    assert np.count_nonzero(np.abs(U[:, group]).max(axis=1) > 1e-6) <= 120 // len(group)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_long_plan_of_many_joints_stays_within_torque_and_rate(seed: int) -> None:
+    """Too many unknowns for one QP, between bounds of which some leave next to no room: the hard rows hold
+    nevertheless."""
+    rows = random_rows(seed, 7, 40, hard=False, missed=20.0)
+    assert excess(rows, braking(rows))[rows.is_hard].max() <= 1e-9
