@@ -41,7 +41,10 @@ class History:
         """takers: functions that also receive each portion of rows of a run."""
         self.layout = layout
         self.latest = np.full(layout.size, np.nan)
-        self.bound_ticks = np.zeros((layout.fields["at_bound"].stop - layout.fields["at_bound"].start, 3))
+        from himpc.limits import CONSTRAINTS
+
+        joints = layout.fields["at_bound"].stop - layout.fields["at_bound"].start
+        self.bound_ticks = np.zeros((joints, len(CONSTRAINTS)))
         self.bucket = -1
         self._takers = takers
         self._block = block
@@ -93,7 +96,7 @@ class History:
         self.latest = rows[-1].copy()  # a copy, since a view would keep all rows in memory
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
-        for k in range(3):
+        for k in range(self.bound_ticks.shape[1]):
             self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
         numbers = np.floor(rows[:, self._t] / _SPAN + 1e-6).astype(np.int64)
         starts = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1)).tolist()

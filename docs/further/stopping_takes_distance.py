@@ -9,7 +9,7 @@ import numpy as np
 from docs.further.kit import Further, Line, Question
 from himpc.limits import Limits
 from himpc.limits.limits import POSITION_MARGIN
-from himpc.limits.rows import REACTION
+from himpc.limits.velocity import REACTION
 from himpc.limits.viability import viability_bounds
 
 T_S = 1e-3

@@ -62,12 +62,12 @@ def solve_explicit(
     """
     n = U_above.shape[1]
     level = white(problem, U_above, [B for B, _ in above], Z)
-    at = (rows.L @ U_above).ravel()
+    at = rows.values(U_above).ravel()
     lower, upper = rows.lower.ravel(), rows.upper.ravel()
     if above:
         # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
         lower, upper = np.minimum(lower, at), np.maximum(upper, at)
-    every = _every_joint(rows.L.tobytes(), rows.L.shape, n)[:, : problem.knots * n]
+    every = every_row(rows, n)[:, : problem.knots * n]
     A = every @ level.P
     length = np.sqrt(np.einsum("ij,ij->i", A, A))
     reach = every @ np.tile(1.0 / np.sqrt(problem.R), problem.knots)
@@ -128,6 +128,19 @@ def quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
     return G.T @ weighted + np.diag(np.tile(problem.R, N)), weighted.T @ problem.free[:K].ravel()
 
 
+def every_row(rows: Rows, n: int) -> Array:
+    """The rows as one matrix on the increments, knot by knot and joint by joint, (r·n, N·n)."""
+    A = _every_joint(rows.L.tobytes(), rows.L.shape, n)
+    N = rows.L.shape[1]
+    if rows.directions:
+        A = A.copy()
+        for place, directions in enumerate(rows.directions):
+            if directions is not None:
+                block = slice(place * N, (place + 1) * N)
+                A[block.start * n : block.stop * n] = np.kron(rows.L[block], directions.D)
+    return A
+
+
 @lru_cache(maxsize=8)
 def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
     return np.asarray(np.kron(np.frombuffer(L).reshape(shape), np.eye(n)), np.float64)
@@ -136,7 +149,7 @@ def _every_joint(L: bytes, shape: tuple[int, int], n: int) -> Array:
 def _point(
     solution: QPSolution, U: Array, multipliers: Array, rows: Rows, lower: Array, upper: Array
 ) -> Point:
-    value = (rows.L @ U).ravel()
+    value = rows.values(U).ravel()
     slack = np.where(multipliers > 0, upper - value, value - lower)
     # An interior-point-like solver leaves tiny multipliers everywhere: binding means both.
     active = np.flatnonzero((np.abs(multipliers) > _BINDING) & (slack < 1e3 * _BINDING))

@@ -45,7 +45,7 @@ def towards(rows: Rows, U: Array, wanted: Array) -> Array | None:
     no step is possible."""
     if not np.isfinite(wanted).all():
         return None
-    here, change = rows.L @ U, rows.L @ (wanted - U)
+    here, change = rows.values(U), rows.values(wanted - U)
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(change > 0, rows.upper - here, here - rows.lower) / np.abs(change)
     share = min(1.0, float(np.min(room, where=change != 0, initial=1.0)))
@@ -54,5 +54,5 @@ def towards(rows: Rows, U: Array, wanted: Array) -> Array | None:
 
 def containing(rows: Rows, U: Array) -> Rows:
     """Returns the rows widened until U satisfies them: lower levels then start from a feasible point."""
-    value = rows.L @ U
+    value = rows.values(U)
     return rows._replace(lower=np.minimum(rows.lower, value), upper=np.maximum(rows.upper, value))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.limits.rows import Kind, Rows
+from himpc.limits.rows import Rows
 
 Array = NDArray[np.float64]
 Fallback = Literal["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"]
@@ -57,7 +58,8 @@ class LevelProblem(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActiveRows:
-    """Rows of `Rows` that bind: indices of row and joint, multiplier and slack (N·m in the rows' scaling).
+    """Rows of `Rows` that bind: indices of row and column, multiplier and slack (N·m in the rows' scaling).
+    A column is a joint, but for constraints with directions of their own.
 
     A positive multiplier pushes back from an upper bound, a negative one from a lower bound. Twice it is
     what the cost (32a) or (34a) would save per N·m of further room.
@@ -71,11 +73,17 @@ class ActiveRows:
     def __len__(self) -> int:
         return self.row.size
 
-    def labelled(self, rows: Rows) -> list[tuple[Kind, int, int, float, float]]:
-        """(kind, knot, joint index, multiplier, slack) of each active row."""
+    def labelled(self, rows: Rows, joints: Sequence[str]) -> list[tuple[str, int, str, float, float]]:
+        """(label, knot, name of the direction, multiplier, slack) of each active row."""
+
+        def name(row: int, column: int) -> str:
+            directions = rows.directions_of(row)
+            return joints[column] if directions is None else directions.names[column]
+
+        columns = (each.tolist() for each in (self.row, self.joint, self.multiplier, self.slack))
         return [
-            (rows.kind(int(r), int(a), m > 0), rows.knot(int(r)), int(a), float(m), float(s))
-            for r, a, m, s in zip(self.row, self.joint, self.multiplier, self.slack, strict=True)
+            (rows.constraint(row, a, m > 0).label, rows.knot(row), name(row, a), m, s)
+            for row, a, m, s in zip(*columns, strict=True)
         ]
 
 

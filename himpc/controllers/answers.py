@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from himpc.cascade.level import NO_ROWS, Fallback, LevelSolution
 from himpc.controllers.view import LevelView
 from himpc.formulation.forms import usable
-from himpc.limits import Rows
+from himpc.limits import TORQUE, Rows
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def solution(
 
 def no_rows(n: int) -> Rows:
     unbounded = np.full((1, n), np.inf)
-    return Rows(np.ones((1, 1)), -unbounded, unbounded, ("torque",))
+    return Rows(np.ones((1, 1)), -unbounded, unbounded, (TORQUE,))
 
 
 def _short(value: Any) -> str:

@@ -17,7 +17,7 @@ from himpc.controllers.base import TorqueController
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
-from himpc.limits import LimitsInForce, Rows, in_force, ramp
+from himpc.limits import TORQUE, LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
 from himpc.tasks import Damping, OrientationTask
@@ -247,7 +247,7 @@ class OneStepController(TorqueController):
     def _rows(self, limits: LimitsInForce, origin: Array) -> Rows:
         """Returns the bounds of this tick on torques relative to `origin`."""
         lower, upper = limits.tau_lower - origin, limits.tau_upper - origin
-        return Rows(np.ones((1, 1)), lower[None], upper[None], ("torque",))
+        return Rows(np.ones((1, 1)), lower[None], upper[None], (TORQUE,))
 
 
 class WithJacobian(Protocol):

@@ -1,12 +1,22 @@
-"""Limits: torque, velocity and position bounds, and the rows they become."""
+"""Limits: which are imposed, the constraints that they are, and the rows they become."""
 
+from himpc.limits.constraints import CONSTRAINTS
 from himpc.limits.limits import POSITION_MARGIN, Limits, LimitsInForce, in_force
+from himpc.limits.position import POSITION
 from himpc.limits.ramp import ramp
-from himpc.limits.rows import Rows, build_rows, reaction
+from himpc.limits.rows import Rows, build_rows
+from himpc.limits.torque import TORQUE
+from himpc.limits.torque_rate import TORQUE_RATE
+from himpc.limits.velocity import VELOCITY, reaction
 from himpc.limits.viability import viability_bounds
 
 __all__ = [
+    "CONSTRAINTS",
+    "POSITION",
     "POSITION_MARGIN",
+    "TORQUE",
+    "TORQUE_RATE",
+    "VELOCITY",
     "Limits",
     "LimitsInForce",
     "Rows",

@@ -3,37 +3,44 @@ possible."""
 
 from __future__ import annotations
 
+from operator import is_
+
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.limits.position import POSITION
 from himpc.limits.rows import Rows
+from himpc.limits.torque import TORQUE
+from himpc.limits.velocity import VELOCITY
+from himpc.limits.yielding import MET, closest_to_rest
 from himpc.qp import solve_qp
 
 Array = NDArray[np.float64]
 
 _ITERATIONS = 300
 """Largest number of iterations of the QP of one joint."""
-_MET = 1e-7
-"""N·m: a row with a smaller violation counts as satisfied."""
 
 
 def braking(rows: Rows) -> Array:
     """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows whenever this is
     possible.
 
-    Rows couple no two joints. With w_j = Σ_{i≤j} τ_i, what a joint's velocity row bounds, and τ_i the torque
-    gained up to knot i, torque rows say how far w_j may be from w_{j−1} and velocity rows where it may be.
-    Going back from the last knot, the w_j from which all later rows can still be met are an interval; going
-    forward, each w_j is put as close to `rows.rest` as these intervals allow. Where there is nothing between
-    the bounds, a velocity row of an earlier knot counts more than later ones. Position rows bound sums of
-    w_j: with them the sequence closest to `rows.rest` is a QP with N unknowns for every joint.
+    Rows of torque, velocity and position couple no two joints. With w_j = Σ_{i≤j} τ_i, what a velocity row
+    of a joint bounds, and τ_i the torque gained up to knot i, torque rows say how far w_j may be from w_{j−1}
+    and velocity rows where it may be. Going back from the last knot, the w_j from which all later rows can
+    still be met are an interval; going forward, each w_j is put as close to `rows.rest` as these intervals
+    allow. Where there is nothing between the bounds, a velocity row of an earlier knot counts more than later
+    ones. Position rows bound sums of w_j: with them the sequence closest to `rows.rest` is a QP with N
+    unknowns for every joint. Rows of other constraints: see `closest_to_rest`.
     """
     N, n = rows.L.shape[1], rows.lower.shape[1]
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest
+    if not _joint_by_joint(rows):
+        return closest_to_rest(rows, rest)
     w = _walk(rows, rest)
     U = _steps(_steps(w))
-    if len(rows.kinds) == 3:
-        for joint in np.flatnonzero(missed(rows, U).max(axis=0) > _MET).tolist():
+    if len(rows.constraints) == 3:
+        for joint in np.flatnonzero(missed(rows, U).max(axis=0) > MET).tolist():
             found = _closest(rows, joint, rest[:, joint])
             if found is not None:
                 w[:, joint] = found
@@ -41,10 +48,15 @@ def braking(rows: Rows) -> Array:
     return U
 
 
+def _joint_by_joint(rows: Rows) -> bool:
+    """Whether all rows are of torque, velocity and position, in this order."""
+    return 2 <= len(rows.constraints) <= 3 and all(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
+
+
 def missed(rows: Rows, U: Array) -> Array:
     """Returns the violation of rows by increments (N, n), (r, n) ≥ 0 N·m; 0 up to the rounding of the
     sums."""
-    value, summed = rows.L @ U, rows.L @ np.abs(U)
+    value, summed = rows.values(U), rows.sizes(U)
     excess = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
     excess[excess <= 1e-14 * len(rows.L) * summed] = 0.0
     return excess
@@ -58,8 +70,8 @@ def least_slack(rows: Rows) -> Array:
     """
     slack = missed(rows, braking(rows))
     slack[: rows.L.shape[1]] = 0.0
-    if len(rows.kinds) == 3:
-        slack[slack <= _MET] = 0.0
+    if len(rows.constraints) >= 3 or not _joint_by_joint(rows):
+        slack[slack <= MET] = 0.0
     return slack
 
 
@@ -74,7 +86,7 @@ def _walk(rows: Rows, rest: Array) -> Array:
     w, before, position = np.empty_like(rest), np.zeros(rest.shape[1]), np.zeros(rest.shape[1])
     for j in range(N):
         wanted = _within(rest[j], low[j], high[j])
-        if len(rows.kinds) == 3 and j + 1 < N:
+        if len(rows.constraints) == 3 and j + 1 < N:
             row = 2 * N + j + 1
             wanted = _within(wanted, rows.lower[row] - position, rows.upper[row] - position)
         before = w[j] = _within(wanted, before + least[j], before + most[j])
@@ -96,7 +108,7 @@ def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
     lower, upper = rows.lower[kept, joint], rows.upper[kept, joint]
     found = solve_qp(np.eye(N), -rest, A, lower, upper, "daqp", _ITERATIONS)
     value = A @ found.x
-    met = bool(((value <= upper + _MET) & (value >= lower - _MET)).all())
+    met = bool(((value <= upper + MET) & (value >= lower - MET)).all())
     if not met:
         return None
     # The torque rows hold exactly: what the solver leaves of them is taken off.

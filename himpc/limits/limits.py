@@ -31,6 +31,7 @@ class Limits:
             acceleration (M̄ < M), and a bound met at full acceleration is overrun: by 17 % on the iiwa's
             circle with rate 0, which is (32e) as printed, by 0.2 % with 15 (`himpc-lab reproduce
             himpc-limits`).
+        torque_rate: N·m/s; largest change of each joint's torque per second; 0: not imposed.
     """
 
     torque: bool = True
@@ -39,6 +40,7 @@ class Limits:
     torque_scale: Annotated[float, Range(0.0, above=True)] = 1.0
     velocity_scale: Annotated[float, Range(0.0, above=True)] = 1.0
     velocity_approach: Annotated[float, Range(0.0, 1e4)] = 15.0
+    torque_rate: Annotated[float, Range(0.0, 1e5)] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self, "limits.")

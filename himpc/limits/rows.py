@@ -1,54 +1,95 @@
-"""The bounds (32d)–(32f) over the horizon as rows on the increments."""
+"""The bounds of all constraints over the horizon as rows on the increments."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.limits.constraint import Constraint, Directions, Moment
+from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.limits import Limits, LimitsInForce
-from himpc.limits.viability import viability_bounds
+from himpc.limits.position import POSITION
+from himpc.limits.velocity import VELOCITY
 from himpc.prediction.joint import JointState
 
 Array = NDArray[np.float64]
-Kind = Literal["torque", "velocity", "position"]
 
 
 class Rows(NamedTuple):
-    """lower ≤ L U ≤ upper, U = (N, n) increments; every joint has the same L.
+    """lower ≤ L U Dᵀ ≤ upper, U = (N, n) increments: N rows per constraint, each with n columns, one per
+    direction of the constraint.
 
     All rows are in N·m: a velocity row is scaled by M̄/T_s, a position row by M̄/T_s², so that one
     tolerance fits all.
 
     Attributes:
-        L: (r, N) lower-triangular Toeplitz blocks, one per kind.
+        L: (r, N) lower-triangular Toeplitz blocks, the time profiles of the constraints.
         lower, upper: (r, n), ±inf where there is no bound.
-        kinds: kind of each block of N rows.
+        constraints: which one each block of N rows belongs to.
         stopping: (2, n) where the lower, upper velocity row is the position limit's: below the joint's own
             limit, the velocity from which it can still stop. None where no row is.
         rest: (N, n) N·m, the values of the velocity rows when the joints come to rest, see `coming_to_rest`;
             None means zeros: the velocities stay constant.
+        directions: of each block; None for a block whose column c is joint c. Empty if all are so.
     """
 
     L: Array
     lower: Array
     upper: Array
-    kinds: tuple[Kind, ...]
+    constraints: tuple[Constraint, ...]
     stopping: NDArray[np.bool_] | None = None
     rest: Array | None = None
+    directions: tuple[Directions | None, ...] = ()
 
-    def kind(self, row: int, joint: int, upper: bool) -> Kind:
-        """Which limit a joint meets at the upper or lower end of a row."""
-        kind = self.kinds[row // self.L.shape[1]]
-        stops = kind == "velocity" and self.stopping is not None and self.stopping[int(upper), joint]
-        return "position" if stops else kind
+    def values(self, U: Array) -> Array:
+        """What the rows bound, L U Dᵀ, (r, n) N·m."""
+        return self._turned(self.L @ U, absolute=False)
+
+    def sizes(self, U: Array) -> Array:
+        """The sums of the sizes of what adds up to `values`, (r, n) N·m: their rounding is a share of it."""
+        return self._turned(self.L @ np.abs(U), absolute=True)
+
+    def _turned(self, value: Array, absolute: bool) -> Array:
+        N = self.L.shape[1]
+        for place, directions in enumerate(self.directions):
+            if directions is not None:
+                block = slice(place * N, (place + 1) * N)
+                D = np.abs(directions.D) if absolute else directions.D
+                value[block] = value[block] @ D.T
+        return value
+
+    @property
+    def bits(self) -> NDArray[np.intp]:
+        """The bit in `at_bound` of each row, (r,)."""
+        return np.repeat([bit_of(each) for each in self.constraints], self.L.shape[1])
+
+    @property
+    def is_hard(self) -> NDArray[np.bool_]:
+        """Which rows hold always, (r,)."""
+        return np.repeat([each.hard for each in self.constraints], self.L.shape[1])
+
+    def directions_of(self, row: int) -> Directions | None:
+        """The directions of a row's columns; None if they are the joints."""
+        return self.directions[row // self.L.shape[1]] if self.directions else None
+
+    def joints_of(self, row: int, column: int) -> tuple[int, ...]:
+        """The joints that a row bounds, counted from 0."""
+        directions = self.directions_of(row)
+        return (column,) if directions is None else tuple(np.flatnonzero(directions.D[column]).tolist())
+
+    def constraint(self, row: int, column: int, upper: bool) -> Constraint:
+        """Which constraint is met at the upper or lower end of a row."""
+        constraint = self.constraints[row // self.L.shape[1]]
+        stops = constraint is VELOCITY and self.stopping is not None and self.stopping[int(upper), column]
+        return POSITION if stops else constraint
 
     def knot(self, row: int) -> int:
         """The knot (1 … N; torque: 0 … N−1) whose value a row bounds."""
         N = self.L.shape[1]
-        return row % N + (self.kinds[row // N] != "torque")
+        return row % N + self.constraints[row // N].first_knot
 
     def widened(self, slack: Array) -> Rows:
         """The rows with both bounds moved outward by `slack`, (r, n) ≥ 0."""
@@ -58,73 +99,38 @@ class Rows(NamedTuple):
 BRAKING = 20.0
 """1/s: decay rate of the velocity of a braking joint, which is almost at rest after a quarter of a second."""
 
-REACTION = 5.0
-"""Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
-
-
-def reaction(limits: Limits, T_s: float) -> float:
-    """Seconds that the viability bound allows before a joint brakes; T_s: control period, s."""
-    return T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
-
 
 @lru_cache(maxsize=64)
-def toeplitz(N: int, kinds: tuple[Kind, ...]) -> Array:
+def profiles(N: int, constraints: tuple[Constraint, ...]) -> Array:
     """L of `Rows`."""
-    lag = np.subtract.outer(np.arange(N), np.arange(N)).astype(float)
-    blocks = {
-        "torque": np.where(lag >= 0, 1.0, 0.0),
-        "velocity": np.where(lag >= 0, lag + 1.0, 0.0),
-        "position": np.where(lag >= 0, lag * (lag + 1.0) / 2.0, 0.0),
-    }
-    return np.vstack([blocks[kind] for kind in kinds])
-
-
-@lru_cache(maxsize=64)
-def approached(N: int, share: float) -> Array:
-    """Share of the distance to a velocity bound that may be gone at knots 1 … N, (N, 1); 1 for share 0."""
-    return 1.0 - np.asarray((1.0 - min(1.0, share or 1.0)) ** np.arange(1.0, N + 1)[:, None], np.float64)
+    return np.vstack([each.profile(N) for each in constraints])
 
 
 def build_rows(
     state: JointState, tau_0: Array, M_bar: Array, limits: Limits, force: LimitsInForce, N: int, T_s: float
 ) -> Rows:
-    """Bounds on torque, velocity and position at every knot.
+    """The bounds of all constraints that `limits` impose, at every knot.
 
     With `limits.position == "viability"` the position limit enters through the velocity rows, all
     knots using the measured q_k; with "paper" the rows are those of (32d): at knot 1 no Δτ can
     influence them, and nothing foresees the distance that stopping takes.
 
     Args:
-        state: measured joint state, (n,) each.
-        tau_0: torque applied last, (n,) N·m.
-        M_bar: diagonal of M̄, (n,).
-        limits: which bounds are imposed.
-        force: their values.
-        N: horizon.
-        T_s: control period, s.
+        state, tau_0, M_bar, limits, force, N, T_s: see `Moment`.
     """
-    n = M_bar.size
-    paper = limits.position == "paper"
-    kinds: tuple[Kind, ...] = ("torque", "velocity", "position") if paper else ("torque", "velocity")
-    # [lower, upper] side by side halves the number of array operations.
-    bounds = np.empty((2, len(kinds) * N, n))
-    bounds[:, :N] = (force.torque - tau_0)[:, None]
-
-    stopping = None
-    if limits.position == "viability":
-        v = viability_bounds(state.q, *force.stops, force.v_limit, force.a_max, reaction(limits, T_s))
-        stopping = np.array((-v[0] < force.v_limit, v[1] < force.v_limit))
-    else:
-        v = np.array((-force.v_limit, force.v_limit))
-    scale = M_bar / T_s
-    velocity = bounds[:, N : 2 * N]
-    np.multiply(approached(N, limits.velocity_approach * T_s), ((v - state.v) * scale)[:, None], out=velocity)
-    velocity -= state.gained_velocity(N, T_s) * scale
-    if paper:
-        q = np.array((force.q_lower, force.q_upper))[:, None]
-        bounds[:, 2 * N :] = (q - state.free_position(N, T_s)) * (scale / T_s)
-    rest = coming_to_rest(state, M_bar, N, T_s)
-    return Rows(toeplitz(N, kinds), bounds[0], bounds[1], kinds, stopping, rest)
+    now = Moment(state, tau_0, M_bar, limits, force, N, T_s)
+    constraints = imposed(limits)
+    blocks = [each.bounds(now) for each in constraints]
+    directions = tuple(block.directions for block in blocks)
+    return Rows(
+        L=profiles(N, constraints),
+        lower=np.concatenate([block.lower for block in blocks]),
+        upper=np.concatenate([block.upper for block in blocks]),
+        constraints=constraints,
+        stopping=next((block.stopping for block in blocks if block.stopping is not None), None),
+        rest=coming_to_rest(state, M_bar, N, T_s),
+        directions=directions if any(each is not None for each in directions) else (),
+    )
 
 
 def coming_to_rest(state: JointState, M_bar: Array, N: int, T_s: float) -> Array:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Binding(NamedTuple):
-    """An active constraint: its level, joint, bound and multiplier."""
+    """An active constraint: its level, its joint (or what its direction is called), bound and multiplier."""
 
     level: str
     joint: str
@@ -138,13 +138,13 @@ class Plan:
         return [
             Binding(
                 level.name,
-                joint_names[joint],
-                kind,
+                direction,
+                label,
                 "upper" if multiplier > 0 else "lower",
                 knot,
                 abs(multiplier),
                 slack,
             )
             for level in self.levels
-            for kind, knot, joint, multiplier, slack in level.active.labelled(self.rows)
+            for label, knot, direction, multiplier, slack in level.active.labelled(self.rows, joint_names)
         ]

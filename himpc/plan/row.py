@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import ActiveRows
-from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.limits import Rows
+from himpc.limits.constraints import bit_of
 from himpc.plan.plan import Plan
 from himpc.references import Preview
 from himpc.rotation import quaternion
@@ -88,10 +88,9 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
     row[fields["at_bound"]] = marks
 
 
-_BITS = {"torque": AT_TORQUE, "velocity": AT_VELOCITY, "position": AT_POSITION}
-
-
 def _mark_bounds(marks: list[int], active: ActiveRows, rows: Rows) -> None:
     found = zip(active.row.tolist(), active.joint.tolist(), active.multiplier.tolist(), strict=True)
-    for row, joint, multiplier in found:
-        marks[joint] |= _BITS[rows.kind(row, joint, multiplier > 0)]
+    for row, column, multiplier in found:
+        bit = bit_of(rows.constraint(row, column, multiplier > 0))
+        for joint in rows.joints_of(row, column):
+            marks[joint] |= bit

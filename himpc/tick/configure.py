@@ -11,7 +11,9 @@ from himpc.formulation.settings import Settings
 from himpc.kinematics.configuration import joint_indices
 from himpc.kinematics.geometry import geometry
 from himpc.limits import LimitsInForce
-from himpc.limits.rows import approached, reaction, toeplitz
+from himpc.limits.constraints import bit_of, imposed
+from himpc.limits.rows import profiles
+from himpc.limits.velocity import approached, reaction
 from himpc.references import Preview, Reference
 from himpc.references.curve import curve_of
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
@@ -21,7 +23,7 @@ from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
-from himpc.tick.tables import LevelTable, sizes, write_effects, write_levels
+from himpc.tick.tables import LevelTable, given_of, sizes, write_effects, write_levels
 from robots import Robot
 
 Span = tuple[int, Task, slice]
@@ -48,10 +50,10 @@ def arena_for(
     """
     tasks = (*form.tasks, *off)
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
-    paper = settings.limits.position == "paper"
+    constraints = imposed(settings.limits)
     N, solved = settings.horizon, sum(form.sizes)
-    bounds = (3 if paper else 2) * N
-    arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds)
+    bounds, directed = len(constraints) * N, len(given_of(constraints))
+    arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds, directed)
     f = arena.f
     model = form.model
     f["M_bar"][:] = settings.M_bar
@@ -61,7 +63,8 @@ def arena_for(
         write_effects(arena, level.rows, level.root_Q, level.weighted_C)
     write_levels(arena, levels)
     limits = settings.limits
-    f["L"][:] = toeplitz(N, ("torque", "velocity", "position") if paper else ("torque", "velocity"))
+    f["L"][:] = profiles(N, constraints)
+    arena.i["bit"][:] = np.repeat([bit_of(each) for each in constraints], N)
     f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
     f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
     f["nothing"][:] = np.nan
@@ -77,6 +80,7 @@ def write_tasks(
     solved: int,
     levels: int = 0,
     bounds: int = 0,
+    directed: int = 0,
 ) -> tuple[Arena, list[Span]]:
     """Returns an arena with the geometry of a robot and its tasks, and the rows of each task.
 
@@ -86,7 +90,7 @@ def write_tasks(
         counts: number of rows of each.
         N: knots.
         solved: number of rows of the tasks that are solved for; they come first.
-        levels, bounds: number of levels and of rows of bounds.
+        levels, bounds, directed: number of each, see `sizes`.
     """
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
     given = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
@@ -100,6 +104,7 @@ def write_tasks(
         len(tasks),
         max(len(frames), 1),
         max(given, 1),
+        directed,
     )
     _write_geometry(arena, robot, frames)
     spans, start, given = [], 0, 0

@@ -12,7 +12,7 @@ from himpc.cascade.last_resort import containing, last_resort, softened, towards
 from himpc.cascade.level import FALLBACKS, NO_ROWS, Fallback, Point
 from himpc.cascade.null_space import nested_bases, whole_space
 from himpc.limits import Rows
-from himpc.limits.rows import Kind, coming_to_rest
+from himpc.limits.rows import coming_to_rest
 from himpc.prediction.joint import JointState
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array
@@ -42,9 +42,7 @@ class FallbackBudget:
         return self.left >= 2
 
 
-def solve_levels(
-    arena: Arena, kinds: tuple[Kind, ...], budget: FallbackBudget
-) -> list[tuple[Fallback, float]]:
+def solve_levels(arena: Arena, like: Rows, budget: FallbackBudget) -> list[tuple[Fallback, float]]:
     """Solves all levels of an arena whose problems have been written; returns for each level the fallback
     that gave its U ("solve" if none was needed) and its time, microseconds.
 
@@ -56,7 +54,7 @@ def solve_levels(
     Args:
         arena: filled by `linearize`. The rows may be wider afterwards: levels below also use rows that a
             fallback has widened.
-        kinds: kinds of the rows.
+        like: rows with the constraints, directions and L of the arena; their bounds are not used.
         budget: the budget of this tick, from which every printed QP is deducted.
     """
     found: list[tuple[Fallback, float]] = []
@@ -66,16 +64,16 @@ def solve_levels(
             np.nan
         )  # if the kernel fails at once, the point of an earlier tick must not be used as a direction
         solved = solve_level(*arena.arguments, place, 0.0)
-        fallback = "solve" if solved else _climb_down(arena, place, kinds, budget)
+        fallback = "solve" if solved else _climb_down(arena, place, like, budget)
         time_us = (perf_counter_ns() - started) / 1e3
         arena.f["rung"][place], arena.f["time_us"][place] = FALLBACKS.index(fallback), time_us
         found.append((fallback, time_us))
     return found
 
 
-def _climb_down(arena: Arena, place: int, kinds: tuple[Kind, ...], budget: FallbackBudget) -> Fallback:
+def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) -> Fallback:
     f = arena.f
-    rows = Rows(f["L"], f["lower"].copy(), f["upper"].copy(), kinds)
+    rows = like._replace(lower=f["lower"].copy(), upper=f["upper"].copy())
     wanted = f["U"][place].copy()
     point = _as_printed(arena, place, rows, budget)
     if point is not None:

@@ -13,7 +13,7 @@ from himpc.tick.kernel.arena import Arena, Snapshot
 from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.solve_level import solve_level
-from himpc.tick.tables import LevelTable, budget_of, sizes, write_effects, write_levels
+from himpc.tick.tables import LevelTable, budget_of, given_of, sizes, write_effects, write_levels
 
 
 def solve_problems(
@@ -23,7 +23,7 @@ def solve_problems(
 ) -> list[LevelSolution]:
     """Computes `himpc.cascade.cascade.solve_cascade` by the kernel; the arguments are the same."""
     arena = arena_of(problems, rows, previous)
-    fallbacks = solve_levels(arena, rows.kinds, FallbackBudget())
+    fallbacks = solve_levels(arena, rows, FallbackBudget())
     finish_tick(*arena.arguments, False)
     return solutions([problem.name for problem in problems], arena.found(), fallbacks)
 
@@ -32,7 +32,8 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
     """Creates an arena and writes the problems into it."""
     N, _, n = problems[0].B.shape
     ends = np.cumsum([0] + [problem.B.shape[1] for problem in problems])
-    arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L))
+    given = given_of(rows.constraints)
+    arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L), directed=len(given))
     f = arena.f
     tables = []
     for place, problem in enumerate(problems):
@@ -47,6 +48,11 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
                 f["U_was"][place], arena.i["known"][1] = before.U, 1
     write_levels(arena, tables)
     f["L"][:], f["lower"][:], f["upper"][:] = rows.L, rows.lower, rows.upper
+    f["direction"][:] = np.eye(n)
+    for place, directions in enumerate(rows.directions[len(rows.constraints) - len(given) :]):
+        if directions is not None:
+            f["direction"][place] = directions.D
+    arena.i["bit"][:] = rows.bits
     f["M_bar"][:], f["scalars"][:] = 1.0, 1.0
     f["limits"][0], f["limits"][1], f["budget"][:] = -np.inf, np.inf, budget_of(arena)
     return arena

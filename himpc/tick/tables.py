@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from himpc.limits import POSITION, TORQUE, VELOCITY
+from himpc.limits.constraint import Constraint
 from himpc.qp import KKT_TOLERANCE
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import Array
@@ -49,6 +51,15 @@ class LevelTable:
     def of(cls, level: LevelForm) -> LevelTable:
         """Returns the table of a level of a strict hierarchy."""
         return cls(level.rows, level.knots, level.R, level.rows, level.knots, level.R)
+
+
+_BUILT_IN = (TORQUE, VELOCITY, POSITION)
+
+
+def given_of(constraints: Sequence[Constraint]) -> Sequence[Constraint]:
+    """The constraints whose bounds the kernel does not compute itself. They come last."""
+    known = sum(one is other for one, other in zip(constraints, _BUILT_IN, strict=False))
+    return constraints[known:]
 
 
 def budget_of(arena: Arena) -> float:
@@ -99,6 +110,7 @@ def sizes(
     tasks: int = 1,
     frames: int = 1,
     given: int = 1,
+    directed: int = 0,
 ) -> Arena:
     """Returns an arena for n joints and N knots.
 
@@ -107,6 +119,7 @@ def sizes(
         rows, solved: number of rows of all tasks, and of those that are solved for, which come first.
         levels, bounds, tasks, frames: number of each.
         given: number of rows of tasks that are not built into the kernel, at least 1.
+        directed: number of constraints that are not built into the kernel.
     """
     arena = Arena(
         n=n,
@@ -119,9 +132,10 @@ def sizes(
         G=given,
         J=n + 1,
         b=bounds,
+        g=max(directed, 1),
         w=N * n,
         k=N * n + 1,
     )
     arena.i["sizes"][:9] = n, N, rows, solved, levels, tasks, frames, bounds, N * n
-    arena.i["sizes"][10] = given
+    arena.i["sizes"][10:] = given, directed
     return arena

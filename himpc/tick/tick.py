@@ -13,7 +13,7 @@ from himpc.formulation.forms import StackForm
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
-from himpc.limits.rows import Kind
+from himpc.limits.constraints import imposed
 from himpc.plan import AtOnce, Evidence, Plan
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.tasks import Damping, Task
@@ -22,6 +22,7 @@ from himpc.tick.configure import arena_for, write_curve, write_limits, write_pre
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
+from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
 from himpc.tick.kernel.arrays import NOW, Array
 from himpc.tick.kernel.finish_tick import finish_tick
@@ -60,9 +61,9 @@ class CompiledTick:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
         self._given = GivenRows(robot, self.arena, self._spans)
-        self._kinds: tuple[Kind, ...] = ("torque", "velocity")
-        if settings.limits.position == "paper":
-            self._kinds = ("torque", "velocity", "position")
+        constraints, f = imposed(settings.limits), self.arena.f
+        self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
+        self._given_bounds = GivenBounds(self.arena, settings, constraints)
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
@@ -171,10 +172,11 @@ class CompiledTick:
             else:
                 before = None
             self._given.write(previews)
+            self._rows = self._given_bounds.write(self._rows, limits)
             if not linearize(*arena.arguments):
                 return None
             self._looked = True
-            fallbacks = solve_levels(arena, self._kinds, budget) if self._levels else []
+            fallbacks = solve_levels(arena, self._rows, budget) if self._levels else []
             iterations += 1
             once = self._most == 1
             if not finish_tick(*arena.arguments, once):
@@ -197,7 +199,7 @@ class CompiledTick:
         f["q"][:], f["v"][:], f["tau_0"][:] = q, v, tau_0
         if limits is not self._limits:
             self._limits = limits
-            write_limits(self.arena, limits, len(self._kinds) == 3)
+            write_limits(self.arena, limits, self._settings.limits.position == "paper")
         references: Mapping[str, Reference] = {}
         t = 0.0
         if isinstance(previews, Outlook):
@@ -279,7 +281,7 @@ class CompiledTick:
                 task.name: R[place] if task.name in self._given.turning else value[span]
                 for place, task, span in self._spans
             },
-            rows=Rows(self.arena.f["L"], found("lower"), found("upper"), self._kinds, stopping),
+            rows=self._rows._replace(lower=found("lower"), upper=found("upper"), stopping=stopping),
         )
 
     def _at_once(self) -> AtOnce:

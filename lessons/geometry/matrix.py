@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.explicit import quadratic
 from himpc.cascade.level import LevelProblem, LevelSolution
-from himpc.limits.rows import Kind, Rows
+from himpc.limits import Rows
 
 LARGEST = 64
 """Largest number of rows and columns that are shown; of a larger Hessian, the first knots that fit are
@@ -26,7 +26,7 @@ class ActiveRow:
 
     joint: int
     knot: int
-    kind: Kind
+    kind: str
     upper: bool
     multiplier: float
 
@@ -81,11 +81,12 @@ def _active(rows: Rows, solution: LevelSolution, N: int) -> Sequence[ActiveRow]:
     found = solution.active
     return [
         ActiveRow(
-            joint=int(joint),
+            joint=joint,
             knot=int(row) % N,
-            kind=rows.kind(int(row), int(joint), bool(multiplier > 0)),
+            kind=rows.constraint(int(row), int(column), bool(multiplier > 0)).label,
             upper=bool(multiplier > 0),
             multiplier=abs(float(multiplier)),
         )
-        for row, joint, multiplier in zip(found.row, found.joint, found.multiplier, strict=True)
+        for row, column, multiplier in zip(found.row, found.joint, found.multiplier, strict=True)
+        for joint in rows.joints_of(int(row), int(column))
     ]

@@ -2,7 +2,8 @@
 
 All other variables of a QP (the other joints, later knots) have their values in one level's solution. In that
 cut the cost of a level is (w − c)ᵀ P (w − c) + least, w = (Δτ_a, Δτ_b) of knot 0 in N·m; the bounds are a
-box, since no row couples two joints; and the set that (33) allows is the plane, a line, a point or empty.
+box, since no row couples two joints (rows of constraints that do are left out); and the set that (33) allows
+is the plane, a line, a point or empty.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
 from himpc.constants import RANK_TOLERANCE
-from himpc.limits.rows import Kind, Rows
+from himpc.limits import Rows
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ class TorqueBox:
 
     lower: Array
     upper: Array
-    kinds: tuple[tuple[Kind | None, Kind | None], tuple[Kind | None, Kind | None]]
+    kinds: tuple[tuple[str | None, str | None], tuple[str | None, str | None]]
 
     def inside(self, w: Array, room: float = 0.0) -> bool:
         """Whether w is in the box, or no farther outside than `room`, N·m."""
@@ -201,14 +202,16 @@ def _cost(problem: LevelProblem, pair: list[int], held: Array) -> tuple[Array, A
 def _box(rows: Rows, pair: list[int], held: Array) -> TorqueBox:
     rest = held.copy()
     rest[0, pair] = 0.0
-    touching = np.flatnonzero(rows.L[:, 0])
+    touching = np.array([row for row in np.flatnonzero(rows.L[:, 0]) if rows.directions_of(row) is None])
     slope = rows.L[touching, 0][:, None]
-    taken = (rows.L @ rest)[touching][:, pair]
+    taken = rows.values(rest)[touching][:, pair]
     lower, upper = ((side[touching][:, pair] - taken) / slope for side in (rows.lower, rows.upper))
 
-    def kind(values: Array, k: int, up: bool) -> Kind | None:
+    def kind(values: Array, k: int, up: bool) -> str | None:
         row = int(values[:, k].argmin() if up else values[:, k].argmax())
-        return rows.kind(int(touching[row]), pair[k], up) if np.isfinite(values[row, k]) else None
+        if not np.isfinite(values[row, k]):
+            return None
+        return rows.constraint(int(touching[row]), pair[k], up).label
 
     return TorqueBox(
         lower.max(axis=0),

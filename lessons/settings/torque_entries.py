@@ -42,6 +42,10 @@ TORQUE_ENTRIES = (
           "Largest rate at which a joint may approach its velocity bound, relative to the remaining "
               "distance; 0: (32e) as printed",
           "1/s", 0.0, 100.0, 1.0),
+    Entry("limits.torque_rate", "Torque rate",
+          "Largest change of each joint's torque per second, which himpc, hiqp, nhimpc and weighted keep "
+              "above all levels; 0: not imposed",
+          "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
           "Solver of the QPs of hqp and of the explicit route; controllers without QPs and the compiled "

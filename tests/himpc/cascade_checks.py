@@ -32,7 +32,7 @@ def assert_within(rows: Rows, U: Array, tolerance: float = 1e-8) -> None:
 def torque_rows(hierarchy: Hierarchy) -> Rows:
     """Returns the torque rows (32f) alone."""
     rows, (N, _) = hierarchy.rows, hierarchy.shape
-    return Rows(rows.L[:N], rows.lower[:N], rows.upper[:N], rows.kinds[:1])
+    return Rows(rows.L[:N], rows.lower[:N], rows.upper[:N], rows.constraints[:1])
 
 
 def assert_agree(one: list[LevelSolution], other: list[LevelSolution], tolerance: float = 1e-6) -> None:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.catalog import Route
-from himpc.limits import Rows
+from himpc.limits import POSITION, TORQUE, VELOCITY, Rows
+from himpc.limits.constraint import Constraint
 from himpc.prediction.task import residual_model
 from himpc.qp import Solver
 from himpc.tick.problems import solve_problems
@@ -67,14 +68,15 @@ class Hierarchy:
         return N, n
 
 
-def row_blocks(N: int, kinds: Sequence[str]) -> Array:
+def row_blocks(N: int, constraints: Sequence[Constraint]) -> Array:
     """Returns the coefficients of the increments in torque, velocity and position: sums, sums of sums, and so
     on."""
     torque = np.tril(np.ones((N, N)))
     velocity = torque @ torque
     position = np.vstack([np.zeros((1, N)), (torque @ velocity)[:-1]]) if N > 1 else np.zeros((1, 1))
     # The printed Euler step: q at knot j+1 contains the velocity up to knot j.
-    return np.vstack([{"torque": torque, "velocity": velocity, "position": position}[kind] for kind in kinds])
+    own = {TORQUE: torque, VELOCITY: velocity, POSITION: position}
+    return np.vstack([own[constraint] for constraint in constraints])
 
 
 def random_hierarchy(
@@ -99,8 +101,9 @@ def random_hierarchy(
         problems.append(
             level_problem(f"level{place}", J / M_bar, C, free, 10 ** rng.uniform(0, 2.5, m), R, knots)
         )
-    kinds = ("torque", "velocity", "position") if position_rows else ("torque", "velocity")
-    rows = bounds_around(rng, problems, Rows(row_blocks(N, kinds), np.empty(0), np.empty(0), kinds), room)
+    constraints = (TORQUE, VELOCITY, POSITION) if position_rows else (TORQUE, VELOCITY)
+    bare = Rows(row_blocks(N, constraints), np.empty(0), np.empty(0), constraints)
+    rows = bounds_around(rng, problems, bare, room)
     return Hierarchy(problems, rows)
 
 
@@ -116,7 +119,7 @@ def bounds_around(rng: np.random.Generator, problems: list[LevelProblem], rows: 
     margin = [10 ** rng.uniform(-1.5, 0.5, size.shape) * size * room for _ in range(2)]
     lower, upper = rows.L @ inside - margin[0], rows.L @ inside + margin[1]
     free = rng.random(size.shape) < 0.1
-    return Rows(rows.L, np.where(free, -np.inf, lower), np.where(free, np.inf, upper), rows.kinds)
+    return Rows(rows.L, np.where(free, -np.inf, lower), np.where(free, np.inf, upper), rows.constraints)
 
 
 def quadratic(problem: LevelProblem) -> tuple[Array, Array]:
@@ -218,6 +221,7 @@ def singular_hierarchy(seed: int, n: int, N: int, size: float) -> Hierarchy:
         C = residual_model(rng.uniform(0, 400, rows), rng.uniform(0, 40, rows), N, 1e-3).C
         free, Q, R = rng.normal(0, 10, (N, rows)), 10 ** rng.uniform(1, 2, rows), 10 ** rng.uniform(0, 1, n)
         problems.append(level_problem(f"level{place}", 20.0 * B, C, free, Q, R))
-    kinds = ("torque", "velocity")
-    rows = bounds_around(rng, problems, Rows(row_blocks(N, kinds), np.empty(0), np.empty(0), kinds), 3.0)
+    constraints = (TORQUE, VELOCITY)
+    bare = Rows(row_blocks(N, constraints), np.empty(0), np.empty(0), constraints)
+    rows = bounds_around(rng, problems, bare, 3.0)
     return Hierarchy(problems, rows)

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc.limits import Limits, Rows, build_rows, in_force
+from himpc.limits import POSITION, TORQUE, VELOCITY, Limits, Rows, build_rows, in_force
 from himpc.limits.braking import braking, least_slack
-from himpc.limits.rows import toeplitz
+from himpc.limits.rows import profiles
 from himpc.prediction.joint import JointState
 from robots import load_robot
 
@@ -39,8 +39,8 @@ def slack_needed(rows: Rows, joint: int) -> float:
 def random_rows(seed: int, n: int, N: int, position_rows: bool) -> tuple[Rows, float]:
     """Returns rows around a random point: some are wide, some are very narrow, and some exclude the point."""
     rng = np.random.default_rng(seed)
-    kinds = ("torque", "velocity", "position") if position_rows else ("torque", "velocity")
-    L = toeplitz(N, kinds)
+    constraints = (TORQUE, VELOCITY, POSITION) if position_rows else (TORQUE, VELOCITY)
+    L = profiles(N, constraints)
     value = L @ rng.normal(0, 10.0 ** rng.uniform(-1, 1.5), (N, n))
     room = float(rng.choice([1e-5, 1e-2, 1.0, 30.0]))
     lower = value - room * 10 ** rng.uniform(0, 2, value.shape)
@@ -51,7 +51,7 @@ def random_rows(seed: int, n: int, N: int, position_rows: bool) -> tuple[Rows, f
     free = (rng.random(value.shape) < 0.1) & (np.arange(len(L)) >= N)[:, None]
     lower, upper = np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
     rest = rng.normal(0, 10.0, (N, n))
-    return Rows(L, lower, upper, kinds, rest=rest), room
+    return Rows(L, lower, upper, constraints, rest=rest), room
 
 
 @given(seeds, st.integers(1, 3), st.integers(1, 12), st.booleans())

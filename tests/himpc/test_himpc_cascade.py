@@ -223,9 +223,9 @@ def test_multipliers_tell_what_room_is_worth() -> None:
             for sign in (1.0, -1.0):
                 rows = hierarchy.rows
                 if multiplier > 0:
-                    rows = Rows(rows.L, rows.lower, rows.upper + sign * size, rows.kinds)
+                    rows = Rows(rows.L, rows.lower, rows.upper + sign * size, rows.constraints)
                 else:
-                    rows = Rows(rows.L, rows.lower - sign * size, rows.upper, rows.kinds)
+                    rows = Rows(rows.L, rows.lower - sign * size, rows.upper, rows.constraints)
                 costs.append(Hierarchy(hierarchy.problems, rows).solve()[0].cost)
             saved = (costs[1] - costs[0]) / (2 * room)
             assert saved == pytest.approx(2 * abs(multiplier), rel=2e-2, abs=1e-2)

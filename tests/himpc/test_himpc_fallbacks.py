@@ -36,7 +36,7 @@ def unreachable(hierarchy: Hierarchy, excess: float = 1.0) -> Hierarchy:
     # Every other bound is wide; joint 0 needs 1 + excess N·m and has at most 1 N·m.
     lower[N:], upper[N:] = -1e3, 1e3
     lower[N, 0] = 1.0 + excess
-    return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
+    return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.constraints))
 
 
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
@@ -73,7 +73,7 @@ def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
     size = np.minimum(np.abs(lower[:N]), np.abs(upper[:N])).min(axis=0)
     lower[:N], upper[:N] = -size, size
     upper[:N, 0], lower[:N, 0] = upper[:N, 0] - past, lower[:N, 0] - past
-    return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.kinds))
+    return Hierarchy(hierarchy.problems, Rows(rows.L, lower, upper, rows.constraints))
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +174,7 @@ def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, posit
     rng = np.random.default_rng(seed)
     rows = hierarchy.rows
     shift = np.where(np.arange(len(rows.L)) < N, 0.0, 1.0)[:, None] * rng.normal(0, 50, rows.lower.shape)
-    shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
+    shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.constraints)
     contradictory = boxed(Hierarchy(hierarchy.problems, shifted), past=float(rng.choice([0.0, 0.3])))
     solutions = contradictory.solve()
     assert solutions[0].fallback in ("solve", "soften", "feasible", "brake")
@@ -193,7 +193,7 @@ def test_least_slack_makes_any_rows_feasible(seed: int, n: int, N: int, position
     rng = np.random.default_rng(seed)
     rows = hierarchy.rows
     shift = np.where(np.arange(len(rows.L)) < N, 0.0, 1.0)[:, None] * rng.normal(0, 20, rows.lower.shape)
-    shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.kinds)
+    shifted = Rows(rows.L, rows.lower + shift, rows.upper + shift, rows.constraints)
     slack = least_slack(shifted)
     assert (slack >= 0).all()
     assert not slack[:N].any()

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc.limits import Limits, LimitsInForce, build_rows, in_force, ramp
+from himpc.limits import POSITION, TORQUE, VELOCITY, Limits, LimitsInForce, build_rows, in_force, ramp
 from himpc.limits.braking import least_slack
 from himpc.limits.limits import POSITION_MARGIN
 from himpc.limits.viability import RETURN_RATE, viability_bounds
@@ -98,7 +98,7 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
     tau_0, U = rng.normal(0, 5, n), rng.normal(0, 1, (N, n))
     rows = build_rows(state, tau_0, M_bar, limits, force, N, T_s)
     value = rows.L @ U
-    assert rows.kinds == ("torque", "velocity", "position")[: 3 if position == "paper" else 2]
+    assert rows.constraints == (TORQUE, VELOCITY, POSITION)[: 3 if position == "paper" else 2]
     np.testing.assert_allclose(rows.lower[:N], np.tile(force.tau_lower - tau_0, (N, 1)))
     v, q, a, tau = state.v.copy(), state.q.copy(), state.a.copy(), tau_0.copy()
     v_bounds = np.stack([-force.v_limit, force.v_limit])
@@ -135,9 +135,10 @@ def test_a_velocity_row_tells_which_limit_it_stands_for(
     force = LimitsInForce(-9 * one, 9 * one, 0.5 * one, -one, one, 10 * one)
     state = JointState(q * one, 0 * one, 0 * one)
     rows = build_rows(state, 0 * one, one, Limits(position=position), force, 3, 1e-3)
-    assert rows.kind(4, 0, upper=True) == upper and rows.kind(4, 0, upper=False) == lower
-    assert rows.kind(1, 0, upper=True) == "torque"
-    assert rows.widened(np.zeros_like(rows.upper)).kind(4, 0, upper=True) == upper
+    assert rows.constraint(4, 0, upper=True).label == upper
+    assert rows.constraint(4, 0, upper=False).label == lower
+    assert rows.constraint(1, 0, upper=True) is TORQUE
+    assert rows.widened(np.zeros_like(rows.upper)).constraint(4, 0, upper=True).label == upper
     assert [rows.knot(row) for row in (0, 2, 3, 5)] == [0, 2, 1, 3]
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from himpc.limits import Limits, in_force
 from himpc.limits.limits import POSITION_MARGIN
-from himpc.limits.rows import REACTION
+from himpc.limits.velocity import REACTION
 from himpc.limits.viability import viability_bounds
 from himpc.prediction.task import residual_model
 from lessons.course import load_lesson

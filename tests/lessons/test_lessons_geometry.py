@@ -9,7 +9,7 @@ import pytest
 
 from himpc.cascade.level import LevelProblem
 from himpc.kinematics.configuration import Configuration
-from himpc.limits import Rows
+from himpc.limits import TORQUE, Rows
 from himpc.qp import solve_qp
 from lessons.events import MoveLevel, MoveTarget, Set
 from lessons.geometry.ellipsoids import ellipsoids
@@ -210,7 +210,7 @@ def test_a_cut_that_misses_what_is_allowed_says_so() -> None:
         "a", np.array([[[0.0, 0.0, 1.0]]]), np.ones((1, 1, 1)), np.zeros((1, 1)), np.zeros((1, 1)),
         np.ones(1), np.ones((1, 1, 1)), np.ones(3), 1, 1.0,
     )  # fmt: skip
-    rows = Rows(np.ones((1, 1)), -np.ones((1, 3)), np.ones((1, 3)), ("torque",))
+    rows = Rows(np.ones((1, 1)), -np.ones((1, 3)), np.ones((1, 3)), (TORQUE,))
     U = np.zeros((1, 3))
     assert cut([problem], rows, [U], (0, 1), U).levels[0].leaves.span.shape == (2, 2)
     shifted = np.array([[0.0, 0.0, 0.5]])

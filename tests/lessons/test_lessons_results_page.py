@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from himpc.limits import POSITION_MARGIN, Limits
-from himpc.limits.rows import REACTION
+from himpc.limits.velocity import REACTION
 from lessons.papers.himpc_paper.adaptation import CASES, FIGURES, Case, quantity
 from lessons.papers.stored import stored
 from lessons.recording.run import run

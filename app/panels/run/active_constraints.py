@@ -7,8 +7,11 @@ import viser
 from app.html.palette import RGB
 from app.html.text import block, esc, swatch
 from app.panels.widgets.snapshot import SessionSnapshot
+from himpc.limits import CONSTRAINTS
 from lessons.settings.settings import SceneSettings
 
+_ALWAYS = 3
+"""Constraints that every robot has: torque, velocity and position. Others have a column once they bind."""
 _HEAD = '<tr style="text-align:left">{}</tr>'
 
 
@@ -41,14 +44,15 @@ class BindingPanel:
             else "No bound is binding: every level is limited only by the levels above it."
         )
         robot = now.ready.robot
+        shown = [place for place in range(now.bound_seconds.shape[1])
+                 if place < _ALWAYS or now.bound_seconds[:, place].any()]  # fmt: skip
         spent = "".join(
-            f"<tr><td>{esc(name)}</td>" + "".join(f"<td>{s:.2f} s</td>" for s in seconds) + "</tr>"
+            f"<tr><td>{esc(name)}</td>" + "".join(f"<td>{s:.2f} s</td>" for s in seconds[shown]) + "</tr>"
             for name, seconds in zip(robot.joint_names, now.bound_seconds, strict=True)
             if seconds.any()
         )
-        self._times.content = block(
-            _table(("joint", "torque", "velocity", "position"), spent) if spent else "None so far."
-        )
+        titles = ("joint", *(CONSTRAINTS[place].label for place in shown))
+        self._times.content = block(_table(titles, spent) if spent else "None so far.")
 
 
 def _table(titles: tuple[str, ...], rows: str) -> str:

@@ -15,7 +15,7 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
-_LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale")
+_LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate")
 
 
 class ControllerPanel:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.bounds import LevelBounds
 from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
@@ -51,21 +52,28 @@ class ActiveSet(NamedTuple):
     change: Array
 
 
-class LevelBounds(NamedTuple):
-    """The bounds of a level, low ≤ L U ≤ high.
+@inline_kernel
+def directed_normal(level: LevelQP, weights: Array, along: Array, normal: Array) -> float:
+    """Coefficients of a row with its own direction, into `normal`; returns what the levels above make of it.
 
-    Attributes:
-        L: (b, N).
-        low, high: (b, n) N·m.
-        value: L U, (b, n) N·m.
-        length: scratch, (b, n).
+    Args:
+        level: gives the coordinates.
+        weights: the row's time profile, (N,).
+        along: its direction, (n,).
+        normal: the result.
     """
-
-    L: Array
-    low: Array
-    high: Array
-    value: Array
-    length: Array
+    n, before = along.size, 0.0
+    for j in range(len(level.start)):
+        start = level.start[j]
+        mine, others = level.offset[j + 1] - level.offset[j], level.rest[j + 1] - level.rest[j]
+        for c in range(mine + others):
+            total = 0.0
+            for a in range(n):
+                total += along[a] * level.metric[a] * level.Q[j, a, start + c]
+            place = level.offset[j] + c if c < mine else level.rest[j] + c - mine
+            normal[place] = weights[j] * total
+        before += weights[j] * dot(along, level.fixed[j], n)
+    return before
 
 
 @inline_kernel
@@ -75,15 +83,19 @@ def normal_of(level: LevelQP, active: ActiveSet, index: int, bounds: LevelBounds
     normal, scaled_normal = active.normal[index], active.scaled_normal[index]
     N = len(level.start)
     L, limit = bounds.L, bounds.high[r, a] if active.side[index] > 0 else bounds.low[r, a]
-    for j in range(N):
-        limit -= L[r, j] * level.fixed[j, a]
-        weight = L[r, j] * level.metric[a]
-        start = level.start[j]
-        mine, others = level.offset[j + 1] - level.offset[j], level.rest[j + 1] - level.rest[j]
-        for c in range(mine):
-            normal[level.offset[j] + c] = weight * level.Q[j, a, start + c]
-        for c in range(others):
-            normal[level.rest[j] + c] = weight * level.Q[j, a, start + mine + c]
+    if r >= bounds.plain:
+        along = bounds.direction[(r - bounds.plain) // N, a]
+        limit -= directed_normal(level, L[r], along, normal)
+    else:
+        for j in range(N):
+            limit -= L[r, j] * level.fixed[j, a]
+            weight = L[r, j] * level.metric[a]
+            start = level.start[j]
+            mine, others = level.offset[j + 1] - level.offset[j], level.rest[j + 1] - level.rest[j]
+            for c in range(mine):
+                normal[level.offset[j] + c] = weight * level.Q[j, a, start + c]
+            for c in range(others):
+                normal[level.rest[j] + c] = weight * level.Q[j, a, start + mine + c]
     active.target[index] = limit
     d, D = level.offset[N], level.rest[N]
     for c in range(d):

@@ -21,15 +21,17 @@ class TickArrays(NamedTuple):
     change places.
 
     Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
-    F frames; G rows that are given; J = n + 1 places, the world first; b rows of bounds (kinds · N); w =
-    N · n coordinates of a level, and k = w + 1 rows that can hold its point, one of them about to be
-    replaced.
+    F frames; G rows that are given; J = n + 1 places, the world first; b rows of bounds, N per constraint,
+    of which the last ones bound g sets of directions; w = N · n coordinates of a level, and k = w + 1 rows
+    that can hold its point, one of them about to be replaced.
     """
 
     # What a tick is given.
-    q: Annotated[Array, "n", "rad", "kinematics tick → fallbacks given finish_tick linearize solve_level"]
-    v: Annotated[Array, "n", "rad/s", "kinematics tick → fallbacks given finish_tick linearize"]
-    tau_0: Annotated[Array, "n", "N·m", "tick → gather finish_tick linearize"]
+    q: Annotated[
+        Array, "n", "rad", "kinematics tick → fallbacks given given_bounds finish_tick linearize solve_level"
+    ]
+    v: Annotated[Array, "n", "rad/s", "kinematics tick → fallbacks given given_bounds finish_tick linearize"]
+    tau_0: Annotated[Array, "n", "N·m", "tick → gather given_bounds finish_tick linearize"]
     x_d: Annotated[Array, "M", "m, rad", "configure linearize kinematics tick → gather"]
     R_d: Annotated[Array, "T 3 3", "1", "configure kinematics tick → finish_tick linearize"]
     # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
@@ -39,14 +41,17 @@ class TickArrays(NamedTuple):
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
     # What is remembered from the tick before.
     q_was: Annotated[Array, "n", "rad", "finish_tick tick → given linearize"]
-    v_was: Annotated[Array, "n", "rad/s", "finish_tick tick → fallbacks given linearize"]
+    v_was: Annotated[Array, "n", "rad/s", "finish_tick tick → fallbacks given given_bounds linearize"]
     x_dot_was: Annotated[Array, "M", "m/s", "finish_tick linearize tick → itself"]
     path: Annotated[Array, "N1 n", "rad", "finish_tick kinematics tick → given linearize"]
     warm_multiplier: Annotated[Array, "r k", "1/N·m", "finish_tick solve_level problems → itself"]
     U_was: Annotated[Array, "r N n", "N·m", "finish_tick problems tick → fallbacks"]
     # The settings.
     M_bar: Annotated[
-        Array, "n", "kg·m²", "configure kinematics problems tick → fallbacks finish_tick linearize"
+        Array,
+        "n",
+        "kg·m²",
+        "configure kinematics problems tick → fallbacks given_bounds finish_tick linearize",
     ]
     K_p: Annotated[Array, "M", "1/s²", "configure → linearize"]
     K_v: Annotated[Array, "M", "1/s", "configure → linearize"]
@@ -63,9 +68,10 @@ class TickArrays(NamedTuple):
         Array, "8 n", "N·m, rad/s, rad, rad/s²", "configure problems → gather finish_tick linearize"
     ]
     L: Annotated[Array, "b N", "1", "configure problems → fallbacks solve_level tick"]
+    direction: Annotated[Array, "g n n", "1", "given_bounds problems → finish_tick solve_level"]
     approach: Annotated[Array, "N", "1", "configure → linearize"]
     scalars: Annotated[
-        Array, "4", "s", "configure finish_tick kinematics problems tick → fallbacks linearize"
+        Array, "4", "s", "configure finish_tick kinematics problems tick → fallbacks given_bounds linearize"
     ]
     # The robot.
     rotation: Annotated[Array, "J 3 3", "1", "configure → linearize"]
@@ -80,8 +86,10 @@ class TickArrays(NamedTuple):
     value: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
     error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
     R_now: Annotated[Array, "T 3 3", "1", "given linearize → finish_tick kinematics tick"]
-    lower: Annotated[Array, "b n", "N·m", "fallbacks linearize problems → solve_level tables tick"]
-    upper: Annotated[Array, "b n", "N·m", "fallbacks linearize problems → solve_level tick"]
+    lower: Annotated[
+        Array, "b n", "N·m", "fallbacks given_bounds linearize problems → solve_level tables tick"
+    ]
+    upper: Annotated[Array, "b n", "N·m", "fallbacks given_bounds linearize problems → solve_level tick"]
     stopping: Annotated[Array, "2 n", "1", "linearize → finish_tick tick"]
     cost: Annotated[Array, "r", "1", "finish_tick → gather problems"]
     kkt: Annotated[Array, "r", "1", "fallbacks solve_level → gather problems"]
@@ -137,7 +145,7 @@ class TickArrays(NamedTuple):
     ideal: Annotated[Array, "w", "1", "solve_level → itself"]
     size: Annotated[Array, "2", "1/N·m, 1", "solve_level → itself"]
     budget: Annotated[Array, "1", "1", "solve_level problems tick → itself"]
-    sizes: Annotated[Whole, "11", "1", "configure tables → fallbacks finish_tick linearize"]
+    sizes: Annotated[Whole, "12", "1", "configure tables → fallbacks finish_tick linearize solve_level"]
     # What is remembered, and whether `x_dot_was` and `U_was` are known.
     known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
     warm_row: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
@@ -148,6 +156,8 @@ class TickArrays(NamedTuple):
     part: Annotated[Whole, "M", "1", "configure → linearize"]
     law: Annotated[Whole, "T", "1", "configure tick → linearize"]
     row_knots: Annotated[Whole, "M", "1", "tables → finish_tick solve_level printed"]
+    # The bit of `at_bound` of each row.
+    bit: Annotated[Whole, "b", "1", "configure problems → finish_tick"]
     level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level printed"]
     # The robot.
     parent: Annotated[Whole, "J", "1", "configure → linearize"]
@@ -189,3 +199,5 @@ AT, WHOLE_AT = _numbered("AT", NUMBERS), _numbered("WHOLE_AT", WHOLES)
 
 PERIOD, T_S, REACTION, NOW = range(4)
 """What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t."""
+DIRECTED = 11
+"""Where `sizes` holds how many constraints bound directions of their own: their rows are the last ones."""

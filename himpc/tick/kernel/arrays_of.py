@@ -10,8 +10,9 @@ from himpc.tick.kernel.arrays import AT, WHOLE_AT, Array, TickArrays, Whole
 @always_inline_kernel
 def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> TickArrays:
     """All arrays of an arena, as views; a compiled function pays only for those that it uses."""
-    s = vector(whole, whole_where[WHOLE_AT.sizes], 11)
+    s = vector(whole, whole_where[WHOLE_AT.sizes], 12)
     n, N, M, r, T, F, b, w, G = s[0], s[1], s[2], max(s[4], 1), s[5], s[6], s[7], s[8], s[10]
+    g = max(s[11], 1)
     return TickArrays(
         vector(data, where[AT.q], n),
         vector(data, where[AT.v], n),
@@ -42,6 +43,7 @@ def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> Ti
         vector(data, where[AT.accuracy], r),
         matrix(data, where[AT.limits], 8, n),
         matrix(data, where[AT.L], b, N),
+        matrices(data, where[AT.direction], g, n, n),
         vector(data, where[AT.approach], N),
         vector(data, where[AT.scalars], 4),
         matrices(data, where[AT.rotation], n + 1, 3, 3),
@@ -105,7 +107,7 @@ def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> Ti
         vector(data, where[AT.ideal], w),
         vector(data, where[AT.size], 2),
         vector(data, where[AT.budget], 1),
-        vector(whole, whole_where[WHOLE_AT.sizes], 11),
+        vector(whole, whole_where[WHOLE_AT.sizes], 12),
         vector(whole, whole_where[WHOLE_AT.known], 2),
         matrix(whole, whole_where[WHOLE_AT.warm_row], r, w + 1),
         matrix(whole, whole_where[WHOLE_AT.warm_joint], r, w + 1),
@@ -114,6 +116,7 @@ def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> Ti
         vector(whole, whole_where[WHOLE_AT.part], M),
         vector(whole, whole_where[WHOLE_AT.law], T),
         vector(whole, whole_where[WHOLE_AT.row_knots], M),
+        vector(whole, whole_where[WHOLE_AT.bit], b),
         matrix(whole, whole_where[WHOLE_AT.level], r, 8),
         vector(whole, whole_where[WHOLE_AT.parent], n + 1),
         vector(whole, whole_where[WHOLE_AT.is_revolute], n + 1),

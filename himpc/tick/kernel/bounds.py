@@ -3,13 +3,36 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.constants import RETURN_RATE
 from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.linear import dot
 
 VIABILITY, PAPER, OFF = range(3)
 """How position limits are kept."""
+
+
+class LevelBounds(NamedTuple):
+    """The bounds of a level, low ≤ L U Dᵀ ≤ high.
+
+    Attributes:
+        L: (b, N).
+        low, high: (b, n) N·m.
+        value: L U Dᵀ, (b, n) N·m.
+        length: scratch, (b, n).
+        direction: (g, n, n), D of each block of N rows from row `plain` on; before it D is the identity.
+        plain: number of rows whose columns are the joints: torque, velocity and position, in this order.
+    """
+
+    L: Array
+    low: Array
+    high: Array
+    value: Array
+    length: Array
+    direction: Array
+    plain: int
 
 
 @inline_kernel
@@ -38,8 +61,8 @@ def bounds(
     upper: Array,
     stopping: Array,
 ) -> None:
-    """Bounds on L U in N·m, (b, n): torque (32f), velocity (32e) scaled by M̄/T_s and, as printed, position
-    (32d) by M̄/T_s²; see `limits.build_rows`.
+    """Bounds on L U in N·m, the first rows of (b, n): torque (32f), velocity (32e) scaled by M̄/T_s and, as
+    printed, position (32d) by M̄/T_s²; see `limits.build_rows`. Bounds of other constraints are given.
 
     Args:
         q, v, v_was: measured state, and the velocity one `period` ago, (n,).
@@ -76,11 +99,12 @@ def bounds(
 
 
 @inline_kernel
-def constraint_values(U: Array, value: Array) -> None:
-    """L U, (b, n): torque rows are running sums of the increments, velocity rows of these, and position rows,
-    one knot later, of those."""
+def constraint_values(U: Array, bounds: LevelBounds) -> None:
+    """L U Dᵀ into `bounds.value`: torque rows are running sums of the increments, velocity rows of these, and
+    position rows, one knot later, of those. Rows with directions of their own follow."""
     N, n = U.shape
-    kinds = len(value) // N
+    value, plain = bounds.value, bounds.plain
+    kinds = plain // N
     for a in range(n):
         torque, velocity, position = 0.0, 0.0, 0.0
         for j in range(N):
@@ -92,3 +116,13 @@ def constraint_values(U: Array, value: Array) -> None:
                 value[N + j, a] = velocity
             if kinds > 2:
                 value[2 * N + j, a] = position
+    for first in range(plain, len(value), N):
+        D = bounds.direction[(first - plain) // N]
+        for c in range(n):
+            for j in range(N):
+                value[first + j, c] = dot(D[c], U[j], n)
+            for j in range(N - 1, -1, -1):  # the last knot first: it needs the increments of those before
+                total = 0.0
+                for s in range(j + 1):
+                    total += bounds.L[first + j, s] * value[first + s, c]
+                value[first + j, c] = total

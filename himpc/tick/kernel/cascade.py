@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.active_set import LevelBounds
 from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.bases import no_directions, projected_rows, take_directions
-from himpc.tick.kernel.bounds import constraint_values
+from himpc.tick.kernel.bounds import LevelBounds, constraint_values
 from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import copy_rows, dot
 
@@ -121,7 +120,7 @@ def widen(
     keep_above(level, U[index - 1], levels[index, KNOTS])
     # U_{i−1} meets the bounds up to rounding; it must stay feasible exactly (Theorem 2).
     value = bounds.value
-    constraint_values(U[index - 1], value)
+    constraint_values(U[index - 1], bounds)
     for r in range(len(value)):
         for a in range(U.shape[2]):
             bounds.low[r, a] = min(lower[r, a], value[r, a] - room)

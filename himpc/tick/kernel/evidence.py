@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
+from himpc.constants import AT_POSITION, AT_VELOCITY
 from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.cascade import OWN_FIRST, OWN_LAST
 from himpc.tick.kernel.kinematics import ORIENTATION
@@ -38,19 +38,34 @@ def leak_of(index: int, levels: Whole, effect: Array) -> float:
 
 @inline_kernel
 def bounds_met(
-    N: int, count: int, row: Whole, joint: Whole, multiplier: Array, stopping: Array, at_bound: Array
+    count: int,
+    row: Whole,
+    column: Whole,
+    multiplier: Array,
+    stopping: Array,
+    bits: Whole,
+    direction: Array,
+    plain: int,
+    at_bound: Array,
 ) -> None:
     """Adds the bits of the rows that hold a level's point to those of the joints, (n,) whole numbers.
 
     Args:
-        N: knots; rows come in blocks of N: torque, velocity, position.
-        count, row, joint, multiplier: the active rows.
+        count, row, column, multiplier: the active rows.
         stopping: (2, n), see `bounds`.
+        bits: of every row.
+        direction, plain: see `LevelBounds`; such a row is told of all joints that it bounds.
         at_bound: the result.
     """
+    N = (len(bits) - plain) // len(direction)
     for p in range(count):
-        a, kind = joint[p], row[p] // N
-        bit = AT_TORQUE if kind == 0 else AT_VELOCITY if kind == 1 else AT_POSITION
+        a, bit = column[p], bits[row[p]]
+        if row[p] >= plain:
+            along = direction[(row[p] - plain) // N, a]
+            for joint in range(at_bound.size):
+                if along[joint] != 0.0:
+                    at_bound[joint] = float(int(at_bound[joint]) | bit)
+            continue
         if bit == AT_VELOCITY and stopping[1 if multiplier[p] > 0.0 else 0, a] > 0.0:
             bit = AT_POSITION
         at_bound[a] = float(int(at_bound[a]) | bit)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, always_inline_kernel, kernel
-from himpc.tick.kernel.arrays import PERIOD, T_S, TickArrays, Whole
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.cascade import (
     ALONE,
@@ -74,7 +74,10 @@ def finish_tick(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep:
         count = t.active_count[i]
         t.active[i] = count
         most = max(most, t.leak[i])
-        bounds_met(N, count, t.active_row[i], t.active_joint[i], t.multiplier[i], t.stopping, t.at_bound)
+        bounds_met(
+            *(count, t.active_row[i], t.active_joint[i], t.multiplier[i], t.stopping),
+            *(t.bit, t.direction, len(t.bit) - t.sizes[DIRECTED] * N, t.at_bound),
+        )
     t.priority_leak[0] = most if r > 1 else math.nan
     quaternions(t.task, t.R_now, t.quaternion)
     quaternions(t.task, t.R_d, t.quaternion_d)

@@ -12,7 +12,6 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.active_set import (
     ActiveSet,
-    LevelBounds,
     fix,
     move,
     normal_of,
@@ -23,7 +22,7 @@ from himpc.tick.kernel.active_set import (
     without,
 )
 from himpc.tick.kernel.arrays import Array, Whole
-from himpc.tick.kernel.bounds import constraint_values
+from himpc.tick.kernel.bounds import LevelBounds, constraint_values
 from himpc.tick.kernel.level import LevelQP, increments
 from himpc.tick.kernel.linear import backward
 from himpc.tick.kernel.violated import farthest, lengths, most_violated
@@ -172,6 +171,7 @@ def optimum(
     N = len(level.start)
     d, D = level.offset[N], level.rest[N]
     evaluation_cost = float(d * d + U.size * U.shape[1] + 4 * value.size)
+    evaluation_cost += float((len(value) - bounds.plain) * U.shape[1] * (N + U.shape[1]))
     update_multipliers(level, active, k)
     k = release(level, active, k, budget)
     point_from_multipliers(level, active, k)
@@ -189,7 +189,7 @@ def optimum(
             point_from_multipliers(level, active, k)
             continue
         increments(level, U)
-        constraint_values(U, value)
+        constraint_values(U, bounds)
         excess, r, a, side = most_violated(value, low, high)
         if not excess > TOLERANCE:
             return kkt, k
@@ -199,7 +199,7 @@ def optimum(
                 return FAILED, 0
             changes += 1
             if changes == _MANY:
-                lengths(level, active, k, bounds.length, budget)
+                lengths(level, active, k, bounds, budget)
             if changes >= _MANY:
                 excess, r, a, side = farthest(value, low, high, bounds.length, TOLERANCE if exact else _ROUGH)
             active.row[k], active.joint[k], active.side[k] = r, a, side
@@ -221,6 +221,6 @@ def optimum(
             if not met and not exact:
                 break  # at a vertex the rounding of a point that is not refined looks like an excess
             increments(level, U)
-            constraint_values(U, value)
+            constraint_values(U, bounds)
             excess, r, a, side = most_violated(value, low, high)
             exact = False

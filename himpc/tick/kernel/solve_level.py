@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, NUMBER, VECTOR, WHOLE, always_inline_kernel, kernel
-from himpc.tick.kernel.active_set import ActiveSet, LevelBounds
-from himpc.tick.kernel.arrays import TickArrays, Whole
+from himpc.tick.kernel.active_set import ActiveSet
+from himpc.tick.kernel.arrays import DIRECTED, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.bounds import LevelBounds
 from himpc.tick.kernel.cascade import (
     ALONE,
     FIRST,
@@ -54,7 +55,8 @@ def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: in
     """
     t = arrays_of(data, where, whole, whole_where)
     levels, level, active = t.level, level_of(t, i), active_set_of(t)
-    bounds = LevelBounds(t.L, t.low, t.high, t.reached, t.length)
+    plain = len(t.L) - t.sizes[DIRECTED] * len(t.start)
+    bounds = LevelBounds(t.L, t.low, t.high, t.reached, t.length, t.direction, plain)
     if not room > 0.0:
         own_directions(i, levels, t.B, t.metric[i], t.reflector, t.Q, t.projected_jacobian, t.end, t.start)
         t.left[i] = count_coordinates(levels[i, KNOTS], t.q.size, t.end, t.start, t.offset, t.rest)

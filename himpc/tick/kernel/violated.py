@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.active_set import ActiveSet
+from himpc.tick.kernel.active_set import ActiveSet, directed_normal
 from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.bounds import LevelBounds
 from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import dot, forward, subtract
 
@@ -49,11 +50,13 @@ def farthest(
 
 
 @inline_kernel
-def lengths(level: LevelQP, active: ActiveSet, k: int, length: Array, budget: Array) -> None:
-    """How long the white coefficients of all rows are, (b, n); behind `k` rows there is room to work."""
+def lengths(level: LevelQP, active: ActiveSet, k: int, bounds: LevelBounds, budget: Array) -> None:
+    """How long the white coefficients of all rows are, into `bounds.length`; behind `k` rows there is room to
+    work."""
     N, n = level.fixed.shape
     d, D = level.offset[N], level.rest[N]
-    kinds = len(length) // N
+    length, plain = bounds.length, bounds.plain
+    kinds = plain // N
     budget[0] -= N * n * (d * d / 6.0 + 8.0 * D)
     one, torque, velocity, position = active.scaled_normal[k], level.z, level.slope, active.change
     share, longest = 1.0 / math.sqrt(level.rho), 0.0
@@ -76,8 +79,18 @@ def lengths(level: LevelQP, active: ActiveSet, k: int, length: Array, budget: Ar
             subtract(-1.0, one, torque, D)
             subtract(-1.0, torque, velocity, D)
             length[j, a] = math.sqrt(dot(torque, torque, D))
-            length[N + j, a] = math.sqrt(dot(velocity, velocity, D))
-            longest = max(longest, length[N + j, a])
+            if kinds > 1:
+                length[N + j, a] = math.sqrt(dot(velocity, velocity, D))
+                longest = max(longest, length[N + j, a])
+    for r in range(plain, len(length)):
+        for a in range(n):
+            budget[0] -= n * D + 0.5 * d * d
+            directed_normal(level, bounds.L[r], bounds.direction[(r - plain) // N, a], one)
+            forward(level.F, one, d)
+            for c in range(d, D):
+                one[c] *= share
+            length[r, a] = math.sqrt(dot(one, one, D))
+            longest = max(longest, length[r, a])
     for r in range(len(length)):
         for a in range(n):
             length[r, a] = max(length[r, a], _SHORT * longest)

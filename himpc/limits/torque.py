@@ -1,0 +1,24 @@
+"""The torque limits (32f)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.constraint import Block, Constraint, Moment, lags
+
+Array = NDArray[np.float64]
+
+
+def summed(N: int) -> Array:
+    """Torque relative to τ₀ is the sum of the increments so far, (N, N)."""
+    return np.where(lags(N) >= 0, 1.0, 0.0)
+
+
+def _bounds(now: Moment) -> Block:
+    lower, upper = np.repeat((now.force.torque - now.tau_0)[:, None], now.N, axis=1)
+    return Block(lower, upper)
+
+
+# Rows are there if the limits are off, too: without bounds.
+TORQUE = Constraint("torque", summed, first_knot=0, hard=True, is_on=lambda _: True, bounds=_bounds)

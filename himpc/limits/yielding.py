@@ -1,0 +1,189 @@
+"""Increments for rows of any constraints, also such as couple joints: inside all rows if any increments are,
+and else inside the hard ones, while the others give way by least squares."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.rows import Rows
+from himpc.limits.torque import TORQUE
+from himpc.limits.torque_rate import TORQUE_RATE
+from himpc.limits.velocity import summed_twice
+from himpc.qp import solve_qp
+
+Array = NDArray[np.float64]
+
+MET = 1e-7
+"""N·m: a row with a smaller violation counts as satisfied."""
+_ITERATIONS = 300
+"""Largest number of iterations of one QP."""
+_WORK = 40_000
+"""Largest product of unknowns and rows, over all QPs. Longer plans move at fewer knots."""
+_ROWS = 1000
+"""Joints that depend on each other and have more rows brake within torque and its rate alone."""
+_FAINT = 1e-5
+"""Weight of coming to rest while rows give way by least squares."""
+
+
+class _Part(NamedTuple):
+    """The rows of some joints: lower ≤ A x ≤ upper, and their increments (N, c) = T x.
+
+    Attributes:
+        A: (k, p·c).
+        lower, upper: (k,) N·m.
+        T: (N, p).
+        G: (N, p), the values of velocity rows are G x.
+        ranks: (k,) 0 for torque rows, 1 for other hard rows, 2 for rows that give way first.
+    """
+
+    A: Array
+    lower: Array
+    upper: Array
+    T: Array
+    G: Array
+    ranks: NDArray[np.intp]
+
+
+def closest_to_rest(rows: Rows, rest: Array) -> Array:
+    """Returns increments (N, n), N·m, whose velocity rows are closest to `rest`, (N, n), among those that
+    meet all rows.
+
+    Joints that share a direction are a group; each group is a strictly convex QP. If no increments meet all
+    rows, those that are not hard give way by least squares. If no increments meet the hard rows, those give
+    way by least squares that do not bound the torque. Beyond _WORK the torque changes at some knots only, the
+    first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds within its iterations,
+    rows of torque and of its rate hold if any increments meet them, see `_within`.
+    """
+    U = _steps(_steps(rest))
+    for group in groups(rows, rest.shape[1]):
+        part = _part(rows, group)
+        if len(part.A) > _ROWS:
+            continue
+        x = _closest(part, rest[:, group])
+        if x is None:
+            if _closest(_up_to(part, 1), rest[:, group]) is None:
+                part = _given_way(part, 1)
+            part = _given_way(part, 2)
+            x = _closest(part, rest[:, group])
+        if x is not None:
+            U[:, group] = part.T @ x.reshape(-1, len(group))
+    return _within(rows, np.cumsum(U, axis=0))
+
+
+def groups(rows: Rows, n: int) -> list[list[int]]:
+    """The joints, those together that some bounded direction couples."""
+    found = [{joint} for joint in range(n)]
+    N = rows.L.shape[1]
+    bounded = np.isfinite(rows.lower) | np.isfinite(rows.upper)
+    for place, directions in enumerate(rows.directions):
+        if directions is None:
+            continue
+        used = bounded[place * N : (place + 1) * N].any(axis=0)
+        for along in directions.D[used]:
+            joints = set(np.flatnonzero(along).tolist())
+            apart = [each for each in found if not each & joints]
+            found = [*apart, joints.union(*(each for each in found if each & joints))]
+    return [sorted(each) for each in found]
+
+
+def _part(rows: Rows, group: list[int]) -> _Part:
+    N, c = rows.L.shape[1], len(group)
+    moves = max(1, min(N, _WORK // (rows.lower.size * c)))
+    if moves == N:
+        # The unknowns are the values of the velocity rows.
+        T, G = np.eye(N) - 2.0 * np.eye(N, k=-1) + np.eye(N, k=-2), np.eye(N)
+    else:
+        T = np.eye(N)[:, np.linspace(0, N - 1, moves).astype(int)]
+        G = summed_twice(N) @ T
+    A, lower, upper, ranks = [], [], [], []
+    for place, constraint in enumerate(rows.constraints):
+        block = slice(place * N, (place + 1) * N)
+        directions = rows.directions[place] if rows.directions else None
+        D = np.eye(c) if directions is None else directions.D[:, group]
+        columns = group if directions is None else np.flatnonzero(D.any(axis=1))
+        own = np.kron(rows.L[block] @ T, D if directions is None else D[columns])
+        low, high = rows.lower[block][:, columns].ravel(), rows.upper[block][:, columns].ravel()
+        # No increment moves the first position row.
+        kept = own.any(axis=1) & (np.isfinite(low) | np.isfinite(high))
+        A.append(own[kept])
+        lower.append(low[kept])
+        upper.append(high[kept])
+        ranks.append(np.full(kept.sum(), 0 if constraint is TORQUE else 1 if constraint.hard else 2))
+    return _Part(np.vstack(A), np.concatenate(lower), np.concatenate(upper), T, G, np.concatenate(ranks))
+
+
+def _closest(part: _Part, rest: Array) -> Array | None:
+    """x that meets all rows and whose velocity rows are closest to `rest`, (N, c); None if there is none."""
+    c = rest.shape[1]
+    H = np.asarray(np.kron(part.G.T @ part.G, np.eye(c)), np.float64)
+    found = solve_qp(H, -(part.G.T @ rest).ravel(), part.A, part.lower, part.upper, "daqp", _ITERATIONS)
+    value = part.A @ found.x
+    return found.x if bool(((value <= part.upper + MET) & (value >= part.lower - MET)).all()) else None
+
+
+def _up_to(part: _Part, rank: int) -> _Part:
+    """The rows of this rank and those before."""
+    counted = part.ranks <= rank
+    return part._replace(
+        A=part.A[counted],
+        lower=part.lower[counted],
+        upper=part.upper[counted],
+        ranks=part.ranks[counted],
+    )
+
+
+def _given_way(part: _Part, rank: int) -> _Part:
+    """The rows of a rank widened by the least squares of what they miss, while those of lower ranks hold and
+    those of higher ones do not count."""
+    counted = _up_to(part, rank)
+    A, lower, upper = counted.A, counted.lower, counted.upper
+    yields = np.flatnonzero(counted.ranks == rank)
+    if not yields.size:
+        return part
+    slack = np.zeros((len(A), yields.size))
+    slack[yields, np.arange(yields.size)] = 1.0
+    H = np.diag(np.r_[np.full(A.shape[1], _FAINT), np.ones(yields.size)])
+    found = solve_qp(H, np.zeros(len(H)), np.hstack([A, slack]), lower, upper, "daqp", _ITERATIONS)
+    value = A @ found.x[: A.shape[1]]
+    missed = np.maximum(np.maximum(value - upper, lower - value), 0.0)
+    missed[counted.ranks < rank] = 0.0
+    missed[missed > 0.0] += MET  # the widened rows have an interior to rounding
+    wider = np.zeros(len(part.A))
+    wider[part.ranks <= rank] = missed
+    return part._replace(lower=part.lower - wider, upper=part.upper + wider)
+
+
+def _within(rows: Rows, wanted: Array) -> Array:
+    """Increments whose torques are close to `wanted`, (N, n), and that meet the rows of torque and of its
+    rate whenever any increments do; those of torque always.
+
+    Going back from the last knot, the torques from which all later rows can still be met are an interval.
+    """
+    N = len(wanted)
+    blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}
+    infinite = np.full(wanted.shape, np.inf)
+    least, most = -infinite, infinite
+    if TORQUE_RATE in blocks:
+        least, most = rows.lower[blocks[TORQUE_RATE]], rows.upper[blocks[TORQUE_RATE]]
+    lowest, highest = -infinite, infinite
+    if TORQUE in blocks:
+        lowest, highest = rows.lower[blocks[TORQUE]], rows.upper[blocks[TORQUE]]
+    low, high = lowest.copy(), highest.copy()
+    for j in range(N - 2, -1, -1):
+        behind_low, behind_high = low[j + 1] - most[j + 1], high[j + 1] - least[j + 1]
+        low[j] = np.minimum(np.maximum(behind_low, lowest[j]), highest[j])
+        high[j] = np.minimum(np.maximum(behind_high, lowest[j]), highest[j])
+    torque, before = np.empty_like(wanted), np.zeros(wanted.shape[1])
+    for j in range(N):
+        near = np.minimum(np.maximum(wanted[j], low[j]), high[j])
+        near = np.minimum(np.maximum(near, before + least[j]), before + most[j])
+        before = torque[j] = np.minimum(np.maximum(near, lowest[j]), highest[j])
+    return _steps(torque)
+
+
+def _steps(x: Array) -> Array:
+    """x_j − x_{j−1}, where x_{−1} = 0."""
+    return np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1])))

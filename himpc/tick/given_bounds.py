@@ -1,0 +1,46 @@
+"""Computes the bounds of constraints that are not built into the kernel, in Python, and writes them to the
+arena."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from himpc.formulation.settings import Settings
+from himpc.limits import LimitsInForce, Rows
+from himpc.limits.constraint import Constraint, Directions, Moment
+from himpc.prediction.joint import JointState
+from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import PERIOD
+from himpc.tick.tables import given_of
+
+
+class GivenBounds:
+    """The constraints that `given_of` names. Their bounds are in the arena before levels are solved."""
+
+    def __init__(self, arena: Arena, settings: Settings, constraints: Sequence[Constraint]) -> None:
+        self._arena, self._settings = arena, settings
+        self._given = given_of(constraints)
+        self._known = len(constraints) - len(self._given)
+
+    def write(self, rows: Rows, force: LimitsInForce) -> Rows:
+        """Writes bounds and directions of this tick; returns the rows with the directions.
+
+        Args:
+            rows: with the constraints of the arena.
+            force: the limits in force. The arena holds the measured state and what is remembered.
+        """
+        if not self._given:
+            return rows
+        f, settings, N = self._arena.f, self._settings, self._settings.horizon
+        state = JointState(f["q"], f["v"], (f["v"] - f["v_was"]) / f["scalars"][PERIOD])
+        now = Moment(state, f["tau_0"], f["M_bar"], settings.limits, force, N, settings.T_s)
+        directions: list[Directions | None] = [None] * self._known
+        for place, constraint in enumerate(self._given):
+            block = constraint.bounds(now)
+            start = (self._known + place) * N
+            f["lower"][start : start + N], f["upper"][start : start + N] = block.lower, block.upper
+            f["direction"][place] = np.eye(len(f["q"])) if block.directions is None else block.directions.D
+            directions.append(block.directions)
+        return rows._replace(directions=tuple(directions) if any(directions) else ())
