@@ -68,7 +68,7 @@ class TorqueSession(Session):
     ) -> None:
         """controllers: makes the controller that settings name. Raises InputError if the scene's settings do
         not fit its robot."""
-        super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant))
+        super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant, world=scene.world))
         self._controller_of = controllers
         self.controller = self._controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
