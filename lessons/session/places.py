@@ -8,11 +8,13 @@ from himpc.telemetry import Layout
 
 
 class Places(NamedTuple):
-    """Where the fields that a session writes stand in a row; what the plant's M tells stands side by side."""
+    """Where the fields that a session writes stand in a row; what the plant's M tells stands side by side,
+    and so do depth and force of a contact."""
 
     t: int
     late: int
     truth: slice
+    touch: slice
     q: slice
     v: slice
     tau: slice
@@ -23,6 +25,7 @@ class Places(NamedTuple):
     def of(cls, layout: Layout) -> Places:
         """Those of a layout."""
         fields = layout.fields
-        start = fields["dynamic_leak"].start
-        joints = (fields[name] for name in cls._fields[3:])
-        return cls(fields["t"].start, fields["late"].start, slice(start, start + 3), *joints)
+        start, felt = fields["dynamic_leak"].start, fields["contact_depth"].start
+        joints = (fields[name] for name in cls._fields[4:])
+        truth, touch = slice(start, start + 3), slice(felt, felt + 2)
+        return cls(fields["t"].start, fields["late"].start, truth, touch, *joints)

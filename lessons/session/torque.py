@@ -222,6 +222,7 @@ class TorqueSession(Session):
         late = settings.is_late(1e-3 * plan.step_us)
         row[at.late] = late
         row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
+        row[at.touch] = plant.touch
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)

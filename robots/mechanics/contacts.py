@@ -26,7 +26,7 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """One point of contact: the names of the two links, or of a link and an object; position (3,) m in the
+    """One point of contact: the names of the two links, or of an object and a link; position (3,) m in the
     world; force (3,) N, world axes, on the second of them; depth m."""
 
     between: tuple[str, str]
@@ -46,8 +46,10 @@ def contacts(model: mujoco.MjModel, data: mujoco.MjData, robot: Robot, world: Wo
         if min(first, second) >= own or contact.efc_address < 0:
             continue
         mujoco.mj_contactForce(model, data, index, force)
-        between = label(robot, world, first), label(robot, world, second)
         turned = contact.frame.reshape(3, 3).T @ force[:3]
+        if second >= own:
+            first, second, turned = second, first, -turned
+        between = label(robot, world, first), label(robot, world, second)
         found.append(Contact(between, contact.pos.copy(), turned, max(0.0, -float(contact.dist))))
     return tuple(found)
 

@@ -69,8 +69,8 @@ def test_an_arm_that_falls_stays_above_the_floor(name: str) -> None:
     assert np.abs(plant.v).max() < 0.2
     assert plant.frame_pose(robot.tip)[1][2] > 0.0 > through.frame_pose(robot.tip)[1][2]
     weight = sum(float(contact.force[2]) for contact in plant.contacts)
-    assert all(contact.between[0] == "floor" or contact.between[1] == "floor" for contact in plant.contacts)
-    assert abs(weight) > 5.0
+    assert all(contact.between[0] == "floor" for contact in plant.contacts)
+    assert weight > 5.0  # the floor carries the arm
 
 
 def test_the_links_of_a_robot_touch_each_other() -> None:
