@@ -4,10 +4,11 @@
     python benchmarks/contacts.py press [SECONDS]
 
 `cost` runs each scene without contacts, with contacts and nothing touched, and pressing on the floor, tick
-by tick in turn, and prints the medians of a whole tick (control and plant) in microseconds and their
-ratios. `press` lets each arm fall on its floor without torque and prints, for time constants of the contact
-and steps of the plant, the deepest penetration in the fall and at rest, mm, and the largest joint speed at
-rest, rad/s.
+by tick in turn, and prints the medians of a whole tick (control and plant) and of the plant alone in
+microseconds, and the ratio of the ticks. A tick of a robot that presses contains what its limits cost the
+controller as well. `press` lets each arm fall on its floor without torque and prints, for time constants of
+the contact and steps of the plant, the deepest penetration in the fall and at rest, mm, and the largest
+joint speed at rest, rad/s.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ LOW = {
     "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # into its own chest: the floor is out of reach
 }
 """Targets that lie inside something."""
+BENT = {"iiwa14": (0, 60, 0, -30, 0, 30, 0), "panda": (0, 60, 0, -60, 0, 90, 45)}
+"""Postures, degrees, from which the arms fall on the floor."""
 
 
 def cost(ticks: int) -> dict[str, dict[str, float]]:
@@ -51,28 +54,47 @@ def cost(ticks: int) -> dict[str, dict[str, float]]:
             pressing.tick()
             waited += 1
         spent: dict[str, list[float]] = {key: [] for key in sessions}
+        plant: dict[str, list[float]] = {key: [] for key in sessions}
+        steps = {key: timed(session.plant) for key, session in sessions.items()}
         for _ in range(ticks):
             for key, session in sessions.items():
                 started = perf_counter_ns()
                 session.tick()
+                tick = 1e-3 * (perf_counter_ns() - started)
                 if key != "on, pressing" or session.plant.touch.force > 0.0:
-                    spent[key].append(1e-3 * (perf_counter_ns() - started))
+                    spent[key].append(tick)
+                    plant[key].append(steps[key][-1])
         medians = {key: float(np.median(times)) for key, times in spent.items()}
         ratios = {f"{key} / off": medians[key] / medians["off"] for key in medians if key != "off"}
-        found[name] = {**medians, **ratios, "ticks in contact": len(spent["on, pressing"])}
+        plants = {f"plant, {key}": float(np.median(times)) for key, times in plant.items()}
+        found[name] = {**medians, **ratios, **plants, "ticks in contact": len(spent["on, pressing"])}
     return found
+
+
+def timed(plant: Plant) -> list[float]:
+    """The list to which the plant will append the time, µs, of each of its steps."""
+    times: list[float] = []
+    step = plant.step
+
+    def measured(tau: np.ndarray, period: float) -> np.ndarray:
+        started = perf_counter_ns()
+        found = step(tau, period)
+        times.append(1e-3 * (perf_counter_ns() - started))
+        return found
+
+    plant.step = measured  # pyright: ignore[reportAttributeAccessIssue]
+    return times
 
 
 def press(seconds: float) -> list[dict[str, object]]:
     """Falls of each arm on its floor, in viscous friction, for several contacts and steps."""
     found: list[dict[str, object]] = []
-    for name in ("iiwa14", "panda"):
+    for name in BENT:
         robot = load_robot(name)
-        start = robot.home + np.array([0.0, 1.2, *[0.0] * (robot.n - 2)])
         for timestep in (2e-3, 1e-3, 5e-4):
             for constant in (0.002, 0.004, 0.008, 0.02):
                 model.CONTACT_SOLREF = (constant, 1.0)
-                rest = fall(robot, start, timestep, seconds)
+                rest = fall(robot, np.radians(BENT[name]), timestep, seconds)
                 found.append({"robot": name, "timestep": timestep, "time constant": constant, **rest})
     return found
 

@@ -7,7 +7,7 @@ import json
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 Point = tuple[float, float, float]
 SolidKind = Literal["box", "sphere", "cylinder", "capsule", "hull"]
@@ -108,5 +108,5 @@ def as_json(model: CollisionModel) -> str:
     return f'{{"solids": [\n  {between.join(solids)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'
 
 
-def _frozen(value: object) -> object:
+def _frozen(value: Any) -> Any:
     return tuple(map(_frozen, value)) if isinstance(value, list) else value

@@ -19,6 +19,7 @@ from robots.urdf.read import Refusal, placement
 
 CORNERS = 96
 """Largest number of corners of a hull: the farthest points of the link in so many directions."""
+_TAGS: tuple[tuple[str, Source], ...] = (("collision", "collision"), ("visual", "hull"))
 _READ = 500  # shapes of a link
 _PER_LINK = 8
 _PER_ROBOT = 120
@@ -36,11 +37,10 @@ def collision_solids(robot: Robot, meshes: bool = True) -> tuple[Solid, ...]:
     are left out. No content of the description or of a mesh file raises an error.
     """
     root = etree.fromstring(robot.urdf_text.encode())
-    tags: tuple[tuple[str, Source], ...] = (("collision", "collision"), ("visual", "hull"))
     chosen: list[tuple[Element, Source]] = []
     for link in root.findall("link"):
-        tag, source = next((each for each in tags if link.find(each[0]) is not None), tags[1])
-        chosen += [(shape, source) for shape in link.findall(tag)[:_READ]]
+        tag, source = next((each for each in _TAGS if link.find(each[0]) is not None), _TAGS[1])
+        chosen.extend((shape, source) for shape in link.findall(tag)[:_READ])
     files = (shape.find("geometry/mesh") for shape, _ in chosen)
     surfaces = _surfaces([mesh.get("filename", "") for mesh in files if mesh is not None] if meshes else [])
     solids: list[Solid] = []

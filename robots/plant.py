@@ -39,11 +39,7 @@ class Plant:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        settings: PlantSettings | None = None,
-        timestep: float = 1e-3,
-        world: World = (),
+        self, robot: Robot, settings: PlantSettings | None = None, timestep: float = 1e-3, world: World = ()
     ) -> None:
         """timestep: s, the longest internal step; world: objects that the robot touches if the settings have
         contacts. Raises InputError for an invalid setting, timestep or world."""
@@ -102,18 +98,20 @@ class Plant:
 
     @property
     def touch(self) -> Touch:
-        """How the robot touched itself or the world during the last step; the largest of its internal
-        steps."""
+        """How the robot touched itself or the world during the last step."""
         return self._touch
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """The points of contact at the end of the last step, with the forces at the torque of that moment."""
-        return self._contacts
+        """The points of contact at the present moment, with the forces at the torque of the last step."""
+        if not self._seen.ncon:
+            return ()
+        self._accelerate(self._data.qpos, self._data.qvel, self._data.ctrl)
+        self._fresh = False
+        return contacts(self._model, self._probe, self.robot, self.world)
 
     def reset(self, q: np.ndarray, v: np.ndarray | None = None, tau: np.ndarray | None = None) -> None:
-        """Puts the robot at q (rad) with velocity v (default 0); t = 0; a push is cleared,
-        and free objects return to their places.
+        """Puts the robot at q (rad) with velocity v (default 0); t = 0, without push; free objects return.
 
         tau: N·m, the torque the motors were giving before; default: `holding_torque`, as when the brakes
         open. Raises ValueError for vectors of the wrong length or with non-finite entries.
@@ -124,7 +122,7 @@ class Plant:
         mujoco.mj_resetData(self._model, self._data)
         self._data.qpos[: self.n], self._data.qvel[: self.n] = position, velocity
         self._push, self._fresh, self.broken = (None, np.zeros(6)), False, False
-        self._touch, self._contacts = Touch(), ()
+        self._touch = Touch()
         torque = self.holding_torque() if torque is None else torque
         self._motors = Motors(np.clip(torque, self._tau_lower, self._tau_upper), 0.0)
         self._encoders = Encoders(position, velocity, 0.0)
@@ -153,13 +151,12 @@ class Plant:
         count = max(1, math.ceil(period / self.timestep - 1e-9))
         h = period / count
         self._model.opt.timestep = h
-        self._touch, self._contacts = Touch(), ()
+        self._touch = Touch()
         for _ in range(count):
             data.ctrl[:] = motors.advance(data.time, h, self._delay, self._lag)
             self._advance(h)
             self._encoders.record(self.q, data.time)
-            if data.ncon:
-                self._feel()
+            self._feel()
         self._fresh = False
         return motors.torque.copy()
 
@@ -194,7 +191,7 @@ class Plant:
             now, before = getattr(self._data, name), getattr(old, name)
             k = self.n if len(now) != len(before) else len(now)
             now[:k] = before[:k]
-        self._touch, self._contacts = Touch(), ()
+        self._touch = Touch()
         if body is not None:
             self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
 
@@ -280,12 +277,16 @@ class Plant:
         mujoco.mj_fullM(self._model, data, M)
         return M
 
+    @property
+    def _seen(self) -> mujoco.MjData:
+        """Where the last stage of the last step left its contacts."""
+        return self._probe if self._altered else self._data
+
     def _feel(self) -> None:
-        """Takes note of the contacts of the present moment: MuJoCo's own are those of a stage of its step."""
-        data = self._data
-        self._accelerate(data.qpos, data.qvel, data.ctrl)
-        self._contacts = contacts(self._model, self._probe, self.robot, self.world)
-        self._touch = Touch(*map(max, self._touch, touch_of(self._contacts)))
+        """Takes note of the contacts, as the last stage of an internal step sees them."""
+        if self._seen.ncon:
+            now = touch_of(self._model, self._seen, self.robot)
+            self._touch = Touch(max(self._touch.depth, now.depth), max(self._touch.force, now.force))
 
     def _look(self) -> mujoco.MjData:
         if not self._fresh:

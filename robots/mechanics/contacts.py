@@ -17,7 +17,7 @@ class Touch(NamedTuple):
     """How a robot touched something during a step of the plant, its own links included.
 
     depth: m, the deepest penetration. force: N, the largest force between two links, or a link and an object.
-    Both are the largest of the internal steps, and 0 without a contact.
+    Both are the largest of the internal steps, as the last stage of each sees them, and 0 without a contact.
     """
 
     depth: float = 0.0
@@ -54,11 +54,19 @@ def contacts(model: mujoco.MjModel, data: mujoco.MjData, robot: Robot, world: Wo
     return tuple(found)
 
 
-def touch_of(found: tuple[Contact, ...]) -> Touch:
+def touch_of(model: mujoco.MjModel, data: mujoco.MjData, robot: Robot) -> Touch:
     """Returns the deepest penetration, and the largest force between two things, the sum over their
     points."""
-    forces: dict[tuple[str, str], np.ndarray] = {}
-    for each in found:
-        forces[each.between] = forces.get(each.between, np.zeros(3)) + each.force
-    depth = max((each.depth for each in found), default=0.0)
-    return Touch(depth, max((float(np.linalg.norm(force)) for force in forces.values()), default=0.0))
+    own, depth = len(robot.collision.solids), 0.0
+    forces: dict[tuple[int, int], list[np.ndarray]] = {}
+    every, found = np.zeros((data.ncon, 6)), data.contact
+    bodies, distances, frames = model.geom_bodyid[found.geom], found.dist, found.frame
+    for index, (geoms, address) in enumerate(zip(found.geom, found.efc_address, strict=True)):
+        if geoms.min() >= own or address < 0:
+            continue
+        mujoco.mj_contactForce(model, data, index, every[index])
+        depth = max(depth, -float(distances[index]))
+        force = every[index, :3] @ frames[index].reshape(3, 3)
+        forces.setdefault((bodies[index, 0], bodies[index, 1]), []).append(force)
+    sums = (each[0] if len(each) == 1 else np.sum(each, axis=0) for each in forces.values())
+    return Touch(depth, max((float(np.sqrt(force @ force)) for force in sums), default=0.0))

@@ -198,7 +198,8 @@ def _gyration(thing: Thing) -> tuple[float, float, float]:
     """Squares of the radii of gyration of a homogeneous body, m²."""
     match thing.shape:
         case Ball(_, _, radius):
-            return (0.4 * radius**2,) * 3
+            same = 0.4 * radius**2
+            return same, same, same
         case Box(_, _, (x, y, z)):
             return (y**2 + z**2) / 12, (x**2 + z**2) / 12, (x**2 + y**2) / 12
         case Post(_, _, height, radius):
