@@ -18,7 +18,9 @@ from robots.truth import pose
 from robots.urdf.read import Refusal, placement
 
 CORNERS = 96
-"""Largest number of corners of a hull: the farthest points of the link in so many directions."""
+"""Largest number of corners of a hull."""
+_SPREAD = 40  # directions in which the farthest points of a link are corners
+_NEAR = 1e-3  # m by which a link may stand out of its hull
 _TAGS: tuple[tuple[str, Source], ...] = (("collision", "collision"), ("visual", "hull"))
 _READ = 500  # shapes of a link
 _PER_LINK = 8
@@ -149,8 +151,17 @@ def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> So
     for axis in axes.T:
         if np.ptp(cloud @ axis) < 2 * _THIN:
             cloud = np.concatenate([cloud - _THIN * axis, cloud + _THIN * axis])
-    corners = np.unique(np.round(cloud[(cloud @ _directions().T).argmax(axis=0)], _DIGITS), axis=0)
     try:
+        cloud = cloud[ConvexHull(cloud).vertices]
+        chosen = np.unique((cloud @ _directions().T).argmax(axis=0))
+        # The corner that lies farthest outside is added until all are near, or there are enough.
+        while len(chosen) < CORNERS:
+            planes = ConvexHull(cloud[chosen]).equations
+            outside = (cloud @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+            if outside.max() < _NEAR:
+                break
+            chosen = np.append(chosen, outside.argmax())
+        corners = np.unique(np.round(cloud[chosen], _DIGITS), axis=0)
         corners = corners[ConvexHull(corners).vertices]
     except QhullError:
         return None
@@ -159,8 +170,8 @@ def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> So
 
 
 def _directions() -> np.ndarray:
-    """Unit vectors (CORNERS, 3): the axes, and a spiral over the sphere."""
-    k = np.arange(CORNERS - 6) + 0.5
+    """Unit vectors (_SPREAD, 3): the axes, and a spiral over the sphere."""
+    k = np.arange(_SPREAD - 6) + 0.5
     z, turn = 1.0 - 2.0 * k / len(k), np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - z**2)
     spiral = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])

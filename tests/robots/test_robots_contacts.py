@@ -201,7 +201,7 @@ def test_worlds_that_cannot_be_are_refused() -> None:
 
 
 def test_the_stored_solids_are_those_of_the_meshes() -> None:
-    """They contain all that is drawn, to 6 mm, and the pairs that are left out are found again."""
+    """They contain all that is drawn, to 3 mm, and the pairs that are left out are found again."""
     robot = load_robot("iiwa14")
     shapes = link_shapes(robot)
     if shapes[0].name.startswith("base/pedestal"):
@@ -212,7 +212,7 @@ def test_the_stored_solids_are_those_of_the_meshes() -> None:
     for shape in shapes:
         planes = hulls[shape.name.rpartition("/")[0]]
         outside = (shape.vertices.astype(float) @ planes[:, :3].T + planes[:, 3]).max()
-        assert outside < 6e-3, shape.name
+        assert outside < 3e-3, shape.name
 
 
 def own(shapes: str) -> Robot:
