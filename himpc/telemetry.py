@@ -40,6 +40,8 @@ _SCALARS = (
     "unsolved",
     "iterations",
     "late",
+    "contact_depth",
+    "contact_force",
 )
 _PER_JOINT = (
     "q",
@@ -76,10 +78,12 @@ class Layout:
     """The position of each field in a row.
 
     `q` and `v` are the plant's, `q_measured` and `v_measured` the values that the controller received;
-    `tau_0` is the torque that acted until then. Per task `x/<task>` and `x_d/<task>` (coordinates, or a
-    quaternion x y z w), `error/<task>`, `v_d/<task>`, `a_d/<task>` (m each; three if the target is a point to
-    look at); per level the fields cost, kkt, rung (index into FALLBACKS), time_us, leak and active (number of
-    binding constraints), NaN for a level that was not solved.
+    `tau_0` is the torque that acted until then. `contact_depth` (m) and `contact_force` (N) are the deepest
+    penetration and the largest force of the tick that begins with the row, 0 without a contact. Per task
+    `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`, `v_d/<task>`,
+    `a_d/<task>` (m each; three if the target is a point to look at); per level the fields cost, kkt, rung
+    (index into FALLBACKS), time_us, leak and active (number of binding constraints), NaN for a level that was
+    not solved.
     """
 
     size: int

@@ -23,11 +23,17 @@ class CatalogEntry:
     home_deg: tuple[float, ...]
     a_max: tuple[float, ...]  # rad/s²
     M_bar: tuple[float, ...]  # kg·m²
+    hollow: tuple[tuple[str, str], ...] = ()  # links whose hulls touch in postures in which the links do not
 
     @property
     def path(self) -> Path:
         """The robot's URDF."""
         return _HERE / self.name / f"{self.name}.urdf"
+
+    @property
+    def collision_path(self) -> Path:
+        """Its collision geometry, written by `python -m robots.mechanics.write`."""
+        return _HERE / self.name / "collision.json"
 
     @property
     def home(self) -> np.ndarray:
@@ -55,6 +61,7 @@ CATALOG: dict[str, CatalogEntry] = {
             home_deg=(0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0),  # elbow up, flange pointing down
             a_max=(10.0,) * 7,  # project design notes
             M_bar=(0.1, 0.21, 0.033, 0.042, 0.001, 0.001, 0.0003),  # HIMPC paper, section VI-A
+            hollow=(("link_5", "link_7"),),
         ),
         CatalogEntry(
             name="panda",
@@ -87,6 +94,11 @@ CATALOG: dict[str, CatalogEntry] = {
             ),
             a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # our estimate of what its torques can produce
             M_bar=(0.046, 0.46, 0.0144, 0.0736, 0.0046, 0.0127, 0.0004) * 2,  # suggest_M_bar
+            hollow=tuple(
+                (f"{side}_{first}", f"{side}_{second}")
+                for side in ("left", "right")
+                for first, second in (("upper_shoulder", "upper_elbow"), ("upper_elbow", "upper_forearm"))
+            ),
         ),
         CatalogEntry(
             name="ridgeback-ur10",
@@ -105,6 +117,7 @@ CATALOG: dict[str, CatalogEntry] = {
                 3.2,
             ),  # project design notes; base m/s², m/s², rad/s²
             M_bar=(130.0, 130.0, 7.9, 0.228, 0.66, 0.152, 0.0078, 0.0037, 0.0003),  # suggest_M_bar
+            hollow=(("forearm", "wrist_2"),),
         ),
     )
 }

@@ -112,9 +112,7 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: 
     joint = np.array([frame.parentJoint for frame in frames], np.intp)
     centre = [frame.placement.act(np.array(one.centre)) for frame, one in zip(frames, spheres, strict=True)]
     radius = np.array([sphere.radius for sphere in spheres])
-    # Spheres of a mobile base, a body that unbounded joints move over the floor.
-    free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
-    base = max((j for j in range(robot.n + 1) if j > 2 and free[:j].all()), default=0)
+    base = base_joint(robot)
     shapes = [_shape(obstacle, joint, base) for obstacle in obstacles]
     if self_collision and base:
         shapes.append(_own_base(base, joint, np.array(centre), radius))
@@ -131,6 +129,13 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: 
         half=np.array([shape.half for shape in shapes]).reshape(-1, 3),
         meets=np.array([shape.meets for shape in shapes], np.bool_).reshape(-1, len(spheres)),
     )
+
+
+def base_joint(robot: Robot) -> int:
+    """Index of the last joint of a mobile base, which unbounded joints move over the floor; 0 for a robot
+    without one. Bodies up to that joint stand on the floor."""
+    free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
+    return max((j for j in range(robot.n + 1) if j > 2 and free[:j].all()), default=0)
 
 
 def _shape(obstacle: Obstacle, joint: Indices, base: int) -> _Shape:

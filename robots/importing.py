@@ -12,6 +12,8 @@ import pinocchio as pin
 from robots.errors import InputError, unknown_name
 from robots.home import choose_tip, find_home, sensible_a_max
 from robots.inertia import suggest_M_bar
+from robots.mechanics.imported import with_collision
+from robots.meshes import has_meshes
 from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
@@ -64,6 +66,8 @@ def import_robot(
     if robot is None or fault is not None:
         refused = Finding("refused", source, fault or "")
         return Import(replace(report, findings=(*report.findings, refused)))
+    if not has_meshes(robot.urdf_text):
+        robot = with_collision(robot)
     return Import(robot.report, robot)
 
 

@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
+from robots.collision_model import stored
 from robots.errors import InputError, shortened, unknown_name
 from robots.importing import Import, bounds, import_robot
+from robots.mechanics.imported import with_collision
+from robots.meshes import has_meshes
 from robots.processes.isolation import Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
@@ -63,9 +66,16 @@ def _import(
     data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
 ) -> Import:
     try:
-        return isolated(import_robot, data, source, folder, tip, within)
+        found = isolated(import_robot, data, source, folder, tip, within)
     except Fault as fault:
         return Import(ImportReport(source, (Finding("refused", source, str(fault)),)))
+    if found.robot is None or not has_meshes(found.robot.urdf_text):
+        return found
+    try:
+        robot = isolated(with_collision, found.robot)
+    except Fault:
+        robot = with_collision(found.robot, meshes=False)
+    return Import(robot.report, robot)
 
 
 def _catalog_robot(entry: CatalogEntry) -> Robot:
@@ -87,6 +97,7 @@ def _catalog_robot(entry: CatalogEntry) -> Robot:
         M_bar=np.array(entry.M_bar),
         urdf_text=canonical.text,
         report=replace(report, tip=entry.tip),
+        collision=stored(entry.collision_path),
     )
 
 

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlparse
 
+from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import shortened
@@ -47,6 +48,11 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
         more = ", …" if len(missing) > 3 else ""
         text = f"{len(missing)} mesh file(s) not found ({names}{more}); capsules are drawn instead"
         yield Finding("note", "meshes", f"{text}. `pip install himpc-lab[meshes]` brings many robots' meshes")
+
+
+def has_meshes(text: str) -> bool:
+    """Whether a canonical URDF names mesh files, whose reading takes time."""
+    return next(etree.fromstring(text.encode()).iterfind("link/*/geometry/mesh"), None) is not None
 
 
 def installed_mesh(uri: str) -> Path | None:

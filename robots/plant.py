@@ -1,8 +1,9 @@
-"""The plant: MuJoCo's simulation of a robot, built from its Pinocchio model. The only door to mujoco.
+"""The plant: MuJoCo's simulation of a robot, built from its Pinocchio model (`robots.mechanics.model`).
 
 Building it this way, not from the URDF, makes the joint order Pinocchio's and M, C·v + g, kinematics and
-accelerations equal to 1e-9. There are no geometries, no contacts and no joint stops: a joint that is pushed
-past its limit continues to move, and the run shows it.
+accelerations equal to 1e-9. With `contacts` the robot touches itself and the objects of the world, with
+`joint_stops` a joint stops at its limits. Without, there are no geometries: links pass through each other,
+and a joint that is pushed past its limit continues to move, and the run shows it.
 """
 
 from __future__ import annotations
@@ -11,21 +12,18 @@ import math
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 
 from robots.errors import InputError
+from robots.mechanics.contacts import Contact, Touch, contacts, touch_of
+from robots.mechanics.model import compiled
 from robots.robot import Robot
 from robots.runge_kutta import rk4
 from robots.settings import PlantSettings
 from robots.signals import Encoders, Motors, PlantState, as_vector
-from robots.truth import encoder_resolution, inertial, joint_axis, pose, true_model
+from robots.truth import encoder_resolution
+from robots.world import World, check_world
 
 _ZERO = (0.0, 0.0, 0.0)
-# MuJoCo models friction as a spring-damper. Its default lets a stuck light joint slide at tenths of
-# rad/s; this is the stiffest setting RK4 still integrates quietly, and creep falls by four decades.
-_STICTION_SOLREF = (0.002, 1.0)
-_STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-
 _BROKEN = 1e6  # rad/s or m/s
 # MuJoCo would print and leave a log file in the user's folder.
 mujoco.set_mju_user_warning(lambda _: None)
@@ -40,24 +38,29 @@ class Plant:
     the plant as its settings make it, and never disturb the simulation.
     """
 
-    def __init__(self, robot: Robot, settings: PlantSettings | None = None, timestep: float = 1e-3) -> None:
-        """timestep: s, the longest internal step. Raises InputError for an invalid setting or timestep."""
+    def __init__(
+        self, robot: Robot, settings: PlantSettings | None = None, timestep: float = 1e-3, world: World = ()
+    ) -> None:
+        """timestep: s, the longest internal step; world: objects that the robot touches if the settings have
+        contacts. Raises InputError for an invalid setting, timestep or world."""
         if not (math.isfinite(timestep) and 0.0 < timestep <= 0.01):
             raise InputError(f"plant timestep is {timestep} s; give a value above 0 and at most 0.01.")
         self.robot = robot
+        check_world(world)
         self.timestep = timestep
+        self.world = world
         self._push: tuple[str | None, np.ndarray] = (None, np.zeros(6))
         self._build(PlantSettings() if settings is None else settings)
         self.reset(robot.home)
 
     def _build(self, settings: PlantSettings) -> None:
         robot = self.robot
-        self._model = _compile(robot, settings)
+        self._model = compiled(robot, settings, self.world)
         self.settings = settings
         self._data = mujoco.MjData(self._model)
         self._probe = mujoco.MjData(self._model)
         self._fresh = False
-        self._armature = self._model.dof_armature.copy()
+        self._armature = self._model.dof_armature[: robot.n].copy()
         self._diagonal = settings.per_joint("diagonal_scale", robot.n)
         self._altered = bool((self._diagonal != 1.0).any())
         self._resolution = encoder_resolution(robot, settings)
@@ -81,20 +84,34 @@ class Plant:
     @property
     def q(self) -> np.ndarray:
         """(n,) rad, the true position."""
-        return self._data.qpos.copy()
+        return self._data.qpos[: self.n].copy()
 
     @property
     def v(self) -> np.ndarray:
         """(n,) rad/s, the true velocity."""
-        return self._data.qvel.copy()
+        return self._data.qvel[: self.n].copy()
 
     @property
     def tau(self) -> np.ndarray:
         """(n,) N·m, the torque acting on the joints, after saturation, delay and lag."""
         return self._motors.torque.copy()
 
+    @property
+    def touch(self) -> Touch:
+        """How the robot touched itself or the world during the last step."""
+        return self._touch
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The points of contact at the present moment, with the forces at the torque of the last step."""
+        if not self._seen.ncon:
+            return ()
+        self._accelerate(self._data.qpos, self._data.qvel, self._data.ctrl)
+        self._fresh = False
+        return contacts(self._model, self._probe, self.robot, self.world)
+
     def reset(self, q: np.ndarray, v: np.ndarray | None = None, tau: np.ndarray | None = None) -> None:
-        """Puts the robot at q (rad) with velocity v (default 0); t = 0; a push is cleared.
+        """Puts the robot at q (rad) with velocity v (default 0); t = 0, without push; free objects return.
 
         tau: N·m, the torque the motors were giving before; default: `holding_torque`, as when the brakes
         open. Raises ValueError for vectors of the wrong length or with non-finite entries.
@@ -103,8 +120,9 @@ class Plant:
         velocity = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
         torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
-        self._data.qpos[:], self._data.qvel[:] = position, velocity
+        self._data.qpos[: self.n], self._data.qvel[: self.n] = position, velocity
         self._push, self._fresh, self.broken = (None, np.zeros(6)), False, False
+        self._touch = Touch()
         torque = self.holding_torque() if torque is None else torque
         self._motors = Motors(np.clip(torque, self._tau_lower, self._tau_upper), 0.0)
         self._encoders = Encoders(position, velocity, 0.0)
@@ -116,7 +134,7 @@ class Plant:
         if not self._rounds:
             return PlantState(self.t, self.q, self.v)
         q, v = self._encoders.read(period, self._resolution)
-        return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self._data.qvel))
+        return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self.v))
 
     # ---------------------------------------------------------------- motion
 
@@ -133,10 +151,12 @@ class Plant:
         count = max(1, math.ceil(period / self.timestep - 1e-9))
         h = period / count
         self._model.opt.timestep = h
+        self._touch = Touch()
         for _ in range(count):
             data.ctrl[:] = motors.advance(data.time, h, self._delay, self._lag)
             self._advance(h)
-            self._encoders.record(data.qpos.copy(), data.time)
+            self._encoders.record(self.q, data.time)
+            self._feel()
         self._fresh = False
         return motors.torque.copy()
 
@@ -167,7 +187,11 @@ class Plant:
         self._motors.limit(self._tau_lower, self._tau_upper)
         self._data.time = old.time
         for name in ("qpos", "qvel", "qacc_warmstart"):
-            getattr(self._data, name)[:] = getattr(old, name)
+            # The robot's part comes first; objects appear or vanish with the contacts.
+            now, before = getattr(self._data, name), getattr(old, name)
+            k = self.n if len(now) != len(before) else len(now)
+            now[:k] = before[:k]
+        self._touch = Touch()
         if body is not None:
             self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
 
@@ -175,13 +199,11 @@ class Plant:
 
     def mass_matrix(self) -> np.ndarray:
         """(n, n) kg·m², M(q) with payload and armature."""
-        M = np.zeros((self.n, self.n))
-        mujoco.mj_fullM(self._model, self._look(), M)
-        return M
+        return self._inertia(self._look())[: self.n, : self.n].copy()
 
     def bias(self) -> np.ndarray:
         """(n,) N·m, C(q, v)·v + g(q): M q̈ + bias = τ − friction + push."""
-        return self._look().qfrc_bias.copy()
+        return self._look().qfrc_bias[: self.n].copy()
 
     def holding_torque(self) -> np.ndarray:
         """(n,) N·m that keeps the plant at q: inverse dynamics with v = 0, q̈ = 0 (no push, no friction)."""
@@ -190,13 +212,13 @@ class Plant:
         mujoco.mj_fwdPosition(self._model, probe)
         mujoco.mj_fwdVelocity(self._model, probe)
         self._fresh = False
-        return probe.qfrc_bias.copy()
+        return probe.qfrc_bias[: self.n].copy()
 
     def jacobian(self, frame: str) -> np.ndarray:
         """(6, n) linear over angular velocity of a frame's origin, world axes; m/rad and rad/rad."""
-        J = np.zeros((6, self.n))
+        J = np.zeros((6, self._model.nv))
         mujoco.mj_jacSite(self._model, self._look(), J[:3], J[3:], self._site(frame))
-        return J
+        return J[:, : self.n].copy()
 
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """(R (3, 3), p (3,) m) of a frame in the world."""
@@ -209,7 +231,13 @@ class Plant:
         """
         found = self._accelerate(self._data.qpos, self._data.qvel, as_vector("tau", tau, self.n))
         self._fresh = True
-        return found
+        return found[: self.n].copy()
+
+    def objects(self) -> np.ndarray:
+        """(k, 7) m and quaternion (w, x, y, z): where the free objects of the world are, in their order."""
+        if self.settings.contacts:
+            return self._data.qpos[self.n :].reshape(-1, 7).copy()
+        return np.array([thing.pose for thing in self.world if thing.free]).reshape(-1, 7)
 
     # ---------------------------------------------------------------- inside
 
@@ -238,11 +266,26 @@ class Plant:
         """Kinematics and M(q). An altered diagonal is an armature made for this very q."""
         mujoco.mj_fwdPosition(self._model, data)
         if self._altered:
-            M = np.zeros((self.n, self.n))
-            mujoco.mj_fullM(self._model, data, M)
+            M = self._inertia(data)
             self._model.dof_armature[:] = self._armature + (self._diagonal - 1.0) * M.diagonal()
             mujoco.mj_fwdPosition(self._model, data)
             self._model.dof_armature[:] = self._armature
+
+    def _inertia(self, data: mujoco.MjData) -> np.ndarray:
+        M = np.zeros((self._model.nv, self._model.nv))
+        mujoco.mj_fullM(self._model, data, M)
+        return M
+
+    @property
+    def _seen(self) -> mujoco.MjData:
+        """Where the last stage of the last step left its contacts."""
+        return self._probe if self._altered else self._data
+
+    def _feel(self) -> None:
+        """Takes note of the contacts, as the last stage of an internal step sees them."""
+        if self._seen.ncon:
+            now = touch_of(self._model, self._seen, self.robot)
+            self._touch = Touch(max(self._touch.depth, now.depth), max(self._touch.force, now.force))
 
     def _look(self) -> mujoco.MjData:
         if not self._fresh:
@@ -254,47 +297,3 @@ class Plant:
 
     def _site(self, frame: str) -> int:
         return self._model.site(f"frame{self.robot.frame_id(frame)}").id
-
-
-def _compile(robot: Robot, settings: PlantSettings) -> mujoco.MjModel:
-    """MuJoCo model: body i carries joint i of Pinocchio's tree, site k is its frame k."""
-    truth = true_model(robot, settings)
-    friction, damping = settings.per_joint("friction", robot.n), settings.per_joint("damping", robot.n)
-    spec = mujoco.MjSpec()
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    spec.compiler.degree = False
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.gravity = truth.gravity.linear
-    # Without this MuJoCo silently restarts a diverging simulation; we want to see it diverge.
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_CONTACT
-    bodies = [spec.worldbody]
-    for joint in range(1, truth.njoints):
-        body = bodies[truth.parents[joint]].add_body(
-            name=f"body{joint}", **pose(truth.jointPlacements[joint])
-        )
-        bodies.append(body)
-        body.mass, body.ipos, body.fullinertia = inertial(truth.inertias[joint])
-        body.explicitinertial = True
-        prismatic, axis = joint_axis(truth, joint)
-        body.add_joint(
-            name=f"joint{joint}",
-            type=mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE,
-            axis=axis,
-            limited=mujoco.mjtLimited.mjLIMITED_FALSE,
-            armature=truth.armature[joint - 1],
-            damping=[damping[joint - 1], 0.0, 0.0],
-            frictionloss=friction[joint - 1],
-            solref_friction=_STICTION_SOLREF,
-            solimp_friction=_STICTION_SOLIMP,
-        )
-        spec.add_actuator(
-            name=f"motor{joint}", target=f"joint{joint}", trntype=mujoco.mjtTrn.mjTRN_JOINT
-        ).set_to_motor()
-    for index, frame in enumerate(truth.frames):
-        if frame.type == pin.FrameType.BODY:
-            bodies[frame.parentJoint].add_site(name=f"frame{index}", **pose(frame.placement))
-    model = spec.compile()
-    order = [model.joint(i).name for i in range(model.njnt)]
-    if order != [f"joint{i}" for i in range(1, truth.njoints)]:
-        raise RuntimeError(f"MuJoCo reordered the joints of '{robot.name}': {order}")
-    return model

@@ -3,12 +3,13 @@ control."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 
+from robots.collision_model import CollisionModel
 from robots.errors import InputError, unknown_name
 from robots.report import ImportReport
 
@@ -35,14 +36,15 @@ class Robot:
     M_bar: np.ndarray  # (n,) kg·m², suggested diagonal of M̄
     urdf_text: str  # canonical URDF
     report: ImportReport
+    collision: CollisionModel = field(default_factory=CollisionModel)  # what touches, and what not
 
     def __post_init__(self) -> None:
-        for field in ("home", "q_lower", "q_upper", "v_limit", "tau_limit", "a_max", "M_bar"):
-            values = np.array(getattr(self, field), dtype=float)
+        for name in ("home", "q_lower", "q_upper", "v_limit", "tau_limit", "a_max", "M_bar"):
+            values = np.array(getattr(self, name), dtype=float)
             if values.shape != (self.model.nv,):
-                raise ValueError(f"Robot.{field} has shape {values.shape}, expected ({self.model.nv},)")
+                raise ValueError(f"Robot.{name} has shape {values.shape}, expected ({self.model.nv},)")
             values.flags.writeable = False
-            object.__setattr__(self, field, values)
+            object.__setattr__(self, name, values)
 
     @property
     def n(self) -> int:

@@ -39,6 +39,9 @@ class PlantSettings:
         delay_ms: ms, delay of the command (rounded to the nearest internal step).
         saturate: whether the command is clipped at the robot's torque limits.
         gravity: whether gravity acts on the plant.
+        contacts: whether the robot touches itself and the objects of its world; otherwise everything passes
+            through everything.
+        joint_stops: whether a joint stops at its limits; otherwise it moves on.
 
     Raises InputError, naming the field, for values that are not finite, negative or absurdly large.
     """
@@ -57,10 +60,12 @@ class PlantSettings:
     delay_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
     saturate: bool = True
     gravity: bool = True
+    contacts: bool = False
+    joint_stops: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, "plant.")
-        for name in ("saturate", "gravity"):
+        for name in ("saturate", "gravity", "contacts", "joint_stops"):
             if not isinstance(getattr(self, name), (bool, np.bool_)):
                 raise InputError(f"plant.{name} is {getattr(self, name)!r}; give true or false.")
         # NumPy arrays and numbers become plain Python ones: settings are compared and written as text.

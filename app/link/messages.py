@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lessons.events import Event
     from lessons.settings.settings import SceneSettings
     from robots import Robot
+    from robots.world import World
 
 # ------------------------------------------------------------------ page → simulation
 
@@ -151,11 +152,21 @@ class TaskView:
     offset: float = 0.0
 
 
+@dataclass(frozen=True)
+class ContactPoint:
+    """A point at which the robot touches an object or itself: names of an object, or of another link, and
+    of the link that feels the force; position, m, and force on it, N, in the world."""
+
+    between: tuple[str, str]
+    position: tuple[float, float, float]
+    force: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
     besides the robot; again: the same run continues with another stack; left_out: a sentence for each of
-    the user's own tasks that is not offered."""
+    the user's own tasks that is not offered; world: the objects around the robot."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -166,6 +177,7 @@ class Ready:
     room: np.ndarray
     again: bool = False
     left_out: tuple[str, ...] = ()
+    world: World = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +191,8 @@ class Status:
     I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: for scenes that have one;
     lecture: of a lesson, when it has changed; inside: while the page requests it; own: of a controller from a
         file;
-    ranks: per level the number of directions that it gets, and the number of its rows.
+    ranks: per level the number of directions that it gets, and the number of its rows; contacts: the points
+    of contact after the last tick; objects: (k, 7), the poses of the free objects of the world.
     """
 
     t: float
@@ -202,6 +215,8 @@ class Status:
     inside: Inside | None = None
     own: OwnCode | None = None
     ranks: dict[str, tuple[int, int]] = field(default_factory=dict)
+    contacts: tuple[ContactPoint, ...] = ()
+    objects: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
 
 
 @dataclass(frozen=True)

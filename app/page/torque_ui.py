@@ -30,6 +30,7 @@ from app.view.robot import RobotView, gizmo_size
 from app.view.target import TargetFrames
 from app.view.targets import Targets
 from app.view.trails import Trails
+from app.view.world import ContactView, WorldView
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 
@@ -122,6 +123,7 @@ class TorqueFace:
         self._add_targets(scene)
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
+        self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]
         position = draggable(ready.tasks)[0]
@@ -178,6 +180,8 @@ class TorqueFace:
         self._frames.actual(moment.poses[-1])
         self._targets.follow(moment.poses, moment.status.targets, moment.live)
         self._links.follow(self._tasks.picking)
+        self._world.follow(moment.status.objects)
+        self._contacts.show(moment.status.contacts)
         if moment.live:
             self._hand.follow(moment.status.targets)
         running = moment.live and moment.status.running
@@ -196,7 +200,7 @@ class TorqueFace:
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
         self._trails.draw(tips, moment.status.path, T_s)
         beside = None if moment.ghost is None else moment.ghost.window
-        self._level_plots.draw(moment.window, beside, T_s)
+        self._level_plots.draw(moment.window, beside, T_s, context.settings.plant.contacts)
         self._joint_plots.draw(moment.window, beside)
         self._inside.draw(moment)
         q = moment.latest[context.ready.layout.fields["q"]]

@@ -258,6 +258,7 @@ class SimulationRunner:
             tasks=self.run.tasks(),
             room=self.run.room(),
             left_out=self.left_out,
+            world=self.run.world(),
         )
 
     def status(self, real_time_factor: float = 0.0, capped: bool = False) -> Status:
@@ -286,6 +287,8 @@ class SimulationRunner:
             inside=run.inside() if ran else None,
             own=run.own(),
             ranks=run.ranks(),
+            contacts=run.contacts(),
+            objects=run.objects(),
         )
 
     def close(self) -> None:

@@ -26,6 +26,8 @@ PLOTS = (JOINT_2, SPEED, TORQUE)
 # Joint 2 ends at 150°; its target lies 22° beyond that.
 BEYOND = ((0.1, MoveTarget("posture", (0.0, 3.0, -1.57))),)
 ONLY_JOINTS = ("levels.position.enabled=false", "levels.orientation.enabled=false")
+# The joints have no end stops here, so that the plot shows how far one overruns its range.
+NO_STOPS = "plant.joint_stops=false"
 MODE = Control("limits.position", "Position limits", choices=("paper", "viability", "off"))
 N = Control("horizon", "N", 1, 40)
 APPROACH = Control("limits.velocity_approach", "Speed bounds closed in on at, 1/s", 5.0, 200.0, log=True)
@@ -33,8 +35,8 @@ APPROACH = Control("limits.velocity_approach", "Speed bounds closed in on at, 1/
 PRINTED = Step(
     title="Five milliseconds",
     text=r"""
-    Joint 2 may turn to 150°. Its target is put 22° beyond, and it comes at 57°/s. The paper bounds
-    the predicted positions (32d),
+    Joint 2 may turn to 150°. Its target is put 22° beyond, and it comes at 57°/s. This arm has no end
+    stops: only the controller keeps a joint in its range. The paper bounds the predicted positions (32d),
 
     $$q_{\min} \le q_{k+j+1} \le q_{\max}, \qquad j = 0 \dots N-1,$$
 
@@ -224,7 +226,7 @@ LESSON = Lesson(
     name="stopping-takes-distance",
     card=card_of(__doc__),
     scene="planar3-hold",
-    set=ONLY_JOINTS,
+    set=(*ONLY_JOINTS, NO_STOPS),
     steps=(PRINTED, LONGER, VIABLE),
     challenge=CHALLENGE,
 )

@@ -36,6 +36,19 @@ def block(recording: Recording) -> dict[str, Any]:
         "dynamic_leak_max": peak(recording["dynamic_leak"]),
         "bound_active_share": float((recording["at_bound"] > 0).any(axis=1).mean()),
         "late_ticks": int(recording["late"].sum()),
+        "contact": _contact(recording),
+    }
+
+
+def _contact(recording: Recording) -> dict[str, float]:
+    """The deepest penetration (m), the largest force (N) and the time in contact (s), with the robot's own
+    links and with the world; a contact counts for the whole tick in which it occurs."""
+    force, depth = recording["contact_force"], recording["contact_depth"]
+    touching = (force > 0.0) | (depth > 0.0)
+    return {
+        "max_depth_m": peak(depth) or 0.0,
+        "max_force_N": peak(force) or 0.0,
+        "time_s": float(touching.sum() * recording.session.settings.T_s),
     }
 
 

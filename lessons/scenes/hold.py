@@ -12,8 +12,11 @@ from himpc.tasks import FrameOrientation, FramePosition, Posture
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar
+from robots.world import standing_floor
 
-PLANAR3_PLANT = PlantSettings(armature=(0.05, 0.05, 0.03))
+TOUCHING = PlantSettings(contacts=True, joint_stops=True)
+"""The plant of a scene whose targets people drag: a robot that is pushed anywhere stops there."""
+PLANAR3_PLANT = replace(TOUCHING, armature=(0.05, 0.05, 0.03))
 """The paper's M̄ = 0.033 supposes geared motors: without armature the loop would be unstable."""
 
 
@@ -27,7 +30,7 @@ def hold_of(name: str) -> TorqueScene:
     if name == "iiwa14":
         safe = suggest_M_bar(robot.model, robot.q_lower, robot.q_upper)
         robot = replace(robot, M_bar=np.minimum(robot.M_bar, safe))
-    plant = PLANAR3_PLANT if name == "planar3" else PlantSettings()
+    plant = PLANAR3_PLANT if name == "planar3" else TOUCHING
     return replace(_hold(robot, plant), name=f"{name}-hold")
 
 
@@ -40,7 +43,7 @@ def hold(
         InputError: the URDF cannot be used, or it has no frame with the name of the tip.
     """
     robot = load_urdf_text(urdf_text, tip) if urdf_text is not None else load_robot(str(urdf), tip, within)
-    plant = PLANAR3_PLANT if robot.name == "planar3" else PlantSettings()
+    plant = PLANAR3_PLANT if robot.name == "planar3" else TOUCHING
     return _hold(robot, plant)
 
 
@@ -60,6 +63,7 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
         q_0=robot.home,
         v_0=np.zeros(robot.n),
         duration=4.0,
+        world=standing_floor(robot),
     )
 
 

@@ -14,6 +14,7 @@ from himpc.stack import Stack
 from lessons.scenes.scene import Scene
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
+from robots.world import World
 
 Array = NDArray[np.float64]
 References = Callable[[Robot, Stack], Mapping[str, Reference]]
@@ -30,12 +31,14 @@ class TorqueScene(Scene):
             takes it from them.
         v_0: initial velocities, (n,) rad/s.
         tau_0: torque acting at the start, (n,) N·m; None: the plant's holding torque.
+        world: the objects around the robot, which it touches if `plant.contacts` is true.
     """
 
     settings: TorqueSettings
     references: References
     v_0: Array
     tau_0: Array | None = None
+    world: World = ()
 
     def __post_init__(self) -> None:
         if self.settings.options is not None:

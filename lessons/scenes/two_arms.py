@@ -13,10 +13,11 @@ from himpc.references import Waypoints
 from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition, Posture, RelativeOrientation, RelativePosition
 from lessons.events import Event, MoveTarget
-from lessons.scenes.hold import gains
+from lessons.scenes.hold import TOUCHING, gains
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
-from robots import NominalSettings, PlantSettings, Robot, load_robot
+from robots import NominalSettings, Robot, load_robot
+from robots.world import standing_floor
 
 RIGHT, LEFT = "right_gripper", "left_gripper"
 SIDE = 0.12
@@ -25,7 +26,7 @@ START_S, EDGE_S = 0.3, 1.2
 """s until it starts, and for each edge."""
 _SCRIPT_S = 0.05
 """s between two targets of the tray in the script."""
-PLANT = PlantSettings(armature=0.1)
+PLANT = replace(TOUCHING, armature=0.1)
 """Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without armature, the inertia of
 an empty gripper is so small that no constant M̄ suits both the wrist and the shoulder.
 """
@@ -140,4 +141,5 @@ def _scene(
         v_0=np.zeros(robot.n),
         duration=duration,
         events=events,
+        world=standing_floor(robot),
     )

@@ -9,11 +9,12 @@ from himpc.telemetry import Layout
 
 class Places(NamedTuple):
     """The indices of the fields that a session writes into a row; values that need the plant's M are
-    adjacent."""
+    adjacent, and so are depth and force of a contact."""
 
     t: int
     late: int
     truth: slice
+    touch: slice
     q: slice
     v: slice
     tau: slice
@@ -24,6 +25,7 @@ class Places(NamedTuple):
     def of(cls, layout: Layout) -> Places:
         """The indices in a layout."""
         fields = layout.fields
-        start = fields["dynamic_leak"].start
-        joints = (fields[name] for name in cls._fields[3:])
-        return cls(fields["t"].start, fields["late"].start, slice(start, start + 3), *joints)
+        start, felt = fields["dynamic_leak"].start, fields["contact_depth"].start
+        joints = (fields[name] for name in cls._fields[4:])
+        truth, touch = slice(start, start + 3), slice(felt, felt + 2)
+        return cls(fields["t"].start, fields["late"].start, truth, touch, *joints)

@@ -68,7 +68,7 @@ class TorqueSession(Session):
     ) -> None:
         """controllers: makes the controller that settings name. Raises InputError if the scene's settings do
         not fit its robot."""
-        super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant))
+        super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant, world=scene.world))
         self._controller_of = controllers
         self.controller = self._controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
@@ -223,6 +223,7 @@ class TorqueSession(Session):
         late = settings.is_late(1e-3 * plan.step_us)
         row[at.late] = late
         row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
+        row[at.touch] = plant.touch
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)

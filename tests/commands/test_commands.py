@@ -116,6 +116,7 @@ KEYS = {
     "priority_leak_max": float,
     "dynamic_leak_max": float,
     "bound_active_share": float,
+    "contact": dict,
     "step_ms": dict,
     "real_time_factor": float,
 }
@@ -143,6 +144,7 @@ def test_run_prints_the_contract(capfd: pytest.CaptureFixture[str]) -> None:
     }
     assert (solver["backend"], solver["route"], solver["solves"]) == ("goldfarb-idnani", "compiled", 150)
     assert set(result["step_ms"]) == {"median", "p99", "max"}
+    assert result["contact"] == {"max_depth_m": 0.0, "max_force_N": 0.0, "time_s": 0.0}
 
 
 def test_run_writes_files(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -26,3 +26,4 @@ def add_plant(
         controls.add_elements(f"plant.{path}", robot.joint_names, title)
     controls.add("plant.diagonal_scale", "plant.encoder_resolution_deg", "plant.torque_lag_ms")
     controls.add("plant.delay_ms", "plant.saturate", "plant.gravity")
+    controls.add("plant.contacts", "plant.joint_stops")

@@ -26,17 +26,17 @@ class LevelPlots:
         self._tasks, self._colours = ready.tasks, colours
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
-        self._build(ghost=False)
+        self._build(ghost=False, contacts=ready.settings.plant.contacts)
 
     def rebuild(self, ready: Ready) -> None:
         """Rebuilds the charts for other tasks."""
         self._tasks = ready.tasks
-        self._build(self._with_ghost)
+        self._build(self._with_ghost, self._with_contacts)
 
-    def _build(self, ghost: bool) -> None:
+    def _build(self, ghost: bool, contacts: bool) -> None:
         for chart in self._charts:
             chart.remove()
-        self._with_ghost = ghost
+        self._with_ghost, self._with_contacts = ghost, contacts
         errors = [
             ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours.get(t.level, BOUND))
             for t in self._tasks
@@ -44,6 +44,8 @@ class LevelPlots:
         step = [ChartLine("whole step", LEVELS[1], width=2.0)]
         leaks = [ChartLine("priority (own model)", LEVELS[2]), ChartLine("dynamic (true plant)", BAD)]
         errors, step, leaks = ([*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks))
+        # An area over the whole height: the time in which the robot touches something.
+        errors += [ChartLine("contact", BAD, fill=0.12, width=0.0)] if contacts else []
         budget = ChartLine("budget", GOOD, dashed=True, fill=0.12)
         with self._place:
             self._charts = [
@@ -55,15 +57,20 @@ class LevelPlots:
                 )
             ]
 
-    def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float) -> None:
-        """ghost: the ghost's data over the same interval."""
-        if (ghost is not None) != self._with_ghost:
-            self._build(ghost is not None)
+    def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float, contacts: bool) -> None:
+        """ghost: the ghost's data over the same interval; contacts: whether the plant has contacts, which
+        the plot of errors marks."""
+        if (ghost is not None, contacts) != (self._with_ghost, self._with_contacts):
+            self._build(ghost is not None, contacts)
         windows = [window] if ghost is None else [window, ghost]
         error, step, leak = self._charts
-        error.show(window, lambda: [curve for each in windows for curve in self._errors(each)])
+        error.show(window, lambda: self._errors_and_contacts(window, windows))
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
         leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
+
+    def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
+        curves = [curve for each in windows for curve in self._errors(each)]
+        return [*curves, touching(window)] if self._with_contacts else curves
 
     def _errors(self, window: PlotWindow) -> list[np.ndarray]:
         fields = window.layout.fields
@@ -88,3 +95,9 @@ def _leaks(window: PlotWindow) -> list[np.ndarray]:
         np.where(known, np.nan_to_num(window.columns(fields[name])[:, 0], nan=0.0), np.nan)
         for name in ("priority_leak", "dynamic_leak")
     ]
+
+
+def touching(window: PlotWindow) -> np.ndarray:
+    """The top of the axis of errors while the robot touches something, else its bottom."""
+    force = window.columns(window.layout.fields["contact_force"])[:, 0]
+    return np.where(np.nan_to_num(force) > 0.0, _ERROR[1], 0.0)

@@ -15,8 +15,8 @@ S_co = TypeVar("S_co", bound=SceneSettings, covariant=True)
 
 @dataclass(frozen=True, eq=False)
 class SessionSnapshot(Generic[S_co]):
-    """latest: the last telemetry row; bound_seconds: (n, number of constraints), time that each joint spent at
-    the bound of each of himpc's `CONSTRAINTS` since the last reset, s."""
+    """latest: the last telemetry row; bound_seconds: (n, number of constraints), time that each joint spent
+    at the bound of each of himpc's `CONSTRAINTS` since the last reset, s."""
 
     ready: Ready
     settings: S_co

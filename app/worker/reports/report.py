@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 
 from app.link.inside import Inside, InsideRequest
-from app.link.messages import TaskView
+from app.link.messages import ContactPoint, TaskView
 from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
 from himpc.plan import Binding
+from robots.world import World
 
 LISTED = 24
 """Largest number of active constraints sent to the page: nobody can read more in a tenth of a second."""
+
+TOUCHING = 24
+"""Largest number of contact points sent to the page."""
 
 
 class SessionReport(ABC):
@@ -61,6 +65,18 @@ class SessionReport(ABC):
         """Per level, the number of directions available to it at the present posture, and its number of rows;
         empty without a stack."""
         return {}
+
+    def world(self) -> World:
+        """The objects around the robot."""
+        return ()
+
+    def contacts(self) -> tuple[ContactPoint, ...]:
+        """The points of contact after the last tick, at most TOUCHING."""
+        return ()
+
+    def objects(self) -> np.ndarray:
+        """(k, 7) position, m, and quaternion (w, x, y, z) of the free objects of the world."""
+        return np.zeros((0, 7))
 
     def mission(self) -> MissionView | None:
         """The state of the mission, if there is one."""

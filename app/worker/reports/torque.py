@@ -7,15 +7,16 @@ from typing import final
 import numpy as np
 
 from app.link.inside import Inside, InsideRequest
-from app.link.messages import TaskView
+from app.link.messages import ContactPoint, TaskView
 from app.link.own_code import OwnCode
 from app.worker.reports.own_code import File
-from app.worker.reports.report import SessionReport
+from app.worker.reports.report import TOUCHING, SessionReport
 from himpc.tasks import PlaneDistance, Task
 from himpc.tasks.kinds import word_of
 from lessons.geometry.look import matrix_of, plane_of
 from lessons.session.torque import TorqueSession
 from robots import InputError, convergence_eigenvalues, convergence_gauge
+from robots.world import World
 
 
 @final
@@ -64,6 +65,16 @@ class TorqueRun(SessionReport):
         finite = np.isfinite(self.session.plant.q).all()
         return self.session.ranks() if finite else {}
 
+    def world(self) -> World:
+        return self.session.scene.world
+
+    def contacts(self) -> tuple[ContactPoint, ...]:
+        found = self.session.plant.contacts[:TOUCHING]
+        return tuple(ContactPoint(each.between, _point(each.position), _point(each.force)) for each in found)
+
+    def objects(self) -> np.ndarray:
+        return self.session.plant.objects()
+
     def gauge(self) -> tuple[float, float] | None:
         found = self._mechanics()
         return None if found is None else convergence_gauge(*found)
@@ -90,3 +101,8 @@ class TorqueRun(SessionReport):
         if not np.isfinite(session.plant.q).all():
             return None
         return session.plant.mass_matrix(), session.M_bar
+
+
+def _point(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

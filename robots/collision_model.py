@@ -1,0 +1,112 @@
+"""The collision geometry of a robot as data: convex solids on its bodies, and the pairs of bodies whose
+contact is left out."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+Point = tuple[float, float, float]
+SolidKind = Literal["box", "sphere", "cylinder", "capsule", "hull"]
+Why = Literal["neighbours", "home", "always", "hollow"]
+Source = Literal["collision", "hull", "capsule"]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A convex solid that is fixed to a body of a robot.
+
+    Attributes:
+        joint: Pinocchio index of the joint that carries it, 0 for the world.
+        link: the link that it belongs to, for messages.
+        kind: its shape. source: "collision", a collision shape of the URDF; "hull", the convex hull of the
+            link's visual shapes; "capsule", generated along the kinematics.
+        size: m; half the edges of a box, (radius,) of a sphere, (radius, half the length of the straight
+            part) of a cylinder or capsule along z, () for a hull.
+        position: its middle in the joint's axes, m. quaternion: its axes there, (w, x, y, z).
+        points: for a hull its corners in the joint's axes, m.
+    """
+
+    joint: int
+    link: str
+    kind: SolidKind
+    source: Source
+    size: tuple[float, ...] = ()
+    position: Point = (0.0, 0.0, 0.0)
+    quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    points: tuple[Point, ...] = ()
+
+
+@dataclass(frozen=True)
+class Excluded:
+    """Two bodies whose contact is left out: first < second, Pinocchio indices of their joints, 0 for the
+    base.
+
+    names: a link of each. why: "neighbours" (a joint connects them), "home" (they touch at home) or "always"
+    (they touch in nearly every posture) or "hollow" (their hulls, which fill the hollows of the real links,
+    touch in postures in which the links do not).
+    """
+
+    first: int
+    second: int
+    names: tuple[str, str]
+    why: Why
+
+
+@dataclass(frozen=True)
+class CollisionModel:
+    """The solids of a robot, in the order of their joints with those of the base last, and the pairs of
+    bodies that never touch. The default is a robot without solids."""
+
+    solids: tuple[Solid, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
+
+    def __str__(self) -> str:
+        """One line for the import report."""
+        if not self.solids:
+            return "the robot has no shape, so it touches nothing"
+        words = {
+            "collision": "{} collision shape(s) of the URDF",
+            "hull": "{} convex hull(s) of visual shapes",
+            "capsule": "{} generated capsule(s)",
+        }
+        counts = Counter(solid.source for solid in self.solids)
+        parts = [text.format(counts[source]) for source, text in words.items() if counts[source]]
+        near = sum(pair.why == "neighbours" for pair in self.excluded)
+        text = f"contacts use {', '.join(parts)}; left out are {near} pair(s) of neighbours"
+        for why, said in _TOLD:
+            pairs = [" – ".join(pair.names) for pair in self.excluded if pair.why == why]
+            shown = ", ".join(pairs[:_SHOWN]) + (f" and {len(pairs) - _SHOWN} more" if pairs[_SHOWN:] else "")
+            text += f", and {shown}, which {said}" if pairs else ""
+        return text
+
+
+_SHOWN = 8
+_TOLD = (
+    ("home", "touch at home"),
+    ("always", "touch in nearly every posture"),
+    ("hollow", "touch only as convex hulls"),
+)
+
+
+def stored(path: Path) -> CollisionModel:
+    """Reads the collision geometry of a robot of the catalog."""
+    data = json.loads(path.read_text())
+    return CollisionModel(
+        tuple(Solid(**{key: _frozen(value) for key, value in solid.items()}) for solid in data["solids"]),
+        tuple(Excluded(**{key: _frozen(value) for key, value in pair.items()}) for pair in data["excluded"]),
+    )
+
+
+def as_json(model: CollisionModel) -> str:
+    """The text of the file that `stored` reads, one line per solid and pair."""
+    solids, pairs = ([json.dumps(asdict(each)) for each in some] for some in (model.solids, model.excluded))
+    between = ",\n  "
+    return f'{{"solids": [\n  {between.join(solids)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value

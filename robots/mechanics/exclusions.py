@@ -1,0 +1,103 @@
+"""The pairs of bodies of a robot whose contact is left out, found by its geometry at home and in random
+postures."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from robots.collision import base_joint
+from robots.collision_model import CollisionModel, Excluded, Solid, Why
+from robots.inertia import sample_configurations
+from robots.mechanics.model import compiled
+from robots.robot import Robot
+from robots.settings import PlantSettings
+
+NEAR = 2e-3
+"""m: bodies that are nearer than this at home count as touching there."""
+SAMPLES = 300
+OFTEN = 0.9
+"""Share of random postures in which a pair touches that is always excluded."""
+
+
+def collision_model(
+    robot: Robot, solids: tuple[Solid, ...], hollow: tuple[tuple[str, str], ...] = ()
+) -> CollisionModel:
+    """Returns the solids with the pairs of bodies to leave out: neighbours, pairs of links that are
+    `hollow`, pairs that are nearer than 2 mm at home, and pairs that touch in nearly every posture within
+    the joints' limits."""
+    names: dict[int, str] = {}
+    for solid in solids:
+        names.setdefault(solid.joint, solid.link)
+
+    def pair(first: int, second: int, why: Why) -> Excluded:
+        return Excluded(first, second, (names[first], names[second]), why)
+
+    parents = robot.model.parents
+    near = [
+        pair(parents[joint], joint, "neighbours")
+        for joint in range(1, robot.n + 1)
+        if joint in names and parents[joint] in names
+    ]
+    for links in hollow:
+        first, second = sorted(robot.model.frames[robot.frame_id(link)].parentJoint for link in links)
+        near.append(pair(first, second, "hollow"))
+    model = CollisionModel(solids, tuple(near))
+    home = sorted(touching(replace(robot, collision=model), robot.home, NEAR))
+    model = replace(model, excluded=(*model.excluded, *(pair(a, b, "home") for a, b in home)))
+    postures = sample_configurations(
+        np.maximum(robot.q_lower, -np.pi), np.minimum(robot.q_upper, np.pi), SAMPLES, 0
+    )
+    counts = _touches(replace(robot, collision=model), postures)
+    always = sorted(each for each, count in counts.items() if count > OFTEN * SAMPLES)
+    return replace(model, excluded=(*model.excluded, *(pair(a, b, "always") for a, b in always)))
+
+
+def touching(robot: Robot, q: np.ndarray, margin: float = 0.0) -> set[tuple[int, int]]:
+    """Returns the pairs of bodies, excluded ones left out, that are nearer than a margin (m) at q (n,),
+    rad; 0 is the base."""
+    return set(_touches(robot, np.array([q]), margin))
+
+
+def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Counter[tuple[int, int]]:
+    # Both solids have the margin, and MuJoCo adds them.
+    model = compiled(robot, PlantSettings(contacts=True), margin=0.5 * margin)
+    data = mujoco.MjData(model)
+    joints = [solid.joint for solid in robot.collision.solids]
+    counts: Counter[tuple[int, int]] = Counter()
+    for q in postures:
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(model, data)
+        found = {tuple(sorted(joints[geom] for geom in contact.geom)) for contact in data.contact}
+        counts.update((a, b) for a, b in found)
+    return counts
+
+
+def lowest(robot: Robot) -> tuple[float | None, float | None]:
+    """Heights, m, of the lowest points at home: of what stands (the base, or a mobile base), and of all
+    else; None where there is no solid."""
+    model = compiled(robot, PlantSettings(contacts=True))
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.home
+    mujoco.mj_fwdPosition(model, data)
+    standing = base_joint(robot)
+    found: dict[bool, list[float]] = {True: [], False: []}
+    for geom, solid in enumerate(robot.collision.solids):
+        found[solid.joint <= standing].append(_bottom(model, data, geom))
+    base, rest = (min(found[key], default=None) for key in (True, False))
+    return base, rest
+
+
+def _bottom(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Height of the lowest point of the box around a geometry, m."""
+    R = data.geom_xmat[geom].reshape(3, 3)
+    middle, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first = model.mesh_vertadr[mesh]
+        corners = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+        return float((data.geom_xpos[geom, 2] + corners @ R[2]).min())
+    return float(data.geom_xpos[geom, 2] + R[2] @ middle - np.abs(R[2]) @ half)

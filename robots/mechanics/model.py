@@ -1,0 +1,206 @@
+"""MuJoCo's model of a robot and of the objects around it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from robots.collision import base_joint
+from robots.collision_model import Excluded, Solid
+from robots.errors import InputError
+from robots.robot import Robot
+from robots.settings import PlantSettings
+from robots.truth import inertial, joint_axis, pose, true_model
+from robots.world import Ball, Box, Floor, Post, Thing, World
+
+# MuJoCo models friction as a spring-damper. Its default lets a stuck light joint slide at tenths of
+# rad/s; this is the stiffest setting RK4 still integrates quietly, and creep falls by four decades.
+_STICTION_SOLREF = (0.002, 1.0)
+_STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+CONTACT_SOLREF = (0.004, 1.0)
+"""Time constant (s) and damping ratio of a contact: see `benchmarks/contacts.py`."""
+CONTACT_SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
+_STOP_SOLREF = (0.004, 1.0)
+_SLIDING = 0.5
+"""Coefficient of sliding friction between two links."""
+BASE = "base"
+"""Name of the body with the solids that do not move."""
+
+
+def compiled(
+    robot: Robot,
+    settings: PlantSettings,
+    world: World = (),
+    also: tuple[Excluded, ...] = (),
+    margin: float = 0.0,
+) -> mujoco.MjModel:
+    """Returns the model: body i carries joint i of Pinocchio's tree, site k is its frame k.
+
+    With contacts, geometry k is solid k of the robot; one body for what is fixed to the world, and one for
+    each object of the world, follow the robot's bodies, and the joints of free objects follow the robot's.
+
+    Args:
+        robot, settings, world: what to model; the world counts with contacts only.
+        also: pairs of bodies, besides those of the robot's own list, that do not touch.
+        margin: m, the distance below which two solids count as touching.
+
+    Raises InputError for a per-joint list of the wrong length, and for free objects with a changed diagonal.
+    """
+    truth = true_model(robot, settings)
+    friction, damping = settings.per_joint("friction", robot.n), settings.per_joint("damping", robot.n)
+    altered = bool((settings.per_joint("diagonal_scale", robot.n) != 1.0).any())
+    spec = mujoco.MjSpec()
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.compiler.degree = False
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.gravity = truth.gravity.linear
+    # Without this MuJoCo silently restarts a diverging simulation; we want to see it diverge.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if not settings.contacts:
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    bodies = [spec.worldbody]
+    for joint in range(1, truth.njoints):
+        body = bodies[truth.parents[joint]].add_body(
+            name=f"body{joint}", **pose(truth.jointPlacements[joint])
+        )
+        bodies.append(body)
+        body.mass, body.ipos, body.fullinertia = inertial(truth.inertias[joint])
+        body.explicitinertial = True
+        prismatic, axis = joint_axis(truth, joint)
+        made = body.add_joint(
+            name=f"joint{joint}",
+            type=mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE,
+            axis=axis,
+            limited=mujoco.mjtLimited.mjLIMITED_FALSE,
+            armature=truth.armature[joint - 1],
+            damping=[damping[joint - 1], 0.0, 0.0],
+            frictionloss=friction[joint - 1],
+            solref_friction=_STICTION_SOLREF,
+            solimp_friction=_STICTION_SOLIMP,
+        )
+        if settings.joint_stops:
+            _stop(made, robot.q_lower[joint - 1], robot.q_upper[joint - 1])
+        spec.add_actuator(
+            name=f"motor{joint}", target=f"joint{joint}", trntype=mujoco.mjtTrn.mjTRN_JOINT
+        ).set_to_motor()
+    for index, frame in enumerate(truth.frames):
+        if frame.type == pin.FrameType.BODY:
+            bodies[frame.parentJoint].add_site(name=f"frame{index}", **pose(frame.placement))
+    if settings.contacts:
+        _add_solids(spec, robot, bodies, margin)
+        _add_world(spec, robot, world, altered)
+        for pair in (*robot.collision.excluded, *also):
+            spec.add_exclude(bodyname1=_body(pair.first), bodyname2=_body(pair.second))
+    model = spec.compile()
+    order = [model.joint(i).name for i in range(robot.n)]
+    if order != [f"joint{i}" for i in range(1, truth.njoints)]:
+        raise RuntimeError(f"MuJoCo reordered the joints of '{robot.name}': {order}")
+    geoms = [model.geom(i).name for i in range(model.ngeom)]
+    wanted = [f"solid{i}" for i in range(len(robot.collision.solids))] + [
+        f"shape{i}" for i in range(len(world))
+    ]
+    if settings.contacts and geoms != wanted:
+        raise RuntimeError(f"MuJoCo reordered the shapes of '{robot.name}': {geoms}")
+    return model
+
+
+def _body(joint: int) -> str:
+    return f"body{joint}" if joint else BASE
+
+
+def _stop(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
+    """Limits a joint that has a limit; MuJoCo knows limits on both sides only."""
+    if np.isfinite(lower) or np.isfinite(upper):
+        joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        joint.range = (max(lower, -_FAR), min(upper, _FAR))
+        joint.solref_limit, joint.solimp_limit = _STOP_SOLREF, CONTACT_SOLIMP
+
+
+_FAR = 1e6  # rad or m
+
+
+def _add_solids(spec: mujoco.MjSpec, robot: Robot, bodies: list[mujoco.MjsBody], margin: float) -> None:
+    base = spec.worldbody.add_body(name=BASE)
+    for index, solid in enumerate(robot.collision.solids):
+        kind = _TYPES[solid.kind]
+        body = bodies[solid.joint] if solid.joint else base
+        geom = body.add_geom(name=f"solid{index}", type=kind, margin=margin, friction=_friction(_SLIDING))
+        geom.solref, geom.solimp = CONTACT_SOLREF, CONTACT_SOLIMP
+        if solid.kind == "hull":
+            mesh = spec.add_mesh(name=f"hull{index}", uservert=np.ravel(solid.points).tolist())
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+            geom.meshname = mesh.name
+        else:
+            geom.size[: len(solid.size)] = solid.size
+            geom.pos, geom.quat = solid.position, solid.quaternion
+
+
+_TYPES = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "hull": mujoco.mjtGeom.mjGEOM_MESH,
+}
+
+
+def _friction(sliding: float) -> tuple[float, float, float]:
+    """Sliding, torsion (m) and rolling (m) with MuJoCo's defaults for the last two."""
+    return sliding, 0.005, 0.0001
+
+
+def _add_world(spec: mujoco.MjSpec, robot: Robot, world: World, altered: bool) -> None:
+    if altered and any(thing.free for thing in world):
+        raise InputError(
+            "plant.diagonal_scale and plant.contacts do not go together in a scene with free objects: "
+            "set one of them to its default, 1 or false."
+        )
+    standing = base_joint(robot)
+    for index, thing in enumerate(world):
+        kind, size = _shape(thing)
+        body = spec.worldbody.add_body(name=f"object{index}", pos=thing.pose[:3], quat=thing.pose[3:])
+        if thing.mass_kg is not None:
+            body.add_freejoint(name=f"free{index}")
+            body.mass, body.inertia = thing.mass_kg, thing.mass_kg * np.array(_gyration(thing))
+            body.ipos, body.iquat, body.explicitinertial = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), True
+        geom = body.add_geom(name=f"shape{index}", type=kind, friction=_friction(thing.friction), priority=1)
+        geom.size[:], geom.solref, geom.solimp = size, CONTACT_SOLREF, CONTACT_SOLIMP
+        if isinstance(thing.shape, Floor) and standing:
+            # A mobile base stands on the floor; its wheels are not simulated.
+            for joint in range(standing + 1):
+                spec.add_exclude(bodyname1=_body(joint), bodyname2=body.name)
+
+
+def _shape(thing: Thing) -> tuple[mujoco.mjtGeom, tuple[float, ...]]:
+    """MuJoCo's type, and its size."""
+    match thing.shape:
+        case Ball(_, _, radius):
+            return mujoco.mjtGeom.mjGEOM_SPHERE, (radius, 0.0, 0.0)
+        case Box(_, _, (x, y, z)):
+            return mujoco.mjtGeom.mjGEOM_BOX, (0.5 * x, 0.5 * y, 0.5 * z)
+        case Post(_, _, height, radius):
+            return mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, 0.5 * height, 0.0)
+        case Floor():
+            return mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0)
+
+
+def _gyration(thing: Thing) -> tuple[float, float, float]:
+    """Squares of the radii of gyration of a homogeneous body, m²."""
+    match thing.shape:
+        case Ball(_, _, radius):
+            same = 0.4 * radius**2
+            return same, same, same
+        case Box(_, _, (x, y, z)):
+            return (y**2 + z**2) / 12, (x**2 + z**2) / 12, (x**2 + y**2) / 12
+        case Post(_, _, height, radius):
+            across = (3 * radius**2 + height**2) / 12
+            return across, across, 0.5 * radius**2
+        case Floor():
+            raise ValueError("a floor has no mass")
+
+
+def label(robot: Robot, world: World, geom: int) -> str:
+    """Name of the link or object that a geometry of the model belongs to."""
+    solids: tuple[Solid, ...] = robot.collision.solids
+    return solids[geom].link if geom < len(solids) else world[geom - len(solids)].shape.name

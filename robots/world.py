@@ -1,0 +1,106 @@
+"""The objects of a scene that a robot can touch: floor, table, posts, balls and boxes, static or free."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import Annotated
+
+from robots.collision import Ball, Box, Floor, Point
+from robots.errors import InputError
+from robots.ranges import Range, check_fields
+from robots.robot import Robot
+
+__all__ = ["Ball", "Box", "Floor", "Post", "Thing", "World", "check_world", "standing_floor", "table"]
+
+MOST = 50
+"""Largest number of objects of a world: each costs time in every step of the plant."""
+_TABLE_TOP = 0.04  # m, thickness
+
+
+@dataclass(frozen=True)
+class Post:
+    """An upright cylinder: the middle of its foot, height and radius, m."""
+
+    name: str
+    foot: Point
+    height: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        sizes = (self.height, self.radius)
+        if not all(map(math.isfinite, (*self.foot, *sizes))) or min(sizes) <= 0.0:
+            raise InputError(f"post '{self.name}' needs finite coordinates and sizes above 0")
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object of a world.
+
+    Attributes:
+        shape: where it stands at the start, and its name, which is unique in its world.
+        mass_kg: kg, of an object that moves freely; None: it is static. A floor is static.
+        friction: coefficient of sliding friction between it and the robot.
+    """
+
+    shape: Ball | Box | Post | Floor
+    mass_kg: Annotated[float | None, Range(1e-3, 1e3)] = None
+    friction: Annotated[float, Range(0.0, 10.0)] = 0.5
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"object '{self.shape.name}': ")
+        if isinstance(self.shape, Floor) and self.mass_kg is not None:
+            raise InputError(f"the floor '{self.shape.name}' has a mass: leave it out, a floor is static")
+
+    @property
+    def free(self) -> bool:
+        """Whether it moves."""
+        return self.mass_kg is not None
+
+    @property
+    def pose(self) -> tuple[float, ...]:
+        """Position of the middle, m, and quaternion (w, x, y, z) at the start."""
+        yaw = 0.0
+        match self.shape:
+            case Ball(_, centre):
+                x, y, z = centre
+            case Box(_, centre, _, yaw):
+                x, y, z = centre
+            case Post(_, (x, y, foot), height):
+                z = foot + 0.5 * height
+            case Floor(_, z):
+                x = y = 0.0
+        return x, y, z, math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
+
+
+World = tuple[Thing, ...]
+
+
+def check_world(world: World) -> None:
+    """Raises InputError for a world with too many objects or with two of the same name."""
+    if len(world) > MOST:
+        raise InputError(f"the world has {len(world)} objects; give at most {MOST}.")
+    twice = [name for name, count in Counter(thing.shape.name for thing in world).items() if count > 1]
+    if twice:
+        raise InputError(f"two objects of the world are called '{twice[0]}'; give each its own name.")
+
+
+def table(name: str, centre: tuple[float, float], size: tuple[float, float], height: float) -> Thing:
+    """Returns a static table: the middle and the edge lengths of its top, and the height of its surface,
+    m."""
+    (x, y), (length, width) = centre, size
+    return Thing(Box(name, (x, y, height - 0.5 * _TABLE_TOP), (length, width, _TABLE_TOP)))
+
+
+def standing_floor(robot: Robot) -> World:
+    """Returns the floor on which a robot stands, at the height 0; nothing for a robot that hangs, or whose
+    home or base is below that height, as for an arm that moves in a horizontal plane."""
+    from robots.mechanics.exclusions import lowest  # needs MuJoCo
+
+    base, rest = lowest(robot)
+    stands = base is not None and -_SUNK < base < _SUNK
+    return (Thing(Floor()),) if stands and (rest is None or rest > 0.0) else ()
+
+
+_SUNK = 0.03  # m by which a base may stand above or below the floor
