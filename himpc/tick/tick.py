@@ -34,8 +34,7 @@ from robots import Robot
 
 
 class CompiledTick:
-    """The arena of one controller with one set of settings. `budget`: largest number of multiplications of
-    one tick for changes of active rows.
+    """The arena of one controller with one set of settings. `budget`: the most multiplications of a tick.
 
     Args:
         robot: gives the geometry.
