@@ -26,6 +26,9 @@ _SMALL = 40
 _ITERATIONS = 100
 """Largest number of iterations of DAQP in each of at most two attempts, which take milliseconds together."""
 
+_TOLERATED = 1e-6
+"""N·m: rows that are wider than this have no solution for the printed route either."""
+
 _LEAK = 1e-7
 """m/s²: largest change that a point may cause at the levels above."""
 
@@ -75,19 +78,24 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
     f = arena.f
     rows = like._replace(lower=f["lower"].copy(), upper=f["upper"].copy())
     wanted = f["U"][place].copy()
-    point = _as_printed(arena, place, rows, budget)
+    alone = place == 0 or bool(arena.i["level"][place, ALONE])
+    resting = rows._replace(rest=_coming_to_rest(arena)) if alone else rows
+    widened = softened(resting) if alone else None
+    point = (
+        None
+        if widened is not None and _contradict(rows, widened)
+        else _as_printed(arena, place, rows, budget)
+    )
     if point is not None:
         _put(arena, place, point)
         return "solve"
-    alone = place == 0 or bool(arena.i["level"][place, ALONE])
     if not alone:
         # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
         if solve_level(*arena.arguments, place, TOLERANCE):
             return "solve"
         above = f["U"][place - 1]
         return _on_the_way(arena, place, containing(rows, above), "inherit", above, f["U"][place].copy())
-    rows = rows._replace(rest=_coming_to_rest(arena))
-    widened = softened(rows)
+    rows = resting
     if widened is not None:
         _write(arena, widened)
         solved = bool(solve_level(*arena.arguments, place, 0.0))
@@ -104,6 +112,13 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
     fallback = _on_the_way(arena, place, widened or rows, fallback, U, wanted)
     _write(arena, rows if place else containing(rows, f["U"][place]))
     return fallback
+
+
+def _contradict(rows: Rows, widened: Rows) -> bool:
+    """Whether rows have no solution: they had to be widened by more than solvers tolerate."""
+    return bool(
+        (widened.lower < rows.lower - _TOLERATED).any() or (widened.upper > rows.upper + _TOLERATED).any()
+    )
 
 
 def _on_the_way(

@@ -20,6 +20,7 @@ from himpc.cascade.last_resort import containing
 from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.braking import least_slack
+from himpc.tick import fallbacks
 
 Array = NDArray[np.float64]
 
@@ -62,6 +63,18 @@ def test_softened_routes_agree(seed: int) -> None:
     """Both routes use the same slack and then find the same increments."""
     hierarchy = unreachable(random_hierarchy(seed, 4, 3, 2))
     assert largest_difference(hierarchy.solve("compiled"), hierarchy.solve("explicit")) <= 1e-6
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rows_without_a_solution_are_not_solved_as_printed(
+    monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """The rows are softened at once: the printed QP has no solution either, and an attempt takes
+    milliseconds in every tick of a robot that presses against something."""
+    asked: list[object] = []
+    monkeypatch.setattr(fallbacks, "solve_explicit", lambda *given: asked.append(given))
+    solutions = unreachable(random_hierarchy(seed, 5, 4, 3)).solve("compiled")
+    assert solutions[0].fallback == "soften" and not asked
 
 
 def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
