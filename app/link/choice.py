@@ -25,10 +25,10 @@ class SceneChoice:
     """A run, with the data that only a page needs.
 
     Attributes:
-        run: scene, robot, settings and seed; for a lesson those of the step, with its script; without a scene
-            until the lesson's file is read. A controller is named by an assignment, so that only `files` are
-            opened.
-        urdf_text: an uploaded robot, instead of the run's.
+        run: scene, robot, settings and seed. For a lesson these are the step's, with the step's script; the
+            scene is empty until the lesson's file has been read. The controller is given as an assignment in
+            `set`, not in `controller`; only the paths in `files` are opened.
+        urdf_text: the text of an uploaded URDF, which replaces the robot of the run.
         exercise: the step of a lesson, if the choice is one.
         mine: the learner's changes to that step, as assignments; applied once when it is loaded.
         scenes: Python files that may be the scene. Only these and the run's `files` and `tasks` are ever

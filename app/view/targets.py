@@ -169,7 +169,8 @@ def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
 
 
 def _put(node: viser.SceneNodeHandle, position: np.ndarray, rotation: np.ndarray) -> None:
-    """Moves a node if its position has changed, so that the browser need not redraw."""
+    """Sets a node's position and rotation, each only if it has changed; otherwise the browser would redraw
+    for nothing."""
     wxyz = vtf.SO3.from_matrix(rotation).wxyz
     if np.abs(np.array(node.position) - position).max() > _STILL:
         node.position = position

@@ -181,7 +181,8 @@ class HIMPC(TorqueController):
             self.kernel.take_M_bar(self._M_bar)
 
     def _search(self, tick: PeriodState) -> PeriodResult | None:
-        """Returns the plan along the previous prediction (30); None if its problems are not finite."""
+        """Returns the plan with the Jacobians at the configurations of the previous prediction (30); None
+        if its problems are not finite."""
         state, settings = tick.state, self._settings
         return self._solve(tick, tick.memory.knots(state.q, state.v, settings.horizon, settings.T_s))
 

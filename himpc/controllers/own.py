@@ -253,8 +253,8 @@ class OwnController(TorqueController):
         started: int,
         notice: str | None,
     ) -> Plan:
-        """Returns the plan of a tick without a torque from the law. moving: the acceleration to be removed,
-        (n,)."""
+        """Returns the plan of a tick in which the law gives no torque: τ₀ − M̄ · moving, within the torque
+        limits. moving: the acceleration that this torque shall cancel, (n,)."""
         limits: LimitsInForce = self._limits
         tau = np.clip(self._tau_0 - self._M_bar * moving, limits.tau_lower, limits.tau_upper)
         status = "the code failed" if self._failed else "state not finite"

@@ -68,7 +68,7 @@ class Rows(NamedTuple):
 
     @property
     def is_hard(self) -> NDArray[np.bool_]:
-        """Which rows hold always, (r,)."""
+        """Which rows are hard constraints, which never give way, (r,)."""
         return np.repeat([each.hard for each in self.constraints], self.L.shape[1])
 
     def directions_of(self, row: int) -> Directions | None:

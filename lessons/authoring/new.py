@@ -26,7 +26,8 @@ TASKS: tuple[str, ...] = (
     "plane_distance",
 )
 """Kinds of tasks that can be used as a template. Two kinds are left out: tasks on joints have little
-to change, and the target of pointing tasks is not a value of their coordinates, as a task of a file requires.
+to change, and a task in a file needs a target that is a value of the task's coordinates, which the target
+of a pointing task is not.
 """
 
 
@@ -75,7 +76,8 @@ def _read(package: str, name: str) -> str:
 
 
 def _task(word: str) -> str:
-    """The source of one of the lab's kinds of tasks, as the text of a file with one task."""
+    """Returns the text of a task file: the source code of one of the lab's kinds of tasks, followed by one
+    task of that kind."""
     of = KINDS[word].makes[0]
     package, _, module = of.__module__.rpartition(".")
     says, rest = _read(package, module).split('"""\n', 1)

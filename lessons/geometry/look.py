@@ -29,7 +29,8 @@ class TickProblems:
     Attributes:
         plan: the plan that was applied.
         problems: the levels' QPs, highest priority first.
-        strict: their solutions one after the other; those of the plan if its controller is strict.
+        strict: the solutions of `problems` in strict order of priority; those of the plan if the
+            controller is strict.
     """
 
     plan: Plan

@@ -59,8 +59,8 @@ class GhostDriver:
         return max(0.0, self._until - self.session.t)
 
     def hear(self, script: Iterable[tuple[float, Event]], until: float) -> None:
-        """Receives the new events of the leader's log and the leader's present time, s; later calls bring no
-        event from before that time.
+        """Receives the new events of the leader's log, and the leader's present time, s. All events before
+        that time have then been received: later calls contain none of them.
         """
         self._script.extend(script)
         self._until = until

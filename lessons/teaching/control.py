@@ -51,7 +51,7 @@ def chosen(settings: SceneSettings, control: Control) -> Any:
 
 
 def within(settings: SceneSettings, control: Control) -> bool:
-    """Whether the control can set the present value of its setting."""
+    """Whether the present value of the setting is one that the control can set."""
     if control.choices:
         return chosen(settings, control) is not None
     return control.takes(settings.value_at(control.path))

@@ -78,7 +78,9 @@ def _names(root: Element, _source: str) -> Iterator[Finding]:
             elif count > 1:
                 yield Finding("refused", where, f"the name is used {count} times; make names unique")
             elif len(name) > MAX_NAME:
-                yield Finding("refused", where, f"its name has {len(name)} characters; {MAX_NAME} will do")
+                yield Finding(
+                    "refused", where, f"its name has {len(name)} characters; at most {MAX_NAME} are allowed"
+                )
             elif not name.isprintable():
                 yield Finding("refused", where, "the name has characters that cannot be printed; rename it")
     if "universe" in named(root, "link"):

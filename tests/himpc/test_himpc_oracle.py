@@ -132,8 +132,8 @@ def test_the_judge_decides_where_rows_nearly_depend() -> None:
 def test_a_level_below_one_that_used_up_nearly_all_freedom_is_solved(
     seed: int, n: int, N: int, levels: int, position_rows: bool, room: float
 ) -> None:
-    """If U_{i−1} is almost the only feasible point, rounding errors can look like a contradiction: of 49,095
-    such hierarchies an earlier explicit route left 210 without a point."""
+    """If U_{i−1} is almost the only feasible point, rounding errors can make the rows look contradictory. An
+    earlier explicit route found no point for 210 of 49,095 such hierarchies."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
     explicit = hierarchy.solve("explicit")
     assert all(solution.fallback == "solve" for solution in explicit)

@@ -75,7 +75,8 @@ def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
 
 @dataclass(frozen=True)
 class Near:
-    """A submission in this process without a new one, for submissions that are wrong but do not misbehave."""
+    """Runs a submission in this process and starts no new process, for submissions that are wrong but do not
+    misbehave."""
 
     source: Source
 

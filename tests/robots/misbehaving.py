@@ -52,7 +52,7 @@ def descend() -> None:
 
 
 def chatter() -> str:
-    """Print to standard output, from Python and from below Python, and return an answer."""
+    """Print to standard output, with `print` and directly to file descriptor 1, and return an answer."""
     print("x" * 100_000)
     os.write(1, b"y" * 100_000)
     sys.stdout.flush()

@@ -28,7 +28,8 @@ INCREMENTAL = ("tdeosf", "hiqp", "himpc")
 
 
 def encoder_runs(controllers: Sequence[str]) -> tuple[Job, ...]:
-    """RT1 with the paper's encoder, with which the roughness of the torque differs between controllers."""
+    """Returns the runs of RT1 with the paper's encoder, one per controller: the roughness of the torque
+    differs between them."""
     return tuple(rt1(controller, *ENCODER) for controller in controllers)
 
 
