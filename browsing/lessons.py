@@ -52,7 +52,7 @@ def predict(page: Page, prediction: Prediction) -> None:
 
 def hurry(page: Page) -> None:
     """Speeds up the run as far as possible."""
-    box = row(page, "As fast as it goes").get_by_role("checkbox")
+    box = row(page, "As fast as possible").get_by_role("checkbox")
     if not box.is_checked():
         box.click()
         page.wait_for_timeout(BETWEEN)

@@ -215,7 +215,7 @@ def test_the_check_judges_challenges() -> None:
     challenge = replace(challenge, duration=0.2, events=MOVE)
     assert faults(lesson_with(aside(SMALL), challenge)) == [
         "it does not pass: Close.",
-        "levels.position.enabled=false is none of its knobs, or out of their range",
+        "levels.position.enabled=false is not one of its knobs, or is outside the knob's range",
     ]
     easy = replace(challenge, goals=(replace(goal, bound=1e3),), solutions=(("horizon=1",), ("horizon=2",)))
     assert faults(lesson_with(aside(SMALL), easy)) == ["it passes with its first settings"]

@@ -213,6 +213,6 @@ def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
     assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 1)
     expect(page.get_by_text("Later knots are held")).to_be_hidden()
     learner.send(Post(Set("controller", "osf")))
-    expect(page.get_by_text("osf solves no such QP")).to_be_visible()
+    expect(page.get_by_text("osf does not solve such QPs")).to_be_visible()
     learner.send(InsideRequest(plane=(7, 9)))  # joints that the robot does not have
     assert eventually(page, lambda: learner.failure is None and learner.status is not None)
