@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
+    from types import FrameType
 
 PATIENCE = 4.5
 """Time, s, that a command has to end by itself."""
 _AGAIN = 0.05  # s after which a swallowed interrupt is raised again
+_LATER = 0.02  # s after which it is raised if that happens while the swallowed one is still being reported
 
 Interrupted = threading.Event
 """Set once a signal has arrived."""
@@ -34,9 +36,11 @@ def interruptible() -> Iterator[Interrupted]:
         yield interrupted
         return
 
-    def interrupt(*_: object) -> None:
+    def interrupt(_: int, frame: FrameType | None) -> None:
         interrupted.set()
-        raise KeyboardInterrupt
+        if frame is None or frame.f_code is not unraisable.__code__:
+            raise KeyboardInterrupt
+        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would report an exception raised in its hook
 
     def unraisable(report: UnraisableHookArgs) -> None:
         if interrupted.is_set():

@@ -85,7 +85,7 @@ def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.Monk
             # this message comes from the page itself and not from a press
             page.write(told, value=f"{AWAKE}\nErrors")
             page.write(before, value="Pause")
-            assert eventually(lambda: any("replaced" in body for _, body in page.notices))
+            assert eventually(lambda: any("was rebuilt" in body for _, body in page.notices))
             assert len(page.notices) == said + 1
     finally:
         server.close()

@@ -90,4 +90,4 @@ def test_a_file_for_what_was_replaced_is_told(server: PageServer) -> None:
     with Wire(server.link) as page:
         assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)
         page.say(_messages.FileTransferStartUpload("gone", "one", "robot.urdf", "text/xml", 1, 10))
-        assert eventually(lambda: any("replaced" in body for _, body in page.notices), LONG)
+        assert eventually(lambda: any("was rebuilt" in body for _, body in page.notices), LONG)

@@ -106,12 +106,15 @@ def test_ctrl_c_ends_it(phase: str, tmp_path: Path) -> None:
     assert wait_until(lambda: not any(child.is_running() for child in children), LONG)
 
 
-def test_what_swallows_an_interrupt_is_interrupted_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("again", [0.05, 1e-6])
+def test_what_swallows_an_interrupt_is_interrupted_again(again: float) -> None:
     """A callback that a library calls loses the exception; a library that continues nevertheless is
-    interrupted again."""
-    code = """
+    interrupted again, also if the alarm comes before Python's hook for lost exceptions has returned."""
+    code = f"""
 import ctypes, time
+from app.commands import interrupts
 from app.commands.interrupts import interruptible
+interrupts._AGAIN = {again}
 compare = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
 numbers = (ctypes.c_int * 1000)()
 

@@ -209,6 +209,10 @@ READER_ROWS = (
         EE, (15, 25), ("limits.velocity_scale=0.5",), (6, 9),
     ),
     Intervention(
+        "seeing-ahead/3", "It drifts most at the edge of the arm's reach, 20 mm,",
+        EE, (19.9, 20.2), ("peak=[0.3,-0.5]",), (3.7, 4.3),
+    ),
+    Intervention(
         "seeing-ahead/3", "with a near one by 4 mm", EE, (19, 21), ("peak=[0.3,-0.5]",), (3.7, 4.3),
     ),
     Intervention(

@@ -141,7 +141,9 @@ QUOTED = (
     Quoted("how-far-ahead/1", "about half the error", _ratio(HAND, "rms"), 0.4, 0.6),
     Quoted("deadlines/0", "The error more than doubles", _ratio(HAND), 2.0, 2.5),
     Quoted("deadlines/1", "The same error", _ratio(HAND), 0.95, 1.05),
-    Quoted("deadlines/2", "the same to the third digit", _ratio(HAND), 0.995, 1.005),
+    Quoted(
+        "deadlines/2", "errs as little as the one in time, to the third digit", _ratio(HAND), 0.995, 1.005
+    ),
     Quoted("sensors-are-coarse/0", "the motion needs 3 % of the torque limit", _of(TORQUE), 2.5, 3.5, None),
     Quoted("sensors-are-coarse/1", "a quarter of the noise", _ratio(ROUGH, "rms"), 0.22, 0.28),
     Quoted("sensors-are-coarse/1", "grows by little more than half", _ratio(HAND), 1.5, 1.65),

@@ -70,7 +70,9 @@ def test_a_code_tells_an_own_task_by_its_content(file: str) -> None:
     opened = decode(code).run
     assert file not in str(opened)
     assert settings_of(replace(opened, tasks=(file,))) == settings_of(spec)
-    with pytest.raises(InputError, match=r"this was made with a user's file of a task, mine\.py@.*add --task mine\.py"):
+    with pytest.raises(
+        InputError, match=r"this was made with a user's file of a task, mine\.py@.*add --task mine\.py"
+    ):
         opened.prepared()
     Path(file).write_text(Path(file).read_text() + "# changed\n")
     with pytest.raises(InputError, match="its content is another"):

@@ -88,7 +88,6 @@ GIVEN: dict[str, tuple[str, ...]] = {
     # Counts of torques, or computed numbers.
     "deadlines/0": ("2",),
     "deadlines/1": ("half", "half", "1", "8"),  # and the paper's period and step time
-    "deadlines/2": ("half",),
     # Numbers of the papers, which are tested below.
     "how-far-ahead/0": ("17", "4", "third", "1.2"),
     "how-strict-is-strict/1": ("tenth", "3", "1"),
