@@ -67,7 +67,7 @@ class CollisionModel:
     def __str__(self) -> str:
         """One line for the import report."""
         if not self.solids:
-            return "the robot has no shape, so it touches nothing"
+            return "the robot has no shape: it touches nothing"
         words = {
             "collision": "{} collision shape(s) of the URDF",
             "hull": "{} convex hull(s) of visual shapes",

@@ -9,7 +9,7 @@ from himpc.telemetry import Layout
 
 class Places(NamedTuple):
     """The indices of the fields that a session writes into a row; values that need the plant's M are
-    adjacent, and so are depth and force of a contact."""
+    adjacent; depth and force of a contact are adjacent, too."""
 
     t: int
     late: int

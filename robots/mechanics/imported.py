@@ -21,7 +21,7 @@ def with_collision(robot: Robot, meshes: bool = True) -> Robot:
         found = collision_model(robot, collision_solids(robot, meshes))
         text = str(found)
     except (ValueError, RuntimeError):
-        found, text = CollisionModel(), "MuJoCo cannot use the robot's shapes, so it touches nothing"
+        found, text = CollisionModel(), "MuJoCo cannot use the robot's shapes: the robot touches nothing"
     if not meshes:
         text += "; reading its meshes takes too long or fails"
     finding = Finding("note", "contacts", text)

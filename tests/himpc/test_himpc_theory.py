@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from himpc.references import Caps, Target
@@ -67,6 +67,7 @@ def test_a_cascade_is_solved_where_numba_is_not_installed() -> None:
 
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.integers(1, 12))
 @settings(max_examples=20)
+@example(2453302, False, 1)  # a small component beside large ones
 def test_the_compiled_filter_of_a_target_is_the_printed_one(seed: int, rotates: bool, N: int) -> None:
     """Both filters give the same motion up to rounding, and come to rest at the same time."""
     rng = np.random.default_rng(seed)
@@ -82,6 +83,7 @@ def test_the_compiled_filter_of_a_target_is_the_printed_one(seed: int, rotates: 
             compiled.move(goal)
         expected, found = (target.preview(k * T_S, T_S, N) for target in (printed, compiled))
         for one, other in zip(expected, found, strict=True):
-            np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9)
+            size = max(1.0, float(np.abs(one).max()))
+            np.testing.assert_allclose(other, one, rtol=0.0, atol=1e-8 * size)
         moved = max(moved, float(np.abs(expected.velocity).max()))
     assert moved > 1e-3

@@ -216,7 +216,7 @@ def test_a_grade_counts_the_memory_of_all_its_processes(now: View) -> None:
         ("import time; time.sleep(100)", "one call takes longer than 0.5 s"),
         ("import os; os.closerange(3, 50)", "leave that out"),
         ("import os; os._exit(0)", "ends its own process (exit code 0)"),
-        ("return 'abc'", "it returned a str where numbers are needed"),
+        ("return 'abc'", "it returned a str instead of numbers"),
         ("return None", "it returned nothing"),
         ("now.q[0] = 1", "read-only"),
         ("now.q = 1", "read-only"),
