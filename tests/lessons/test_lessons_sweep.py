@@ -195,7 +195,7 @@ def test_a_process_that_dies_costs_its_own_item_only() -> None:
     outcomes = dict(on_cores(dies_at_one, [0, 1, 2, 3]))
     assert [outcomes[place] for place in (0, 2, 3)] == [0, 4, 9]
     assert isinstance(outcomes[1], FailedJob)
-    assert "died" in outcomes[1].reason
+    assert "process ended" in outcomes[1].reason
 
 
 def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
