@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.limits.position import POSITION
 from himpc.limits.rows import Rows
+from himpc.limits.sequences import clamped, steps, viable
 from himpc.limits.torque import TORQUE
 from himpc.limits.velocity import VELOCITY
 from himpc.limits.yielding import MET, closest_to_rest
@@ -38,13 +39,13 @@ def braking(rows: Rows) -> Array:
     if not _joint_by_joint(rows):
         return closest_to_rest(rows, rest)
     w = _walk(rows, rest)
-    U = _steps(_steps(w))
+    U = steps(steps(w))
     if len(rows.constraints) == 3:
         for joint in np.flatnonzero(missed(rows, U).max(axis=0) > MET).tolist():
             found = _closest(rows, joint, rest[:, joint])
             if found is not None:
                 w[:, joint] = found
-        U = _steps(_steps(w))
+        U = steps(steps(w))
     return U
 
 
@@ -79,23 +80,16 @@ def _walk(rows: Rows, rest: Array) -> Array:
     """w that meets torque and velocity rows, (N, n); of position rows it sees the next one only."""
     N = len(rest)
     least, most = rows.lower[:N], rows.upper[:N]
-    low, high = rows.lower[N : 2 * N].copy(), rows.upper[N : 2 * N].copy()
-    for j in range(N - 2, -1, -1):
-        behind_low, behind_high = low[j + 1] - most[j + 1], high[j + 1] - least[j + 1]
-        low[j], high[j] = _within(behind_low, low[j], high[j]), _within(behind_high, low[j], high[j])
+    low, high = viable(rows.lower[N : 2 * N], rows.upper[N : 2 * N], least, most)
     w, before, position = np.empty_like(rest), np.zeros(rest.shape[1]), np.zeros(rest.shape[1])
     for j in range(N):
-        wanted = _within(rest[j], low[j], high[j])
+        wanted = clamped(rest[j], low[j], high[j])
         if len(rows.constraints) == 3 and j + 1 < N:
             row = 2 * N + j + 1
-            wanted = _within(wanted, rows.lower[row] - position, rows.upper[row] - position)
-        before = w[j] = _within(wanted, before + least[j], before + most[j])
+            wanted = clamped(wanted, rows.lower[row] - position, rows.upper[row] - position)
+        before = w[j] = clamped(wanted, before + least[j], before + most[j])
         position = position + before
     return w
-
-
-def _within(x: Array, low: Array, high: Array) -> Array:
-    return np.minimum(np.maximum(x, low), high)
 
 
 def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
@@ -116,8 +110,3 @@ def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
     for j in range(N):
         before = w[j] = min(max(found.x[j], before + rows.lower[j, joint]), before + rows.upper[j, joint])
     return w
-
-
-def _steps(x: Array) -> Array:
-    """x_j − x_{j−1}, where x_{−1} = 0."""
-    return np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1])))

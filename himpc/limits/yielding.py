@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.limits.rows import Rows
+from himpc.limits.sequences import clamped, steps, viable
 from himpc.limits.torque import TORQUE
 from himpc.limits.torque_rate import TORQUE_RATE
 from himpc.limits.velocity import summed_twice
@@ -57,7 +58,7 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
     first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds within its iterations,
     rows of torque and of its rate hold if any increments meet them, see `_within`.
     """
-    U = _steps(_steps(rest))
+    U = steps(steps(rest))
     for group in groups(rows, rest.shape[1]):
         part = _part(rows, group)
         if len(part.A) > _ROWS:
@@ -160,7 +161,7 @@ def _within(rows: Rows, wanted: Array) -> Array:
     """Increments whose torques are close to `wanted`, (N, n), and that meet the rows of torque and of its
     rate whenever any increments do; those of torque always.
 
-    Going back from the last knot, the torques from which all later rows can still be met are an interval.
+    See `viable`.
     """
     N = len(wanted)
     blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}
@@ -171,19 +172,9 @@ def _within(rows: Rows, wanted: Array) -> Array:
     lowest, highest = -infinite, infinite
     if TORQUE in blocks:
         lowest, highest = rows.lower[blocks[TORQUE]], rows.upper[blocks[TORQUE]]
-    low, high = lowest.copy(), highest.copy()
-    for j in range(N - 2, -1, -1):
-        behind_low, behind_high = low[j + 1] - most[j + 1], high[j + 1] - least[j + 1]
-        low[j] = np.minimum(np.maximum(behind_low, lowest[j]), highest[j])
-        high[j] = np.minimum(np.maximum(behind_high, lowest[j]), highest[j])
+    low, high = viable(lowest, highest, least, most)
     torque, before = np.empty_like(wanted), np.zeros(wanted.shape[1])
     for j in range(N):
-        near = np.minimum(np.maximum(wanted[j], low[j]), high[j])
-        near = np.minimum(np.maximum(near, before + least[j]), before + most[j])
-        before = torque[j] = np.minimum(np.maximum(near, lowest[j]), highest[j])
-    return _steps(torque)
-
-
-def _steps(x: Array) -> Array:
-    """x_j − x_{j−1}, where x_{−1} = 0."""
-    return np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1])))
+        near = clamped(clamped(wanted[j], low[j], high[j]), before + least[j], before + most[j])
+        before = torque[j] = clamped(near, lowest[j], highest[j])
+    return steps(torque)
