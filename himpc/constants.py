@@ -6,6 +6,13 @@ RANK_TOLERANCE = 1e-10
 RETURN_RATE = 5.0
 """1/s: a joint beyond its limit must return at this rate times the excess."""
 
+WITHIN = 0.25
+"""m: pairs of links or objects that are farther apart have no row."""
+FADE = 0.05
+"""m: over this distance before WITHIN a bound loosens to none, so that a pair that enters does not jump."""
+RETREAT = 0.2
+"""m/s: the fastest retreat that a row of a distance asks for."""
+
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 """Bits of telemetry's `at_bound`: which limits bind. Velocity rows that impose a position limit count as
 position."""

@@ -17,7 +17,7 @@ from robots.spheres import covering_spheres
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Point = tuple[float, float, float]
-FLOOR, BALL, BOX = range(3)
+FLOOR, BALL, BOX, CAPSULE = range(4)
 """Kinds of shapes."""
 
 
@@ -66,24 +66,27 @@ def _check(name: str, numbers: tuple[float, ...], *sizes: float) -> None:
 
 
 class Surroundings(NamedTuple):
-    """Arrays of the spheres s of a robot and of the shapes o that it must not touch.
+    """Arrays of the capsules s of a robot (spheres, if their spans are 0) and of the shapes o that it must
+    not touch.
 
     Attributes:
-        links: names of the links that carry the spheres.
-        joint: (S,) index of the joint that carries each sphere. centre: (S, 3) m in that joint's axes.
-            radius: (S,) m.
+        links: names of the links that carry the capsules.
+        joint: (S,) index of the joint that carries each capsule. centre: (S, 3) m, the start of its segment
+            in that joint's axes. span: (S, 3) m, from the start to the end. radius: (S,) m.
         names: names of the shapes.
-        kind: (O,) FLOOR, BALL or BOX.
+        kind: (O,) FLOOR, BALL, BOX or CAPSULE.
         carrier: (O,) index of the joint that carries each shape, 0 for the world.
         turn: (O, 3, 3) and middle: (O, 3) m, the shape's axes and middle in its carrier's; for a floor a
-            point of its surface.
-        half: (O, 3) m, half the edges of a box; a ball's radius comes first.
+            point of its surface, for a capsule the start of its segment.
+        half: (O, 3) m, half the edges of a box; a ball's radius comes first; a capsule's segment in its
+            carrier's axes. thickness: (O,) m, a capsule's radius.
         meets: (O, S) whether the distance of a pair is checked.
     """
 
     links: tuple[str, ...]
     joint: Indices
     centre: Array
+    span: Array
     radius: Array
     names: tuple[str, ...]
     kind: Indices
@@ -91,6 +94,7 @@ class Surroundings(NamedTuple):
     turn: Array
     middle: Array
     half: Array
+    thickness: Array
     meets: NDArray[np.bool_]
 
 
@@ -120,6 +124,7 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: 
         links=tuple(sphere.link for sphere in spheres),
         joint=joint,
         centre=np.array(centre),
+        span=np.zeros((len(spheres), 3)),
         radius=radius,
         names=tuple(shape.name for shape in shapes),
         kind=np.array([shape.kind for shape in shapes], np.intp),
@@ -127,6 +132,7 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: 
         turn=np.array([pin.rpy.rpyToMatrix(0.0, 0.0, shape.yaw) for shape in shapes]).reshape(-1, 3, 3),
         middle=np.array([shape.middle for shape in shapes]).reshape(-1, 3),
         half=np.array([shape.half for shape in shapes]).reshape(-1, 3),
+        thickness=np.zeros(len(shapes)),
         meets=np.array([shape.meets for shape in shapes], np.bool_).reshape(-1, len(spheres)),
     )
 

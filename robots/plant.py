@@ -239,6 +239,12 @@ class Plant:
             return self._data.qpos[self.n :].reshape(-1, 7).copy()
         return np.array([thing.pose for thing in self.world if thing.free]).reshape(-1, 7)
 
+    def object_velocities(self) -> np.ndarray:
+        """(k, 3) m/s: the velocities of the middles of the free objects, world axes, in their order."""
+        if self.settings.contacts:
+            return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
+        return np.zeros((sum(thing.free for thing in self.world), 3))
+
     # ---------------------------------------------------------------- inside
 
     def _advance(self, h: float) -> None:

@@ -19,10 +19,15 @@ from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
+from himpc.limits.distance import Near
+from himpc.limits.stall import PROGRESS, going, slowed, stalled
 from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
+from himpc.references.outlook import observed_by
 from himpc.stack import DAMPING_LEVEL, about
+from himpc.tasks import Damping
+from himpc.tick.distances import Distances
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 
@@ -54,6 +59,7 @@ class HIMPC(TorqueController):
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
+        self._errors: Array | None = None
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
@@ -88,8 +94,10 @@ class HIMPC(TorqueController):
         # A joint's torque cannot exceed its limit. A larger reading is wrong and must not be the start of a
         # bound.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
-        self._settings = settings
+        self._settings, self._errors = settings, None
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
+        explicit = settings.route == "explicit"
+        self._distances = Distances(self.robot) if explicit and settings.limits.avoidance.on else None
         self.kernel = self._compile() if settings.route == "compiled" else None
 
     def _compile(self) -> CompiledTick:
@@ -124,19 +132,22 @@ class HIMPC(TorqueController):
         memory = self._memory or Memory.start(q, v, T_s)
         state = JointState(q, v, (v - memory.v) / memory.period)
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, T_s)
+        limits = self._slowed(previews)
         values: dict[str, Array] = {}
         errors: dict[str, Array] = {}
         with np.errstate(all="ignore"):
             if self._off:
                 here = Configuration(self.robot, self._data, q, v, previews=previews)
                 measure(self._off, here, previews, values, errors)
-            rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, self._limits, N, T_s)
+            near = self._near(q, previews)
+            rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, limits, N, T_s, near)
             found = self._search(PeriodState(state, memory, previews, rows, values, errors))
         if found is None:
             return self._hold(q, started)
         solutions, predicted_q = found.solutions, found.predicted_q
         first = solutions[-1].U[0] if solutions else 0.0
-        tau = np.minimum(np.maximum(self._tau_0 + first, self._limits.tau_lower), self._limits.tau_upper)
+        self._errors = np.array([float(np.linalg.norm(errors[task.name])) for task in self._form.tasks])
+        tau = np.minimum(np.maximum(self._tau_0 + first, limits.tau_lower), limits.tau_upper)
         if not usable(tau):
             return self._hold(q, started)
         by_name = {solution.name: solution for solution in solutions}
@@ -145,7 +156,7 @@ class HIMPC(TorqueController):
         plan = Plan(
             tau=tau,
             tau_0=self._tau_0,
-            limits=self._limits,
+            limits=limits,
             step_us=(perf_counter_ns() - started) / 1e3,
             unsolved=sum(solution.fallback != "solve" for solution in solutions),
             find_evidence=lambda: evidence,
@@ -164,11 +175,38 @@ class HIMPC(TorqueController):
             for place, level in enumerate(self._form.levels):
                 tick.fade(place, self._faded(level))
 
-        plan = tick.step(q, v, previews, self._tau_0, self._limits, started)
+        plan = tick.step(q, v, previews, self._tau_0, self._slowed(previews), started)
         if plan is None:
             return self._hold(q, started)
+        if self._settings.limits.avoidance.on:
+            self._errors = tick.error_lengths(self._form.tasks)
         self._tau_0 = plan.tau
         return plan
+
+    def _slowed(self, previews: Mapping[str, Preview]) -> LimitsInForce:
+        """The limits in force, with lower velocities while the robot is stalled, see `stalled`."""
+        avoidance = self._settings.limits.avoidance
+        distances = self._distances if self.kernel is None else self.kernel.distances
+        if distances is None:
+            return self._limits
+        if self._errors is None:
+            self._stall = going(len(self._form.tasks))
+            return self._limits
+        moves = distances.moves or any(
+            float(np.abs(previews[task.name].velocity[0]).max()) > PROGRESS
+            for task in self._form.tasks
+            if not isinstance(task, Damping)
+        )
+        room = distances.nearest - avoidance.d_safe
+        self._stall = stalled(self._stall, self._errors, moves, room, self._settings.T_s)
+        return slowed(self._limits, self._stall)
+
+    def _near(self, q: Array, previews: Mapping[str, Preview]) -> Near | None:
+        """The nearest pairs, if the explicit route keeps distances."""
+        if self._distances is None:
+            return None
+        self._distances.observe(observed_by(previews))
+        return self._distances.at(q)
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""
@@ -227,6 +265,8 @@ class HIMPC(TorqueController):
             before = form.jacobian(past)[0] @ memory.v
         error = measure(form.tasks, configuration, previews, values, errors)
         asked = form.asked(configuration, previews)
+        pull = self._settings.limits.avoidance.largest_error
+        error = form.pulling(error, pull) if math.isfinite(pull) else error
         free = form.free(error, x_dot, (x_dot - before) / memory.period, asked, configuration.horizon)
         if not math.isfinite(float(free.sum())):
             return None, x_dot

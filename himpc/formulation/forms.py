@@ -22,6 +22,8 @@ from robots import InputError, Robot
 
 Array = NDArray[np.float64]
 
+_TINY = 1e-300
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LevelForm:
@@ -125,6 +127,14 @@ class StackForm:
                 if found is not preview:
                     asked[task.name] = found
         return {**previews, **asked} if asked else previews
+
+    def pulling(self, error: Array, pull: float) -> Array:
+        """x̃ on which the tasks act, (m,): a task's error that is longer than `pull` is shortened to it."""
+        ends = np.cumsum(self.sizes)
+        parts = np.split(error, ends[:-1])
+        return np.concatenate(
+            [part * min(1.0, pull / max(float(np.linalg.norm(part)), _TINY)) for part in parts]
+        )
 
     def free(
         self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.geometry import Placed, geometry, placed
-from himpc.htmpc.kernel.clearance import near
+from himpc.tick.kernel.near import near
 from robots import Robot
 from robots.collision import Obstacle, surroundings
 
@@ -75,9 +75,10 @@ class CollisionModel:
         distance, normal = np.empty(most + 1), np.empty((most + 1, 3))
         gradient = np.empty((most if gradients else 0, tree.moves.shape[1]))
         count = near(
-            *(*where, tree.is_revolute, tree.moves, around.joint, around.centre, around.radius, around.kind),
-            *(around.carrier, around.turn, around.middle, around.half, around.meets, within),
-            *(np.empty((K, S, 3)), knot, sphere, shape, distance, normal, gradient),
+            *(*where, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
+            *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
+            *(around.thickness, around.meets, within, np.empty((K, S, 3)), np.empty((K, S, 3))),
+            *(knot, sphere, shape, np.empty(most + 1), distance, normal, gradient),
         )
         found = (knot[:count], distance[:count], gradient[:count], sphere[:count], shape[:count])
         return Clearances(*found, around.links, around.names)

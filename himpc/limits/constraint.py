@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.limits.limits import Limits, LimitsInForce
 from himpc.prediction.joint import JointState
+
+if TYPE_CHECKING:
+    from himpc.limits.distance import Near
 
 Array = NDArray[np.float64]
 
@@ -26,6 +29,7 @@ class Moment(NamedTuple):
         force: their values.
         N: horizon.
         T_s: control period, s.
+        near: the nearest pairs, if distances are kept.
     """
 
     state: JointState
@@ -35,6 +39,7 @@ class Moment(NamedTuple):
     force: LimitsInForce
     N: int
     T_s: float
+    near: Near | None = None
 
 
 class Directions(NamedTuple):

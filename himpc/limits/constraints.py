@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from himpc.limits.constraint import Constraint
+from himpc.limits.distance import DISTANCE
 from himpc.limits.limits import Limits
 from himpc.limits.position import POSITION
 from himpc.limits.torque import TORQUE
@@ -14,6 +15,7 @@ CONSTRAINTS: tuple[Constraint, ...] = (
     VELOCITY,
     POSITION,
     TORQUE_RATE,
+    DISTANCE,
 )
 """In the order of their rows. Place k has bit 2ᵏ in telemetry's `at_bound`."""
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.limits.avoidance import Avoidance
 from robots import InputError, Robot
 from robots.ranges import Range, check_fields
 
@@ -32,6 +33,7 @@ class Limits:
             circle with rate 0, which is (32e) as printed, by 0.2 % with 15 (`himpc-lab reproduce
             himpc-limits`).
         torque_rate: N·m/s; largest change of each joint's torque per second; 0: not imposed.
+        avoidance: the distances that are kept.
     """
 
     torque: bool = True
@@ -41,6 +43,7 @@ class Limits:
     velocity_scale: Annotated[float, Range(0.0, above=True)] = 1.0
     velocity_approach: Annotated[float, Range(0.0, 1e4)] = 15.0
     torque_rate: Annotated[float, Range(0.0, 1e5)] = 0.0
+    avoidance: Avoidance = field(default_factory=Avoidance)
 
     def __post_init__(self) -> None:
         check_fields(self, "limits.")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.limits.constraint import Constraint, Directions, Moment
 from himpc.limits.constraints import bit_of, imposed
+from himpc.limits.distance import Near
 from himpc.limits.limits import Limits, LimitsInForce
 from himpc.limits.position import POSITION
 from himpc.limits.velocity import VELOCITY
@@ -107,7 +108,14 @@ def profiles(N: int, constraints: tuple[Constraint, ...]) -> Array:
 
 
 def build_rows(
-    state: JointState, tau_0: Array, M_bar: Array, limits: Limits, force: LimitsInForce, N: int, T_s: float
+    state: JointState,
+    tau_0: Array,
+    M_bar: Array,
+    limits: Limits,
+    force: LimitsInForce,
+    N: int,
+    T_s: float,
+    near: Near | None = None,
 ) -> Rows:
     """The bounds of all constraints that `limits` impose, at every knot.
 
@@ -116,9 +124,9 @@ def build_rows(
     influence them, and nothing foresees the distance that stopping takes.
 
     Args:
-        state, tau_0, M_bar, limits, force, N, T_s: see `Moment`.
+        state, tau_0, M_bar, limits, force, N, T_s, near: see `Moment`.
     """
-    now = Moment(state, tau_0, M_bar, limits, force, N, T_s)
+    now = Moment(state, tau_0, M_bar, limits, force, N, T_s, near)
     constraints = imposed(limits)
     blocks = [each.bounds(now) for each in constraints]
     directions = tuple(block.directions for block in blocks)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import final
 
+from himpc.references.observed import NOTHING, Observed
 from himpc.references.preview import Preview, Reference
 
 
@@ -17,12 +18,21 @@ class Outlook(Mapping[str, Preview]):
         references: by the names of their tasks.
         t: s, now.
         T_s, N: period (s) and knots of the samples.
+        observed: the objects around the robot.
     """
 
-    __slots__ = ("N", "T_s", "_found", "references", "t")
+    __slots__ = ("N", "T_s", "_found", "observed", "references", "t")
 
-    def __init__(self, references: Mapping[str, Reference], t: float, T_s: float, N: int) -> None:
+    def __init__(
+        self,
+        references: Mapping[str, Reference],
+        t: float,
+        T_s: float,
+        N: int,
+        observed: Observed = NOTHING,
+    ) -> None:
         self.references, self.t, self.T_s, self.N = references, t, T_s, N
+        self.observed = observed
         self._found: dict[str, Preview] = {}
 
     def __getitem__(self, name: str) -> Preview:
@@ -36,3 +46,8 @@ class Outlook(Mapping[str, Preview]):
 
     def __len__(self) -> int:
         return len(self.references)
+
+
+def observed_by(previews: Mapping[str, Preview]) -> Observed:
+    """The objects that come with previews; none unless they are an `Outlook`."""
+    return previews.observed if isinstance(previews, Outlook) else NOTHING

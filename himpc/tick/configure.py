@@ -21,6 +21,7 @@ from himpc.tasks.frame import AXES, FrameTask
 from himpc.tasks.joints import OnJoints
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import PULL
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
 from himpc.tick.tables import LevelTable, given_of, sizes, write_effects, write_levels
@@ -67,6 +68,7 @@ def arena_for(
     arena.i["bit"][:] = np.repeat([bit_of(each) for each in constraints], N)
     f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
     f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
+    f["scalars"][PULL] = limits.avoidance.largest_error
     f["nothing"][:] = np.nan
     arena.i["sizes"][9] = {"viability": VIABILITY, "paper": PAPER, "off": OFF}[limits.position]
     return arena, spans

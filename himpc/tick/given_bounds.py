@@ -10,26 +10,39 @@ import numpy as np
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.constraint import Constraint, Directions, Moment
+from himpc.limits.distance import DISTANCE
 from himpc.prediction.joint import JointState
+from himpc.references.observed import Observed
+from himpc.tick.distances import Distances
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD
 from himpc.tick.tables import given_of
+from robots import Robot
 
 
 class GivenBounds:
-    """The constraints that `given_of` names. Their bounds are in the arena before levels are solved."""
+    """The constraints that `given_of` names. Their bounds are in the arena before levels are solved. Those of
+    distances are computed by the kernel, from objects that it does not hold.
 
-    def __init__(self, arena: Arena, settings: Settings, constraints: Sequence[Constraint]) -> None:
+    Attributes:
+        distances: the pairs whose distances are kept; None if none are.
+    """
+
+    def __init__(
+        self, robot: Robot, arena: Arena, settings: Settings, constraints: Sequence[Constraint]
+    ) -> None:
         self._arena, self._settings = arena, settings
         self._given = given_of(constraints)
         self._known = len(constraints) - len(self._given)
+        self.distances = Distances(robot) if DISTANCE in constraints else None
 
-    def write(self, rows: Rows, force: LimitsInForce) -> Rows:
+    def write(self, rows: Rows, force: LimitsInForce, observed: Observed) -> Rows:
         """Writes bounds and directions of this tick; returns the rows with the directions.
 
         Args:
             rows: with the constraints of the arena.
             force: the limits in force. The arena holds the measured state and what is remembered.
+            observed: the objects around the robot.
         """
         if not self._given:
             return rows
@@ -38,6 +51,10 @@ class GivenBounds:
         now = Moment(state, f["tau_0"], f["M_bar"], settings.limits, force, N, settings.T_s)
         directions: list[Directions | None] = [None] * self._known
         for place, constraint in enumerate(self._given):
+            if constraint is DISTANCE and self.distances is not None:
+                self.distances.observe(observed)
+                directions.append(self.distances.write(self._arena, place, settings.limits))
+                continue
             block = constraint.bounds(now)
             start = (self._known + place) * N
             f["lower"][start : start + N], f["upper"][start : start + N] = block.lower, block.upper

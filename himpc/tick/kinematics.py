@@ -11,7 +11,7 @@ from himpc.formulation.forms import StackForm
 from himpc.references import Preview
 from himpc.tasks import Damping, FrameOrientation, Task
 from himpc.tick.configure import write_tasks
-from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.linearize import linearize
 from robots import Robot
 
@@ -44,6 +44,7 @@ class Kinematics:
         self._solved = sum(form.sizes)
         self._arena, self._spans = write_tasks(robot, (*form.tasks, *off), counts, _NUDGES, self._solved)
         self._arena.f["M_bar"][:], self._arena.f["scalars"][:], self._arena.i["known"][0] = 1.0, 1.0, 1
+        self._arena.f["scalars"][PULL] = np.inf
 
     def at(self, q: Array, v: Array, h: float, previews: Mapping[str, Preview]) -> Seen:
         """Returns the kinematics of the tasks at a state.

@@ -10,7 +10,7 @@ from himpc.cascade.level import NO_ROWS, ActiveRows, Fallback, LevelProblem, Lev
 from himpc.limits.rows import Rows
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.kernel.arena import Arena, Snapshot
-from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.tables import LevelTable, budget_of, given_of, sizes, write_effects, write_levels
@@ -54,6 +54,7 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
             f["direction"][place] = directions.D
     arena.i["bit"][:] = rows.bits
     f["M_bar"][:], f["scalars"][:] = 1.0, 1.0
+    f["scalars"][PULL] = np.inf
     f["limits"][0], f["limits"][1], f["budget"][:] = -np.inf, np.inf, budget_of(arena)
     return arena
 

@@ -16,9 +16,11 @@ from himpc.limits import LimitsInForce, Rows
 from himpc.limits.constraints import imposed
 from himpc.plan import AtOnce, Evidence, Plan
 from himpc.references import Outlook, Preview, Reference, Target
+from himpc.references.outlook import observed_by
 from himpc.tasks import Damping, Task
 from himpc.telemetry import Layout
 from himpc.tick.configure import arena_for, write_curve, write_limits, write_preview
+from himpc.tick.distances import Distances
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
@@ -62,7 +64,7 @@ class CompiledTick:
         self._given = GivenRows(robot, self.arena, self._spans)
         constraints, f = imposed(settings.limits), self.arena.f
         self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
-        self._given_bounds = GivenBounds(self.arena, settings, constraints)
+        self._given_bounds = GivenBounds(robot, self.arena, settings, constraints)
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
@@ -115,6 +117,17 @@ class CompiledTick:
             f["path"].copy(),
             {level.name: level for level in levels},
         )
+
+    @property
+    def distances(self) -> Distances | None:
+        """The pairs whose distances are kept; None if none are."""
+        return self._given_bounds.distances
+
+    def error_lengths(self, tasks: Sequence[Task]) -> Array:
+        """The length of the last error of each of the first tasks, m or rad."""
+        error = self.arena.f["error"]
+        spans = (span for _, _, span in self._spans[: len(tasks)])
+        return np.array([math.sqrt(error[span].dot(error[span])) for span in spans])
 
     def fade(self, place: int, share: float | Array) -> None:
         """Multiplies a level's √Q by `share`, one number or one per row."""
@@ -171,7 +184,7 @@ class CompiledTick:
             else:
                 before = None
             self._given.write(previews)
-            self._rows = self._given_bounds.write(self._rows, limits)
+            self._rows = self._given_bounds.write(self._rows, limits, observed_by(previews))
             if not linearize(*arena.arguments):
                 return None
             self._looked = True

@@ -13,6 +13,7 @@ from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Binding, Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
+from himpc.references.observed import NOTHING
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of
@@ -22,6 +23,7 @@ from lessons.session.bumpless import Handover, settled
 from lessons.session.controllers import controller_of
 from lessons.session.deadline import DelayedTorque
 from lessons.session.leak import at_once, dynamic_leak
+from lessons.session.observed import observed
 from lessons.session.places import Places
 from lessons.session.session import LOST_SPEED, Session
 from lessons.session.targets import carried, kept, move_target, target_at
@@ -103,6 +105,8 @@ class TorqueSession(Session):
         self._push_until = math.inf
         self._ticks = 0
         self._outbox = DelayedTorque()
+        moves = any(thing.free for thing in self.plant.world)
+        self._around = None if moves else observed(self.plant)
         self._hands = self._first_hands()
         self._truth = (math.nan, math.nan, math.nan)
 
@@ -208,7 +212,10 @@ class TorqueSession(Session):
         T_s, t = settings.T_s, plant.t
         q, v = plant.q, plant.v
         state = plant.measure(T_s)
-        ahead = Outlook(self.references, t, T_s, settings.horizon)
+        around = NOTHING
+        if settings.limits.avoidance.on:
+            around = self._around if self._around is not None else observed(plant)
+        ahead = Outlook(self.references, t, T_s, settings.horizon, around)
         self.controller = settled(self.controller)
         plan = self.controller.step(state.q, state.v, ahead, plant.tau)
         row, at = self._row, self._at

@@ -13,6 +13,7 @@ from himpc.catalog import CONTROLLERS, Route
 from himpc.controllers import Settings as ControllerSettings
 from himpc.formulation.settings import Horizon, Period
 from himpc.limits import Limits
+from himpc.limits.avoidance import Avoidance
 from himpc.qp import Solver
 from himpc.references import Reference
 from himpc.stack import Level, Stack
@@ -145,7 +146,7 @@ class TorqueSettings(SceneSettings):
         `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
-        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "nominal.KEY"; "plant.KEY". If a
+        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY"; "plant.KEY". If a
         value has one number per joint, a place 1 … n after it is the number of that joint: "M_bar.3"."""
         levels = tuple((level.name, tuple(task.name for task in level.tasks)) for level in self.levels)
         return _places(levels, type(self.options), tuple(self.controllers))
@@ -198,6 +199,10 @@ def _part(name: str) -> Callable[[TorqueSettings], Any]:
 
 def _with(name: str) -> Callable[[TorqueSettings, Any], TorqueSettings]:
     return lambda settings, part: replace(settings, **{name: part})
+
+
+def _with_avoidance(settings: TorqueSettings, avoidance: Avoidance) -> TorqueSettings:
+    return replace(settings, limits=replace(settings.limits, avoidance=avoidance))
 
 
 def _levels(settings: TorqueSettings) -> Stack:
@@ -273,5 +278,6 @@ def _places(
     for task in (task for _, tasks in levels for task in tasks):
         found |= {f"tasks.{task}.{key}": _gain(task, key) for key in _GAINS}
     for part, of in _PARTS.items():
-        found |= field_places(of, _part(part), _with(part), f"{part}.")
+        found |= field_places(of, _part(part), _with(part), f"{part}.", without=("avoidance",))
+    found |= field_places(Avoidance, lambda s: s.limits.avoidance, _with_avoidance, "avoidance.")
     return MappingProxyType(found)

@@ -46,6 +46,24 @@ TORQUE_ENTRIES = (
           "Largest change of each joint's torque per second, which himpc, hiqp, nhimpc and weighted keep "
               "above all levels; 0: not imposed",
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
+    Entry("avoidance.on", "Keep distances",
+          "Distances between links, and between links and objects, are kept above all levels by himpc, "
+              "hiqp, nhimpc and weighted",
+          tries=("true", "false"), name="distances kept"),
+    Entry("avoidance.d_safe", "d_safe", "The distance that is kept", "m", 0.0, 100.0, 1.0, shown="mm",
+          factor=1e3, name="safe distance"),
+    Entry("avoidance.margin", "Margin",
+          "Added to d_safe, since time-delay estimation brakes late", "m", 0.0, 100.0, 1.0, shown="mm",
+          factor=1e3, name="margin of distances"),
+    Entry("avoidance.reaction", "Reaction", "Time before the robot brakes, which the bound allows for", "s",
+          0.0, 1.0, 0.01, name="reaction of distances"),
+    Entry("avoidance.deceleration", "Deceleration",
+          "How fast the approach to an object can be slowed down, as the bound assumes", "m/s²", 0.1, 20.0,
+          0.1, name="deceleration of distances"),
+    Entry("avoidance.pull", "Pull",
+          "Largest error on which tasks of positions (m) and orientations (rad) act while distances are "
+              "kept, so that a target out of reach does not pull harder; 0: no limit",
+          "m, rad", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
           "Solver of the QPs of hqp and of the explicit route; controllers without QPs and the compiled "

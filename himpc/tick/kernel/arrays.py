@@ -71,7 +71,10 @@ class TickArrays(NamedTuple):
     direction: Annotated[Array, "g n n", "1", "given_bounds problems → finish_tick solve_level"]
     approach: Annotated[Array, "N", "1", "configure → linearize"]
     scalars: Annotated[
-        Array, "4", "s", "configure finish_tick kinematics problems tick → fallbacks given_bounds linearize"
+        Array,
+        "5",
+        "s, m",
+        "configure finish_tick kinematics problems tick → fallbacks given_bounds linearize",
     ]
     # The robot.
     rotation: Annotated[Array, "J 3 3", "1", "configure → linearize"]
@@ -197,7 +200,8 @@ NUMBERS, WHOLES = _shapes(Array), _shapes(Whole)
 AT, WHOLE_AT = _numbered("AT", NUMBERS), _numbered("WHOLE_AT", WHOLES)
 """Where in `Arena.where` and `Arena.whole_where` the place of an array is noted."""
 
-PERIOD, T_S, REACTION, NOW = range(4)
-"""What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t."""
+PERIOD, T_S, REACTION, NOW, PULL = range(5)
+"""What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t, the
+largest error on which tasks act."""
 DIRECTED = 11
 """Where `sizes` holds how many constraints bound directions of their own: their rows are the last ones."""

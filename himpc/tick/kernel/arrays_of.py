@@ -45,7 +45,7 @@ def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> Ti
         matrix(data, where[AT.L], b, N),
         matrices(data, where[AT.direction], g, n, n),
         vector(data, where[AT.approach], N),
-        vector(data, where[AT.scalars], 4),
+        vector(data, where[AT.scalars], 5),
         matrices(data, where[AT.rotation], n + 1, 3, 3),
         matrix(data, where[AT.translation], n + 1, 3),
         matrix(data, where[AT.axis], n + 1, 3),

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, VECTOR, always_inline_kernel, kernel
-from himpc.tick.kernel.arrays import NOW, PERIOD, REACTION, T_S, Array, TickArrays, Whole
+from himpc.tick.kernel.arrays import NOW, PERIOD, PULL, REACTION, T_S, Array, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (
@@ -23,6 +23,7 @@ from himpc.tick.kernel.kinematics import (
     turned_away,
 )
 from himpc.tick.kernel.linear import dot
+from himpc.tick.kernel.pull import bounded_pull
 from himpc.tick.kernel.references import curves
 from himpc.tick.kernel.residual import free_motion
 
@@ -106,4 +107,6 @@ def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool
         *(t.error, t.x_dot, t.x_dot_was, period, t.K_p, t.K_v, t.on_velocity, t.on_acceleration),
         *(displacement, velocity_d, acceleration_d, m, t.free),
     )
+    if t.scalars[PULL] < math.inf:
+        bounded_pull(t.task, t.error, t.scalars[PULL], t.K_p, m, t.free)
     return math.isfinite(total)

@@ -1,0 +1,42 @@
+"""The settings of distances that are kept at torque level."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from robots.ranges import Range, check_fields
+
+MOST = 8
+"""Largest number of pairs with a row; a robot with fewer joints has as many rows as joints."""
+
+
+@dataclass(frozen=True)
+class Avoidance:
+    """Whether and how distances are kept: between links, and between links and objects.
+
+    Attributes:
+        on: whether distances have rows.
+        d_safe: m, the distance that is kept.
+        margin: m, added to d_safe, since time-delay estimation brakes late.
+        reaction: s before the robot brakes, which the bound allows for.
+        deceleration: m/s², of a distance's decrease, that the bound counts on.
+        pull: largest error, m and rad, on which tasks of positions and orientations act while `on`: a target
+            that cannot be reached then pulls no harder than one that is this far away. 0: no limit.
+    """
+
+    on: bool = False
+    d_safe: Annotated[float, Range(0.0, 0.2)] = 0.01
+    margin: Annotated[float, Range(0.0, 0.2)] = 0.01
+    reaction: Annotated[float, Range(0.0, 2.0)] = 0.1
+    deceleration: Annotated[float, Range(0.01, 100.0)] = 2.0
+    pull: Annotated[float, Range(0.0, 10.0)] = 0.1
+
+    def __post_init__(self) -> None:
+        check_fields(self, "avoidance.")
+
+    @property
+    def largest_error(self) -> float:
+        """The largest error on which tasks act, m or rad."""
+        return self.pull if self.on and self.pull > 0.0 else math.inf

@@ -1,0 +1,75 @@
+"""Slows the joints down where a robot presses against what it must keep away from and its tasks make no
+progress."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.limits import LimitsInForce
+
+Array = NDArray[np.float64]
+
+BLOCKED = 0.03
+"""m: only a robot with a pair that has less room than this can be stalled."""
+PROGRESS = 0.02
+"""m/s, rad/s: the least decrease of an error that counts as progress; a reference that is faster moves."""
+CLOSE_ENOUGH = 0.01
+"""m, rad: a task with a smaller error has reached its target."""
+SLOWING, RECOVERY = 0.2, 0.05
+"""s: time constants with which the joints become slow, and fast again."""
+SLOWEST = 0.02
+"""rad/s: no joint becomes slower."""
+
+
+class Stall(NamedTuple):
+    """How far a robot is stalled.
+
+    Attributes:
+        share: 1: it is not; 0: wholly.
+        due: (T,) the errors, m or rad, that its tasks should have reached by now.
+    """
+
+    share: float
+    due: Array
+
+
+def going(tasks: int) -> Stall:
+    """A robot that is not stalled."""
+    return Stall(1.0, np.full(tasks, np.inf))
+
+
+def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) -> Stall:
+    """The stall one period later.
+
+    At a target that cannot be reached, a strict hierarchy uses every freedom for ever smaller gains: near
+    such a configuration rows of tasks and of distances depend on each other, small errors ask for large
+    velocities, and the joints move at their limits without end. So while something is in the way, no
+    reference moves, and no task that is away from its target comes closer, the joints become slower.
+
+    Args:
+        before: one period ago.
+        errors: the length of each task's error, (T,) m or rad.
+        moves: whether a reference, or what is in the way, moves.
+        room: by how much the nearest distance exceeds d_safe, m; infinite without any.
+        T_s: s.
+    """
+    far = errors > CLOSE_ENOUGH
+    if moves or not 0.0 <= room <= BLOCKED or not far.any():
+        due, slows = errors, False
+    else:
+        due = np.minimum(errors, before.due - PROGRESS * T_s)
+        slows = not bool((far & (errors <= due + CLOSE_ENOUGH)).any())
+    goal, seconds = (0.0, SLOWING) if slows else (1.0, RECOVERY)
+    return Stall(before.share + min(1.0, T_s / seconds) * (goal - before.share), due)
+
+
+def slowed(limits: LimitsInForce, stall: Stall) -> LimitsInForce:
+    """The limits in force with the velocities that the stall leaves."""
+    if stall.share > 1.0 - 1e-6:
+        return limits
+    slow = np.minimum(limits.v_limit, SLOWEST)
+    return replace(limits, v_limit=slow + stall.share * (limits.v_limit - slow))

@@ -1,0 +1,103 @@
+"""The rows that keep distances, see `limits.distance`: which pairs have one, their directions and bounds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, inline_kernel, kernel
+from himpc.compilation.views import borrowed
+from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, Whole
+from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.kinematics import forward_kinematics
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES)
+def place_joints(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> None:
+    """Computes where the joints are at the measured positions, into `placed` and `axis_now`."""
+    t = arrays_of(data, where, whole, whole_where)
+    forward_kinematics(t.q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
+
+
+@inline_kernel
+def least_rate(distance: float, d_safe: float, margin: float, reaction: float, deceleration: float) -> float:
+    """The least rate of a distance, m/s, see `limits.distance.least_rates`."""
+    room = distance - d_safe - margin
+    if room <= 0.0:
+        return -max(RETURN_RATE * min(distance - d_safe, 0.0), -RETREAT)
+    stop = deceleration * (math.sqrt(reaction * reaction + 2.0 / deceleration * room) - reaction)
+    fade = min(max((WITHIN - distance) / FADE, 0.0), 1.0)
+    return -stop / fade if fade > 0.0 else -math.inf
+
+
+@kernel(WHOLE, VECTOR, INDICES, INDICES)
+def nearest(count: int, distance: Array, chosen: Whole, taken: Whole) -> int:
+    """Chooses the nearest of `count` pairs, at most as many as `chosen` has room for, nearest first; returns
+    their number. taken: scratch, one per pair."""
+    for r in range(count):
+        taken[r] = 0
+    found = 0
+    while found < min(count, chosen.size):
+        best = -1
+        for r in range(count):
+            if not taken[r] and (best < 0 or distance[r] < distance[best]):
+                best = r
+        taken[best] = 1
+        chosen[found] = best
+        found += 1
+    return found
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, INDICES, VECTOR, MATRIX, VECTOR, VECTOR)
+def distance_rows(
+    data: Any,
+    where: Whole,
+    whole: Whole,
+    whole_where: Whole,
+    block: int,
+    count: int,
+    chosen: Whole,
+    distance: Array,
+    slopes: Array,
+    moving: Array,
+    numbers: Array,
+) -> None:
+    """Writes the rows of pairs into `direction`, `lower` and `upper`.
+
+    Args:
+        data, where, whole, whole_where: the arena.
+        block: which set of directions is that of distances.
+        count: number of pairs that have rows. chosen: which ones.
+        distance, slopes: of all pairs, see `near`.
+        moving: what the object's motion takes from the distance of each chosen pair, m/s.
+        numbers: d_safe and margin, m, reaction, s, and deceleration, m/s².
+    """
+    t = arrays_of(data, where, whole, whole_where)
+    slopes = borrowed(slopes)
+    N, n = t.fixed.shape
+    T_s, period = t.scalars[T_S], t.scalars[PERIOD]
+    first, D = len(t.L) - (t.sizes[DIRECTED] - block) * N, t.direction[block]
+    for c in range(n):
+        for a in range(n):
+            D[c, a] = 0.0
+        for j in range(N):
+            t.lower[first + j, c], t.upper[first + j, c] = -math.inf, math.inf
+        if c >= count:
+            continue
+        gradient = slopes[chosen[c]]
+        squares, speed, gained = 0.0, 0.0, 0.0
+        for a in range(n):
+            squares += (gradient[a] / t.M_bar[a]) ** 2
+            speed += gradient[a] * t.v[a]
+            gained += gradient[a] * (t.v[a] - t.v_was[a]) / period
+        length = math.sqrt(squares)
+        rate = moving[c] + least_rate(distance[chosen[c]], numbers[0], numbers[1], numbers[2], numbers[3])
+        if length == 0.0 or not math.isfinite(rate):
+            continue
+        for a in range(n):
+            D[c, a] = gradient[a] / (t.M_bar[a] * length)
+        for j in range(N):
+            t.lower[first + j, c] = (t.approach[j] * (rate - speed) - T_s * (j + 1.0) * gained) / (
+                T_s * length
+            )

@@ -1,0 +1,31 @@
+"""How hard tasks pull while distances are kept, see `Avoidance.pull`."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.compilation.compiled import inline_kernel
+from himpc.tick.kernel.arrays import Array, Whole
+
+
+@inline_kernel
+def bounded_pull(task: Whole, error: Array, pull: float, K_p: Array, m: int, free: Array) -> None:
+    """Takes from `free_motion` the part of the errors beyond `pull`, see `StackForm.pulling`.
+
+    Args:
+        task: see `jacobian`. error: x̃_k, (M,). K_p: (M,).
+        pull: the largest error on which a task acts, m or rad.
+        m: number of rows that are solved for.
+        free: (N, M), updated.
+    """
+    for p in range(len(task)):
+        first, last = task[p, 2], min(task[p, 2] + task[p, 3], m)
+        squares = 0.0
+        for i in range(first, last):
+            squares += error[i] * error[i]
+        if not squares > pull * pull:
+            continue
+        beyond = 1.0 - pull / math.sqrt(squares)
+        for i in range(first, last):
+            for j in range(len(free)):
+                free[j, i] -= K_p[i] * beyond * error[i]

@@ -1,0 +1,44 @@
+"""What the simulation tells a controller of the objects around the robot: their true places."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from himpc.references.observed import Observed
+from robots import Plant
+from robots.collision import Ball, Box, Floor
+from robots.world import Post, Thing, World
+
+
+def observed(plant: Plant) -> Observed:
+    """The objects of a plant's world where they are now. A free box or post counts as upright."""
+    still = fixed(plant.world)
+    if not any(thing.free for thing in plant.world):
+        return still
+    poses, velocities = iter(plant.objects()), iter(plant.object_velocities())
+    velocity = np.zeros((len(plant.world), 3))
+    shapes = list(still.shapes)
+    for place, thing in enumerate(plant.world):
+        if thing.free:
+            shapes[place], velocity[place] = _moved(thing, next(poses)), next(velocities)
+    return Observed(tuple(shapes), velocity)
+
+
+def fixed(world: World) -> Observed:
+    """The objects of a world where they stand at the start."""
+    return Observed(tuple(thing.shape for thing in world))
+
+
+def _moved(thing: Thing, pose: np.ndarray) -> Ball | Box | Post | Floor:
+    x, y, z, w, _, _, k = pose.tolist()
+    match thing.shape:
+        case Ball() as ball:
+            return replace(ball, centre=(x, y, z))
+        case Box() as box:
+            return replace(box, centre=(x, y, z), yaw=2.0 * float(np.arctan2(k, w)))
+        case Post() as post:
+            return replace(post, foot=(x, y, z - 0.5 * post.height))
+        case Floor() as floor:
+            return floor

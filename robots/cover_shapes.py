@@ -1,0 +1,97 @@
+"""The capsules of a robot's cover and the shapes that they must not touch, as arrays: objects of the world, and
+the other capsules of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from robots.collision import BALL, BOX, CAPSULE, FLOOR, Ball, Box, Floor, Surroundings, base_joint
+from robots.cover import Capsule, Cover
+from robots.robot import Robot
+from robots.world import Post
+
+Array = NDArray[np.float64]
+WorldShape = Ball | Box | Post | Floor
+
+_POSTURES = 24
+_STILL = 1e-3
+"""m: a capsule whose height varies less over all postures cannot be kept away from the floor."""
+
+
+def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape]) -> Surroundings:
+    """Collects the capsules of a robot's cover, and as shapes the objects of the world, in this order, and
+    after them the same capsules again.
+
+    Every pair of capsules is checked once, but those of one body and those of bodies that the cover leaves
+    out. Capsules that do not move are not checked against the world, nor are those against a floor whose
+    height never changes, or that stand in it at home.
+    """
+    capsules = cover.capsules
+    joint = np.array([each.joint for each in capsules], np.intp)
+    start = np.array([each.start for each in capsules], float).reshape(-1, 3)
+    span = np.array([each.end for each in capsules], float).reshape(-1, 3) - start
+    radius = np.array([each.radius for each in capsules])
+    S, B = len(capsules), len(shapes)
+    meets = np.zeros((B + S, S), np.bool_)
+    for place, shape in enumerate(shapes):
+        meets[place] = joint > 0
+        if isinstance(shape, Floor):
+            meets[place] &= (joint > base_joint(robot)) & _reaches(robot, capsules, shape.height)
+    left_out = {(each.first, each.second) for each in cover.excluded}
+    for i, k in combinations(range(S), 2):
+        pair = min(joint[i], joint[k]), max(joint[i], joint[k])
+        meets[B + k, i] = pair[0] != pair[1] and pair not in left_out
+    tables = [_table(shape) for shape in shapes]
+    return Surroundings(
+        links=tuple(each.link for each in capsules),
+        joint=joint,
+        centre=start,
+        span=span,
+        radius=radius,
+        names=(*(shape.name for shape in shapes), *(each.link for each in capsules)),
+        kind=np.array([*(kind for kind, *_ in tables), *[CAPSULE] * S], np.intp),
+        carrier=np.array([*[0] * B, *joint], np.intp),
+        turn=np.array([*(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for _, yaw, *_ in tables), *[np.eye(3)] * S]),
+        middle=np.array([*(middle for _, _, middle, *_ in tables), *start]).reshape(-1, 3),
+        half=np.array([*(half for *_, half, _ in tables), *span]).reshape(-1, 3),
+        thickness=np.array([*(thickness for *_, thickness in tables), *radius]),
+        meets=meets,
+    )
+
+
+def middles(shapes: Sequence[WorldShape]) -> Array:
+    """The rows of `Surroundings.middle` of objects of the world, (B, 3) m."""
+    return np.array([_table(shape)[2] for shape in shapes], float).reshape(-1, 3)
+
+
+def _table(shape: WorldShape) -> tuple[int, float, Array, Array, float]:
+    """Kind, yaw, middle, half and thickness, see `Surroundings`. A post is the capsule that contains it."""
+    none = np.zeros(3)
+    match shape:
+        case Floor(_, height):
+            return FLOOR, 0.0, np.array([0.0, 0.0, height]), none, 0.0
+        case Ball(_, centre, radius):
+            return BALL, 0.0, np.array(centre, float), np.full(3, radius), 0.0
+        case Box(_, centre, size, yaw):
+            return BOX, yaw, np.array(centre, float), 0.5 * np.array(size, float), 0.0
+        case Post(_, foot, height, radius):
+            return CAPSULE, 0.0, np.array(foot, float), np.array([0.0, 0.0, height]), radius
+
+
+def _reaches(robot: Robot, capsules: Sequence[Capsule], height: float) -> NDArray[np.bool_]:
+    """Which capsules have heights over a floor that depend on the posture, and are above it at home, (S,)."""
+    rng = np.random.default_rng(0)
+    low = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
+    high = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)
+    data, heights = robot.model.createData(), np.empty((_POSTURES + 1, len(capsules)))
+    for row, q in enumerate([robot.home, *rng.uniform(low, high, (_POSTURES, robot.n))]):
+        pin.forwardKinematics(robot.model, data, q)
+        for place, each in enumerate(capsules):
+            ends = [data.oMi[each.joint].act(np.array(end))[2] for end in (each.start, each.end)]
+            heights[row, place] = min(ends) - each.radius - height
+    return (np.ptp(heights, axis=0) > _STILL) & (heights[0] > 0.0)
