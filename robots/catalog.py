@@ -36,6 +36,11 @@ class CatalogEntry:
         return _HERE / self.name / "collision.json"
 
     @property
+    def cover_path(self) -> Path:
+        """The capsules that distances use, written by the same command."""
+        return _HERE / self.name / "cover.json"
+
+    @property
     def home(self) -> np.ndarray:
         """Home configuration, (n,) rad."""
         import numpy as np  # imported here, which keeps NumPy out of programs that only list the catalog

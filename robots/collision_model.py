@@ -96,8 +96,8 @@ def stored(path: Path) -> CollisionModel:
     """Reads the collision geometry of a robot of the catalog."""
     data = json.loads(path.read_text())
     return CollisionModel(
-        tuple(Solid(**{key: _frozen(value) for key, value in solid.items()}) for solid in data["solids"]),
-        tuple(Excluded(**{key: _frozen(value) for key, value in pair.items()}) for pair in data["excluded"]),
+        tuple(Solid(**{key: frozen(value) for key, value in solid.items()}) for solid in data["solids"]),
+        tuple(Excluded(**{key: frozen(value) for key, value in pair.items()}) for pair in data["excluded"]),
     )
 
 
@@ -108,5 +108,5 @@ def as_json(model: CollisionModel) -> str:
     return f'{{"solids": [\n  {between.join(solids)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'
 
 
-def _frozen(value: Any) -> Any:
-    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+def frozen(value: Any) -> Any:
+    return tuple(map(frozen, value)) if isinstance(value, list) else value

@@ -22,10 +22,10 @@ CORNERS = 96
 _SPREAD = 40  # directions in which the farthest points of a link are corners
 _NEAR = 1e-3  # m by which a link may stand out of its hull
 _TAGS: tuple[tuple[str, Source], ...] = (("collision", "collision"), ("visual", "hull"))
-_READ = 500  # shapes of a link
+SHAPES_PER_LINK = 500  # shapes of a link
 _PER_LINK = 8
 _PER_ROBOT = 120
-_FARTHEST = 1e3  # m, largest distance of a point from its joint
+FARTHEST = 1e3  # m, largest distance of a point from its joint
 _THIN = 1e-3  # m, half the least thickness of a hull
 _DIGITS = 4  # of a coordinate in m
 
@@ -42,7 +42,7 @@ def collision_solids(robot: Robot, meshes: bool = True) -> tuple[Solid, ...]:
     chosen: list[tuple[Element, Source]] = []
     for link in root.findall("link"):
         tag, source = next((each for each in _TAGS if link.find(each[0]) is not None), _TAGS[1])
-        chosen.extend((shape, source) for shape in link.findall(tag)[:_READ])
+        chosen.extend((shape, source) for shape in link.findall(tag)[:SHAPES_PER_LINK])
     files = (shape.find("geometry/mesh") for shape, _ in chosen)
     surfaces = _surfaces([mesh.get("filename", "") for mesh in files if mesh is not None] if meshes else [])
     solids: list[Solid] = []
@@ -65,7 +65,7 @@ def _of_link(
             continue
         try:
             at = frame.placement * placement(shape)
-            solid = _primitive(geometry[0], frame.parentJoint, name, source, at)
+            solid = primitive(geometry[0], frame.parentJoint, name, source, at)
             cloud = _scaled(geometry[0], meshes) if solid is None else _corners(solid)
         except (ValueError, Refusal):
             continue
@@ -109,7 +109,7 @@ def _corners(solid: Solid) -> np.ndarray:
     return np.array([(radius * np.cos(t), radius * np.sin(t), z) for t in turns for z in (-half, half)])
 
 
-def _primitive(shape: Element, joint: int, link: str, source: Source, at: pin.SE3) -> Solid | None:
+def primitive(shape: Element, joint: int, link: str, source: Source, at: pin.SE3) -> Solid | None:
     """A box, cylinder or sphere; None for a mesh. Raises ValueError for a size that is no number."""
     sizes = {
         name: [float(word) for word in shape.get(name, "").split()] for name in ("size", "radius", "length")
@@ -125,7 +125,7 @@ def _primitive(shape: Element, joint: int, link: str, source: Source, at: pin.SE
         kind, size = "cylinder", [radius, 0.5 * length]
     else:
         return None
-    if not all(1e-5 < each < _FARTHEST for each in size) or np.abs(at.translation).max() > _FARTHEST:
+    if not all(1e-5 < each < FARTHEST for each in size) or np.abs(at.translation).max() > FARTHEST:
         raise ValueError("a size is out of range")
     return _placed(joint, link, kind, source, size, at)
 
@@ -141,7 +141,7 @@ def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> So
     """The convex hull of points in the joint's axes; flat ones get a thickness of 2 mm. None without
     points."""
     cloud = np.concatenate([np.zeros((0, 3)), *clouds])
-    cloud = cloud[(np.abs(cloud) < _FARTHEST).all(axis=1)]
+    cloud = cloud[(np.abs(cloud) < FARTHEST).all(axis=1)]
     if not len(cloud):
         return None
     from scipy.spatial import ConvexHull, QhullError  # it takes time to load, and only hulls need it

@@ -10,6 +10,7 @@ import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
 from robots.collision_model import stored
+from robots.cover import stored_cover
 from robots.errors import InputError, shortened, unknown_name
 from robots.importing import Import, bounds, import_robot
 from robots.mechanics.imported import with_collision
@@ -98,6 +99,7 @@ def _catalog_robot(entry: CatalogEntry) -> Robot:
         urdf_text=canonical.text,
         report=replace(report, tip=entry.tip),
         collision=stored(entry.collision_path),
+        cover=stored_cover(entry.cover_path),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from robots.collision_model import CollisionModel
+from robots.cover import Cover
 from robots.errors import InputError, unknown_name
 from robots.report import ImportReport
 
@@ -37,6 +38,7 @@ class Robot:
     urdf_text: str  # canonical URDF
     report: ImportReport
     collision: CollisionModel = field(default_factory=CollisionModel)  # what touches, and what not
+    cover: Cover | None = None  # made by `cover_of` if it is not given
 
     def __post_init__(self) -> None:
         for name in ("home", "q_lower", "q_upper", "v_limit", "tau_limit", "a_max", "M_bar"):

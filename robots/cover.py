@@ -1,0 +1,69 @@
+"""The cover of a robot: capsules on its bodies that contain what one sees and what the plant collides with.
+Distances for collision avoidance are distances between capsules."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robots.collision_model import Excluded, Point, frozen
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """All points nearer than a radius to a segment; a ball if the segment is a point.
+
+    Attributes:
+        joint: Pinocchio index of the joint that carries it, 0 for the world.
+        link: the link that it belongs to, for messages.
+        start, end: the ends of the segment in the joint's axes, m.
+        radius: m.
+    """
+
+    joint: int
+    link: str
+    start: Point
+    end: Point
+    radius: float
+
+
+@dataclass(frozen=True)
+class Cover:
+    """The capsules of a robot, in the order of their joints with those of the base last, and the pairs of
+    bodies whose distance is not kept. The default is a robot without capsules."""
+
+    capsules: tuple[Capsule, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
+
+
+def cover_of(robot: Robot) -> Cover:
+    """Returns the cover of a robot: the stored one of a robot of the catalog, else the one that was made when
+    it was imported."""
+    if robot.cover is not None:
+        return robot.cover
+    from robots.mechanics.covers import made_cover  # it loads MuJoCo, which a stored cover does not need
+
+    return made_cover(robot)
+
+
+def stored_cover(path: Path) -> Cover:
+    """Reads the cover of a robot of the catalog."""
+    data = json.loads(path.read_text())
+    return Cover(
+        tuple(Capsule(**{key: frozen(value) for key, value in each.items()}) for each in data["capsules"]),
+        tuple(Excluded(**{key: frozen(value) for key, value in each.items()}) for each in data["excluded"]),
+    )
+
+
+def cover_as_json(cover: Cover) -> str:
+    """The text of the file that `stored_cover` reads, one line per capsule and pair."""
+    capsules, pairs = (
+        [json.dumps(asdict(each)) for each in some] for some in (cover.capsules, cover.excluded)
+    )
+    between = ",\n  "
+    return f'{{"capsules": [\n  {between.join(capsules)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'

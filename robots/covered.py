@@ -1,0 +1,121 @@
+"""The surfaces that a cover contains: triangles of what one sees and of what the plant collides with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from lxml import etree
+from lxml.etree import _Element as Element
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from robots.collision_model import Solid
+from robots.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
+from robots.robot import Robot
+from robots.urdf.read import Refusal, placement
+
+Array = NDArray[np.float64]
+_SECTIONS = 24  # of a round solid
+_MOST = 400_000  # triangles of a robot
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Triangles (F, 3, 3), m, of a link in the axes of its joint, and the radius, m, of the balls whose
+    middles fill them: 0 for a surface."""
+
+    joint: int
+    link: str
+    corners: Array
+    swell: float = 0.0
+
+
+def patches(robot: Robot, meshes: bool = True) -> Iterator[Patch]:
+    """Yields the surfaces of the solids and of the visual shapes of a robot, at most 400,000 triangles.
+
+    meshes: whether mesh files are read. No content of the description or of a mesh file raises an error.
+    """
+    left = _MOST
+    for patch in (*map(_of_solid, robot.collision.solids), *_visuals(robot, meshes)):
+        near = np.abs(patch.corners).max(initial=0.0) < FARTHEST  # false for NaN
+        if near and 0 < len(patch.corners) <= left:
+            left -= len(patch.corners)
+            yield patch
+
+
+def _visuals(robot: Robot, meshes: bool) -> Iterator[Patch]:
+    root = etree.fromstring(robot.urdf_text.encode())
+    files = _read(root) if meshes else {}
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        frame = robot.model.frames[robot.frame_id(name)]
+        for visual in link.findall("visual")[:SHAPES_PER_LINK]:
+            geometry = visual.find("geometry")
+            if geometry is None or len(geometry) == 0:
+                continue
+            try:
+                at = frame.placement * placement(visual)
+                solid = primitive(geometry[0], frame.parentJoint, name, "hull", at)
+                if solid is not None:
+                    yield _of_solid(solid)
+                    continue
+                scale = np.broadcast_to(
+                    [float(word) for word in geometry[0].get("scale", "1 1 1").split()], 3
+                )
+            except (ValueError, Refusal):
+                continue
+            for corners in files.get(geometry[0].get("filename", ""), ()):
+                yield Patch(frame.parentJoint, name, _placed(corners * scale, at))
+
+
+def _read(root: Element) -> dict[str, list[Array]]:
+    """The triangles of the visual meshes by their URI."""
+    uris = [mesh.get("filename", "") for mesh in root.iterfind("link/visual/geometry/mesh")]
+    if not uris:
+        return {}
+    from robots.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
+
+    return {
+        uri: [vertices[faces] for _, vertices, faces in pieces] for uri, pieces in mesh_pieces(uris).items()
+    }
+
+
+def _of_solid(solid: Solid) -> Patch:
+    """The surface of a solid; round ones are contained, not met."""
+    if solid.kind == "hull":
+        corners, swell = _hull(np.array(solid.points)), 0.0
+        return Patch(solid.joint, solid.link, corners, swell)
+    if solid.kind in ("sphere", "capsule"):
+        half = solid.size[1] if solid.kind == "capsule" else 0.0
+        corners, swell = np.array([[(0.0, 0.0, -half), (0.0, 0.0, half), (0.0, 0.0, half)]]), solid.size[0]
+    else:
+        corners, swell = _hull(_box(solid) if solid.kind == "box" else _cylinder(solid)), 0.0
+    w, x, y, z = solid.quaternion
+    at = pin.SE3(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix(), np.array(solid.position))
+    return Patch(solid.joint, solid.link, _placed(corners, at), swell)
+
+
+def _box(solid: Solid) -> Array:
+    return np.array([np.multiply(solid.size, signs) for signs in np.ndindex(2, 2, 2)]) * 2.0 - solid.size
+
+
+def _cylinder(solid: Solid) -> Array:
+    radius, half = solid.size
+    turns = 2.0 * np.pi * np.arange(_SECTIONS) / _SECTIONS
+    radius /= np.cos(np.pi / _SECTIONS)  # the polygon is around the circle
+    return np.array([(radius * np.cos(t), radius * np.sin(t), z) for t in turns for z in (-half, half)])
+
+
+def _hull(points: Array) -> Array:
+    """The triangles of the hull of points, none without a volume."""
+    try:
+        return points[ConvexHull(points).simplices]
+    except (QhullError, ValueError):
+        return np.zeros((0, 3, 3))
+
+
+def _placed(corners: Array, at: pin.SE3) -> Array:
+    return corners @ at.rotation.T + at.translation
