@@ -96,8 +96,9 @@ class HIMPC(TorqueController):
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings, self._errors = settings, None
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
+        avoidance = settings.limits.avoidance
         explicit = settings.route == "explicit"
-        self._distances = Distances(self.robot) if explicit and settings.limits.avoidance.on else None
+        self._distances = Distances(self.robot, avoidance) if explicit and avoidance.on else None
         self.kernel = self._compile() if settings.route == "compiled" else None
 
     def _compile(self) -> CompiledTick:
@@ -185,7 +186,6 @@ class HIMPC(TorqueController):
 
     def _slowed(self, previews: Mapping[str, Preview]) -> LimitsInForce:
         """The limits in force, with lower velocities while the robot is stalled, see `stalled`."""
-        avoidance = self._settings.limits.avoidance
         distances = self._distances if self.kernel is None else self.kernel.distances
         if distances is None:
             return self._limits
@@ -197,8 +197,7 @@ class HIMPC(TorqueController):
             for task in self._form.tasks
             if not isinstance(task, Damping)
         )
-        room = distances.nearest - avoidance.d_safe
-        self._stall = stalled(self._stall, self._errors, moves, room, self._settings.T_s)
+        self._stall = stalled(self._stall, self._errors, moves, distances.room, self._settings.T_s)
         return slowed(self._limits, self._stall)
 
     def _near(self, q: Array, previews: Mapping[str, Preview]) -> Near | None:

@@ -23,12 +23,14 @@ class Near(NamedTuple):
         distance: d, (r,) m, negative inside.
         gradient: ∇d, (r, n) m/rad.
         moving: (r,) m/s, what the object's own motion takes from d per second.
+        share: (r,) of d_safe and the margin that is kept: below 1 for links that are close at home.
         names: of each pair.
     """
 
     distance: Array
     gradient: Array
     moving: Array
+    share: Array
     names: tuple[str, ...]
 
 
@@ -42,9 +44,10 @@ def least_rates(near: Near, avoidance: Avoidance) -> Array:
     added to d_safe. Within the margin d must not shrink, and below d_safe it must grow. What the motion of an
     object takes is added."""
     t, a = avoidance.reaction, avoidance.deceleration
-    room = near.distance - avoidance.d_safe - avoidance.margin
+    d_safe = near.share * avoidance.d_safe
+    room = near.distance - d_safe - near.share * avoidance.margin
     stop = a * (np.sqrt(t**2 + 2.0 / a * np.maximum(room, 0.0)) - t)
-    back = np.maximum(RETURN_RATE * np.minimum(near.distance - avoidance.d_safe, 0.0), -RETREAT)
+    back = np.maximum(RETURN_RATE * np.minimum(near.distance - d_safe, 0.0), -RETREAT)
     with np.errstate(divide="ignore"):
         fade = np.clip((WITHIN - near.distance) / FADE, 0.0, 1.0)
         return np.where(room > 0.0, -stop / fade, -back) + near.moving

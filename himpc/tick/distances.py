@@ -3,124 +3,210 @@
 from __future__ import annotations
 
 import math
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.constants import WITHIN
-from himpc.kinematics.geometry import geometry
+from himpc.kinematics.geometry import Geometry, geometry
+from himpc.limits.avoidance import Avoidance
 from himpc.limits.constraint import Directions
 from himpc.limits.distance import Near, row_count
-from himpc.limits.limits import Limits
 from himpc.limits.stall import PROGRESS
 from himpc.references.observed import NOTHING, Observed
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.distance_rows import distance_rows, nearest, place_joints
 from himpc.tick.kernel.near import near
 from robots import Robot
+from robots.collision import Surroundings
 from robots.cover import cover_of
 from robots.cover_shapes import cover_surroundings, middles
+from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_AT_HOME = 0.5
+"""Share of their distance at home that links keep at most: d_safe must not forbid the posture at home."""
+_GRID = 15
+"""Postures of a joint that stands between two links."""
+_NEVER = 0.03
+"""m: links with at most two joints between them that are farther apart in all postures need no row."""
+
+
+class _Pairs:
+    """The pairs of capsules and shapes that are near, with room for all of some surroundings.
+
+    Attributes:
+        count: number of pairs.
+        sphere, shape: (count,) or more, indices of each. distance: m. normal: (·, 3). slopes: (·, n).
+    """
+
+    def __init__(self, tree: Geometry, around: Surroundings) -> None:
+        self._tree, self.around = tree, around
+        S, most = len(around.radius), int(around.meets.sum()) + 1
+        self._scratch = np.empty((1, S, 3)), np.empty((1, S, 3))
+        self._knot, self.sphere, self.shape = np.zeros((3, most), np.intp)
+        self._share, self.distance = np.empty(most), np.empty(most)
+        self.normal, self.slopes = np.empty((most, 3)), np.empty((most, tree.moves.shape[1]))
+        self.count = 0
+
+    def find(self, placed: Array, z: Array, within: float) -> None:
+        """Finds the pairs nearer than `within`, m, for placements of the joints as in `forward_kinematics`,
+        (1, n+1, 12) and (1, n+1, 3)."""
+        around, tree = self.around, self._tree
+        self.count = near(
+            *(placed, z, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
+            *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
+            *(around.thickness, around.meets, within, *self._scratch),
+            *(self._knot, self.sphere, self.shape, self._share, self.distance, self.normal, self.slopes),
+        )
+
+
+class _Links(NamedTuple):
+    """What is checked between the links of a robot, (S, S) each: which pairs of capsules, and the largest
+    distance, m, that they have to keep."""
+
+    meets: NDArray[np.bool_]
+    kept: Array
+
+
+@per_robot
+def _links(robot: Robot) -> _Links:
+    """All pairs of `cover_surroundings`, but those of links with at most two joints between them that are
+    never nearer than _NEVER: they would take up the rows of pairs that can touch."""
+    tree, around, data = (
+        geometry(robot),
+        cover_surroundings(robot, cover_of(robot), ()),
+        robot.model.createData(),
+    )
+    between: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    for o, s in np.argwhere(around.meets).tolist():
+        joints = np.flatnonzero(tree.moves[around.joint[o]] != tree.moves[around.joint[s]])
+        if len(joints) <= 2:
+            between.setdefault(tuple(joints.tolist()), []).append((o, s))
+    low = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
+    high = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)
+    meets = around.meets.copy()
+    for joints, pairs in between.items():
+        only = np.zeros_like(meets)
+        only[tuple(np.transpose(pairs))] = True
+        found, close, q = _Pairs(tree, around._replace(meets=only)), np.zeros_like(meets), robot.home.copy()
+        for values in product(*(np.linspace(low[j], high[j], _GRID) for j in joints)):
+            q[list(joints)] = values
+            found.find(*_placements(robot, data, q), _NEVER)
+            close[found.shape[: found.count], found.sphere[: found.count]] = True
+        meets &= ~only | close
+    kept, found = np.full(meets.shape, np.inf), _Pairs(tree, around._replace(meets=meets))
+    found.find(*_placements(robot, data, robot.home), WITHIN)
+    at = found.shape[: found.count], found.sphere[: found.count]
+    kept[at] = _AT_HOME * np.maximum(found.distance[: found.count], 0.0)
+    return _Links(meets, kept)
+
+
+def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
+    """The placements of the joints at q, (n,), as in `forward_kinematics`, (1, n+1, 12) and (1, n+1, 3)."""
+    pin.forwardKinematics(robot.model, data, q)
+    placed = np.array([[*each.rotation.ravel(), *each.translation] for each in data.oMi])
+    z = [each.rotation @ axis for each, axis in zip(data.oMi, geometry(robot).axis, strict=True)]
+    return placed[None], np.array(z)[None]
 
 
 class Distances:
-    """The cover of a robot and the objects that a controller knows, as arrays for the kernel.
+    """The distances of a robot's cover from the objects that a controller knows, and between its links.
 
     Attributes:
-        nearest: the smallest distance found last, m; infinite without any within `WITHIN`.
+        room: by how much the nearest pair of the last tick was farther apart than d_safe, m; infinite if no
+            pair was within `WITHIN`.
     """
+
+    def __init__(self, robot: Robot, avoidance: Avoidance) -> None:
+        self._robot, self._avoidance, self._data = robot, avoidance, robot.model.createData()
+        self._chosen = np.zeros(row_count(robot.n), np.intp)
+        self._moving, self._share = np.zeros(len(self._chosen)), np.ones(len(self._chosen))
+        self.room = math.inf
+        self._observed = NOTHING
+        self._know(NOTHING)
 
     @property
     def moves(self) -> bool:
         """Whether an object with a row moves."""
         return bool(np.any(np.abs(self._moving) > PROGRESS))
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot, self._tree, self._data = robot, geometry(robot), robot.model.createData()
-        self._cover = cover_of(robot)
-        self._chosen = np.zeros(row_count(robot.n), np.intp)
-        self._moving = np.zeros(len(self._chosen))
-        self._observed: Observed | None = None
-        self.nearest = math.inf
-        self.observe(NOTHING)
-
     def observe(self, observed: Observed) -> None:
         """Takes over where the objects are."""
         before, self._observed = self._observed, observed
-        if before is not None and observed.shapes is before.shapes:
+        if observed.shapes is before.shapes:
             return
-        if before is not None and list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
-            self._around.middle[: len(observed.shapes)] = middles(observed.shapes)
-            return
-        self._around = around = cover_surroundings(self._robot, self._cover, observed.shapes)
-        S, most = len(around.radius), max(int(around.meets.sum()), 1)
-        self._scratch = np.empty((1, S, 3)), np.empty((1, S, 3))
-        self._pair = np.zeros((3, most + 1), np.intp)
-        self._taken = np.zeros(most + 1, np.intp)
-        self._share, self._distance = np.empty(most + 1), np.empty(most + 1)
-        self._normal, self._slopes = np.empty((most + 1, 3)), np.empty((most + 1, self._robot.n))
+        if list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
+            self._pairs.around.middle[: len(observed.shapes)] = middles(observed.shapes)
+        else:
+            self._know(observed)
+
+    def _know(self, observed: Observed) -> None:
+        """Prepares the arrays for other objects than before."""
+        around = cover_surroundings(self._robot, cover_of(self._robot), observed.shapes)
+        links, B = _links(self._robot), len(observed.shapes)
+        around.meets[B:] = links.meets
+        kept = self._avoidance.d_safe + self._avoidance.margin
+        self._shares = np.ones(around.meets.shape)
+        if kept > 0.0:
+            self._shares[B:] = np.minimum(1.0, links.kept / kept)
+        self._pairs, self._taken = (
+            _Pairs(geometry(self._robot), around),
+            np.zeros(around.meets.sum() + 1, np.intp),
+        )
         self._names = [[f"{link} – {name}" for link in around.links] for name in around.names]
 
     def _find(self, placed: Array, z: Array) -> int:
-        """Chooses the nearest pairs for the placements of the joints, (1, n+1, …) each; returns their
-        number."""
-        around, tree = self._around, self._tree
-        knot, sphere, shape = self._pair
-        found = near(
-            *(placed, z, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
-            *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
-            *(around.thickness, around.meets, WITHIN, *self._scratch),
-            *(knot, sphere, shape, self._share, self._distance, self._normal, self._slopes),
-        )
-        count = nearest(found, self._distance, self._chosen, self._taken)
-        velocity = None if self._observed is None else self._observed.velocity
-        self.nearest = float(self._distance[self._chosen[0]]) if count else math.inf
-        self._moving[:] = 0.0
-        if velocity is not None:
-            for c, pair in enumerate(self._chosen[:count].tolist()):
-                if shape[pair] < len(velocity):
-                    self._moving[c] = self._normal[pair] @ velocity[shape[pair]]
+        """Chooses the nearest pairs; returns their number."""
+        pairs = self._pairs
+        pairs.find(placed, z, WITHIN)
+        count = nearest(pairs.count, pairs.distance, self._chosen, self._taken)
+        velocity = self._observed.velocity
+        self.room = math.inf
+        for c, pair in enumerate(self._chosen[:count].tolist()):
+            shape = int(pairs.shape[pair])
+            self._share[c] = share = self._shares[shape, pairs.sphere[pair]]
+            self.room = min(self.room, float(pairs.distance[pair] - share * self._avoidance.d_safe))
+            moves = velocity is not None and shape < len(velocity)
+            self._moving[c] = pairs.normal[pair] @ velocity[shape] if moves else 0.0
+        self._moving[count:] = 0.0
         return count
 
     def _named(self, count: int) -> tuple[str, ...]:
-        _, sphere, shape = self._pair
-        chosen = self._chosen[:count]
-        return tuple(
-            self._names[o][s] for o, s in zip(shape[chosen].tolist(), sphere[chosen].tolist(), strict=True)
-        )
+        pairs, chosen = self._pairs, self._chosen[:count]
+        at = zip(pairs.shape[chosen].tolist(), pairs.sphere[chosen].tolist(), strict=True)
+        return tuple(self._names[shape][sphere] for shape, sphere in at)
 
     def at(self, q: Array) -> Near:
         """The nearest pairs at the positions q, (n,)."""
-        model, tree = self._robot.model, self._tree
-        pin.forwardKinematics(model, self._data, q)
-        placed = np.array([[*each.rotation.ravel(), *each.translation] for each in self._data.oMi])
-        z = np.array([each.rotation @ axis for each, axis in zip(self._data.oMi, tree.axis, strict=True)])
-        count = self._find(placed[None], z[None])
-        chosen = self._chosen[:count]
-        return Near(
-            self._distance[chosen], self._slopes[chosen], self._moving[:count].copy(), self._named(count)
-        )
+        count = self._find(*_placements(self._robot, self._data, q))
+        pairs, chosen = self._pairs, self._chosen[:count]
+        moving, share = self._moving[:count].copy(), self._share[:count].copy()
+        return Near(pairs.distance[chosen], pairs.slopes[chosen], moving, share, self._named(count))
 
-    def write(self, arena: Arena, block: int, limits: Limits) -> Directions:
+    def write(self, arena: Arena, block: int) -> Directions:
         """Writes the rows of this tick to an arena that holds the measured state.
 
         block: which set of directions is that of distances.
         """
-        avoidance = limits.avoidance
+        avoidance, pairs = self._avoidance, self._pairs
         place_joints(*arena.arguments)
         count = self._find(arena.f["placed"][None], arena.f["axis_now"][None])
-        numbers = np.array([avoidance.d_safe + avoidance.margin, avoidance.reaction, avoidance.deceleration])
+        numbers = (avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration)
         distance_rows(
-            *(*arena.arguments, block, count, self._chosen),
-            *(self._distance, self._slopes, self._moving, numbers),
+            *(*arena.arguments, block, count, self._chosen, pairs.distance, pairs.slopes),
+            *(self._moving, self._share, np.array(numbers)),
         )
-        n = self._robot.n
-        names = self._named(count)
-        return Directions(arena.f["direction"][block].copy(), (*names, *[""] * (n - count)))
+        names = (*self._named(count), *[""] * (self._robot.n - count))
+        return Directions(arena.f["direction"][block].copy(), names)
 
 
-def _kind(shape: object) -> tuple:
+def _kind(shape: object) -> tuple[object, ...]:
     """What stays when an object moves."""
-    return type(shape), getattr(shape, "name", ""), getattr(shape, "size", getattr(shape, "radius", 0.0))
+    sizes = (getattr(shape, name, None) for name in ("name", "size", "radius", "height"))
+    return type(shape), *sizes

@@ -34,7 +34,7 @@ class GivenBounds:
         self._arena, self._settings = arena, settings
         self._given = given_of(constraints)
         self._known = len(constraints) - len(self._given)
-        self.distances = Distances(robot) if DISTANCE in constraints else None
+        self.distances = Distances(robot, settings.limits.avoidance) if DISTANCE in constraints else None
 
     def write(self, rows: Rows, force: LimitsInForce, observed: Observed) -> Rows:
         """Writes bounds and directions of this tick; returns the rows with the directions.
@@ -53,7 +53,7 @@ class GivenBounds:
         for place, constraint in enumerate(self._given):
             if constraint is DISTANCE and self.distances is not None:
                 self.distances.observe(observed)
-                directions.append(self.distances.write(self._arena, place, settings.limits))
+                directions.append(self.distances.write(self._arena, place))
                 continue
             block = constraint.bounds(now)
             start = (self._known + place) * N

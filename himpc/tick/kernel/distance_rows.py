@@ -49,7 +49,7 @@ def nearest(count: int, distance: Array, chosen: Whole, taken: Whole) -> int:
     return found
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, INDICES, VECTOR, MATRIX, VECTOR, VECTOR)
+@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, INDICES, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR)
 def distance_rows(
     data: Any,
     where: Whole,
@@ -61,6 +61,7 @@ def distance_rows(
     distance: Array,
     slopes: Array,
     moving: Array,
+    share: Array,
     numbers: Array,
 ) -> None:
     """Writes the rows of pairs into `direction`, `lower` and `upper`.
@@ -71,6 +72,7 @@ def distance_rows(
         count: number of pairs that have rows. chosen: which ones.
         distance, slopes: of all pairs, see `near`.
         moving: what the object's motion takes from the distance of each chosen pair, m/s.
+        share: of d_safe and the margin that each chosen pair keeps.
         numbers: d_safe and margin, m, reaction, s, and deceleration, m/s².
     """
     t = arrays_of(data, where, whole, whole_where)
@@ -92,7 +94,9 @@ def distance_rows(
             speed += gradient[a] * t.v[a]
             gained += gradient[a] * (t.v[a] - t.v_was[a]) / period
         length = math.sqrt(squares)
-        rate = moving[c] + least_rate(distance[chosen[c]], numbers[0], numbers[1], numbers[2], numbers[3])
+        rate = moving[c] + least_rate(
+            *(distance[chosen[c]], share[c] * numbers[0], share[c] * numbers[1], numbers[2], numbers[3])
+        )
         if length == 0.0 or not math.isfinite(rate):
             continue
         for a in range(n):
