@@ -12,6 +12,8 @@ FADE = 0.05
 """m: over this distance before WITHIN a bound loosens to none, so that a pair that enters does not jump."""
 RETREAT = 0.2
 """m/s: the fastest retreat that a row of a distance asks for."""
+TURN_PULL = 5.0
+"""rad/m: how much larger than that of a position the error is on which a task of angles acts at most."""
 
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 """Bits of telemetry's `at_bound`: which limits bind. Velocity rows that impose a position limit count as

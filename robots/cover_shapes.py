@@ -1,5 +1,5 @@
-"""The capsules of a robot's cover and the shapes that they must not touch, as arrays: objects of the world, and
-the other capsules of the robot."""
+"""The capsules of a robot's cover and the shapes that they must not touch, as arrays: objects of the world,
+and the other capsules of the robot."""
 
 from __future__ import annotations
 

@@ -241,7 +241,7 @@ THEORY = {
     "cascade": ("limits", "qp", "constants"),
     "formulation": (
         *("cascade", "limits", "prediction", "stack", "tasks", "kinematics", "references"),
-        *("qp", "catalog"),
+        *("qp", "catalog", "constants"),
     ),
     "telemetry": ("cascade", "stack", "kinematics", "constants"),
     "plan": ("telemetry", "cascade", "limits", "tasks", "references", "rotation", "constants"),
@@ -254,7 +254,7 @@ COMPILED = {
     "htmpc/kernel": ("tick/kernel", "compilation", "constants"),
     "tick": (
         *("tick/kernel", "plan", "telemetry", "formulation", "cascade", "limits", "prediction"),
-        *("tasks", "kinematics", "references", "qp"),
+        *("tasks", "kinematics", "references", "qp", "constants"),
     ),
     "controllers": (
         *("tick", "plan", "formulation", "cascade", "limits", "prediction", "stack", "tasks"),

@@ -11,13 +11,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
+from himpc.constants import TURN_PULL
 from himpc.formulation.settings import Settings
 from himpc.kinematics.configuration import Configuration
 from himpc.prediction.task import ResidualModel, residual_model
 from himpc.references import Later, Preview
 from himpc.references.hold import still
 from himpc.stack import DAMPING_LEVEL, Level, active_levels, freedom_left
-from himpc.tasks import Damping, Task
+from himpc.tasks import Damping, FramePosition, Task
 from robots import InputError, Robot
 
 Array = NDArray[np.float64]
@@ -129,11 +130,13 @@ class StackForm:
         return {**previews, **asked} if asked else previews
 
     def pulling(self, error: Array, pull: float) -> Array:
-        """x̃ on which the tasks act, (m,): a task's error that is longer than `pull` is shortened to it."""
-        ends = np.cumsum(self.sizes)
-        parts = np.split(error, ends[:-1])
+        """x̃ on which the tasks act, (m,): errors that are longer than they pull are shortened, see
+        `Avoidance.pull`."""
+        parts = np.split(error, np.cumsum(self.sizes)[:-1])
+        most = [pull if isinstance(task, FramePosition) else TURN_PULL * pull for task in self.tasks]
+        lengths = [max(float(np.linalg.norm(part)), _TINY) for part in parts]
         return np.concatenate(
-            [part * min(1.0, pull / max(float(np.linalg.norm(part)), _TINY)) for part in parts]
+            [min(1.0, a / b) * part for part, a, b in zip(parts, most, lengths, strict=True)]
         )
 
     def free(

@@ -22,8 +22,9 @@ class Avoidance:
         margin: m, added to d_safe, since time-delay estimation brakes late.
         reaction: s before the robot brakes, which the bound allows for.
         deceleration: m/s², of a distance's decrease, that the bound counts on.
-        pull: largest error, m and rad, on which tasks of positions and orientations act while `on`: a target
-            that cannot be reached then pulls no harder than one that is this far away. 0: no limit.
+        pull: m, largest error on which tasks of positions act while `on`; other tasks act on up to TURN_PULL
+            times as many rad. A target that cannot be reached then pulls no harder than one that is this far
+            away. 0: no limit.
     """
 
     on: bool = False

@@ -1,4 +1,4 @@
-"""Distances between links, and between links and objects: the speed of approach from which the robot can still
+"""Distances between links, and between links and objects: the speed of approach from which a robot can still
 stop."""
 
 from __future__ import annotations

@@ -172,8 +172,9 @@ class Distances:
             shape = int(pairs.shape[pair])
             self._share[c] = share = self._shares[shape, pairs.sphere[pair]]
             self.room = min(self.room, float(pairs.distance[pair] - share * self._avoidance.d_safe))
-            moves = velocity is not None and shape < len(velocity)
-            self._moving[c] = pairs.normal[pair] @ velocity[shape] if moves else 0.0
+            self._moving[c] = 0.0
+            if velocity is not None and shape < len(velocity):
+                self._moving[c] = pairs.normal[pair] @ velocity[shape]
         self._moving[count:] = 0.0
         return count
 

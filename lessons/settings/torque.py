@@ -146,8 +146,9 @@ class TorqueSettings(SceneSettings):
         `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
-        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY"; "plant.KEY". If a
-        value has one number per joint, a place 1 … n after it is the number of that joint: "M_bar.3"."""
+        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY";
+        "plant.KEY". If a value has one number per joint, a place 1 … n after it is the number of that joint:
+        "M_bar.3"."""
         levels = tuple((level.name, tuple(task.name for task in level.tasks)) for level in self.levels)
         return _places(levels, type(self.options), tuple(self.controllers))
 

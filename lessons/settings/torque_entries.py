@@ -61,9 +61,10 @@ TORQUE_ENTRIES = (
           "How fast the approach to an object can be slowed down, as the bound assumes", "m/s²", 0.1, 20.0,
           0.1, name="deceleration of distances"),
     Entry("avoidance.pull", "Pull",
-          "Largest error on which tasks of positions (m) and orientations (rad) act while distances are "
-              "kept, so that a target out of reach does not pull harder; 0: no limit",
-          "m, rad", 0.0, 2.0, 0.01, name="pull of targets"),
+          "Largest error of a position on which its task acts while distances are kept, so that a target "
+              "out of reach does not pull harder; other tasks act on up to five times as many rad. 0: no "
+              "limit",
+          "m", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
           "Solver of the QPs of hqp and of the explicit route; controllers without QPs and the compiled "

@@ -94,9 +94,9 @@ def distance_rows(
             speed += gradient[a] * t.v[a]
             gained += gradient[a] * (t.v[a] - t.v_was[a]) / period
         length = math.sqrt(squares)
-        rate = moving[c] + least_rate(
-            *(distance[chosen[c]], share[c] * numbers[0], share[c] * numbers[1], numbers[2], numbers[3])
-        )
+        d: Any = distance[chosen[c]]
+        d_safe, margin = share[c] * numbers[0], share[c] * numbers[1]
+        rate = moving[c] + least_rate(d, d_safe, margin, numbers[2], numbers[3])
         if length == 0.0 or not math.isfinite(rate):
             continue
         for a in range(n):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
+from himpc.constants import TURN_PULL
 from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.kinematics import POSITION
 
 
 @inline_kernel
@@ -14,7 +16,8 @@ def bounded_pull(task: Whole, error: Array, pull: float, K_p: Array, m: int, fre
 
     Args:
         task: see `jacobian`. error: x̃_k, (M,). K_p: (M,).
-        pull: the largest error on which a task acts, m or rad.
+        pull: the largest error on which a task of a position acts, m; the others act on up to TURN_PULL
+            times as much.
         m: number of rows that are solved for.
         free: (N, M), updated.
     """
@@ -23,9 +26,10 @@ def bounded_pull(task: Whole, error: Array, pull: float, K_p: Array, m: int, fre
         squares = 0.0
         for i in range(first, last):
             squares += error[i] * error[i]
-        if not squares > pull * pull:
+        most = pull if task[p, 0] == POSITION else TURN_PULL * pull
+        if not squares > most * most:
             continue
-        beyond = 1.0 - pull / math.sqrt(squares)
+        beyond = 1.0 - most / math.sqrt(squares)
         for i in range(first, last):
             for j in range(len(free)):
                 free[j, i] -= K_p[i] * beyond * error[i]

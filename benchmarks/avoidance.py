@@ -1,0 +1,186 @@
+"""Random drags into what is around a robot and into itself, with distances kept and without.
+
+    python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--seed 1]
+                                   [--controller himpc] [--set PATH=VALUE …]
+
+Every chain drags the hand of a robot to four targets, one a second, of positions alone or of poses; targets
+are those of random postures, so many lie in the floor, in the robot or behind it. Then the robot has three
+seconds to come to rest. Prints a line of a Markdown table for each robot: drags, the deepest penetration
+between links whose distance is kept, by MuJoCo's geometry, the chains in which it exceeds 1 mm, the largest
+share of the velocity limits, lost runs, unsolved QPs, the chains whose joints are slower than 0.05 rad/s at
+the end, and the median and the longest processor time of a step. Exit code 1 if a penetration exceeds 1 mm,
+a run is lost, or more than 5 % of the chains do not come to rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from lessons.events import MoveTarget
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.hold import hold
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.session import LOST_SPEED
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
+from robots import Robot
+from robots.cover import cover_of
+
+DRAGS, APART_S, REST_S = 4, 1.0, 3.0
+DEEP_M, AT_REST = 1e-3, 0.05
+SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}
+ROBOTS = (*SCENES, "generated")
+
+
+@dataclass
+class Total:
+    """The results of all chains of one robot."""
+
+    drags: int = 0
+    deepest: float = 0.0
+    deep: int = 0
+    where: str = ""
+    speed: float = 0.0
+    lost: int = 0
+    unsolved: int = 0
+    resting: int = 0
+    chains: int = 0
+
+
+def generated(seed: int) -> str:
+    """The URDF of a random arm with six joints, whose links are cylinders."""
+    rng = np.random.default_rng(seed)
+    parts = ['<robot name="generated"><link name="base"/>']
+    parent, length = "base", 0.3
+    for j in range(6):
+        length_next = float(rng.uniform(0.12, 0.3))
+        axis = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")[j]
+        parts.append(
+            f'<joint name="joint_{j + 1}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="link_{j + 1}"/><origin xyz="0 0 {length:.3f}"/><axis xyz="{axis}"/>'
+            '<limit lower="-2.6" upper="2.6" effort="150" velocity="2.0"/></joint>'
+            f'<link name="link_{j + 1}"><inertial><origin xyz="0 0 {length_next / 2:.3f}"/>'
+            f'<mass value="{3.0 - 0.4 * j:.2f}"/><inertia ixx="0.03" iyy="0.03" izz="0.01" ixy="0" '
+            'ixz="0" iyz="0"/></inertial><collision><origin '
+            f'xyz="0 0 {length_next / 2:.3f}"/><geometry><cylinder radius="{0.06 - 0.006 * j:.3f}" '
+            f'length="{length_next:.3f}"/></geometry></collision></link>'
+        )
+        parent, length = f"link_{j + 1}", length_next
+    return "".join(parts) + "</robot>"
+
+
+def scene_of(robot: str, seed: int) -> TorqueScene:
+    """The hold scene of a robot of this benchmark."""
+    return torque_scene(SCENES[robot]) if robot in SCENES else hold(None, None, generated(seed))
+
+
+def targets(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
+    """A drag of one or two targets of a hand: where a random posture has it."""
+    robot = session.robot
+    low = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
+    high = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)
+    data, q = robot.model.createData(), rng.uniform(low, high)
+    pin.framesForwardKinematics(robot.model, data, q)
+    tasks = {task.name: task for level in session.settings.levels for task in level.tasks}
+    found = []
+    turns = rng.random() < 0.5
+    for name, task in tasks.items():
+        target = session.target(name)
+        frame = getattr(task, "frame", None)
+        if target is None or frame is None:
+            continue
+        place = data.oMf[robot.frame_id(frame or robot.tip)]
+        if target.raw.ndim == 2 and turns and len(getattr(task, "axes", "xyz")) == 3:
+            found.append(MoveTarget(name, tuple(pin.Quaternion(place.rotation).coeffs().tolist())))
+        elif target.raw.ndim == 1:
+            axes = ["xyz".index(axis) for axis in getattr(task, "axes", "xyz")]
+            found.append(MoveTarget(name, tuple(place.translation[axes].tolist())))
+    return found
+
+
+def covered_depth(session: TorqueSession, left_out: set[tuple[int, int]]) -> tuple[float, str]:
+    """The deepest penetration between bodies whose distance is kept, m, and its name."""
+    robot, found = session.robot, (0.0, "")
+    for each in session.plant.contacts:
+        joints = [joint_of(robot, name) for name in each.between]
+        pair = (min(joints), max(joints))
+        if pair not in left_out and each.depth > found[0]:
+            found = each.depth, " – ".join(each.between)
+    return found
+
+
+def joint_of(robot: Robot, name: str) -> int:
+    """The joint that carries a link; 0 for an object of the world."""
+    return robot.model.frames[robot.frame_id(name)].parentJoint if name in robot.frames else 0
+
+
+def run(
+    robot: str, chains: int, seed: int, changes: Sequence[str], controller: str
+) -> tuple[Total, list[float]]:
+    """Runs all chains of a robot."""
+    rng, total, times = np.random.default_rng(seed), Total(), []
+    scene = scene_of(robot, seed)
+    settings = replace(scene.settings, controller=controller)
+    settings = with_assignments(settings, changes)
+    left_out = {(each.first, each.second) for each in cover_of(scene.robot).excluded}
+    for _ in range(chains):
+        session, deepest, fastest = TorqueSession(replace(scene, settings=settings)), 0.0, 0.0
+        total.chains += 1
+        for drag in range(DRAGS):
+            total.drags += 1
+            for event in targets(session, rng):
+                session.post(event)
+            for _ in range(round((APART_S if drag < DRAGS - 1 else REST_S) / session.step_s)):
+                session.tick()
+                assert session.plan is not None
+                times.append(1e-3 * session.plan.step_us)
+                total.unsolved += session.plan.unsolved
+                fastest = max(fastest, float(np.abs(session.plant.v / session.robot.v_limit).max()))
+                if session.plant.touch.depth > DEEP_M:
+                    deep, where = covered_depth(session, left_out)
+                    if deep > max(deepest, total.deepest):
+                        total.where = where
+                    deepest = max(deepest, deep)
+        total.deepest, total.deep = max(total.deepest, deepest), total.deep + (deepest > DEEP_M)
+        total.speed = max(total.speed, fastest)
+        total.lost += session.plant.broken or not fastest <= LOST_SPEED
+        total.resting += bool(np.abs(session.plant.v).max() < AT_REST)
+    return total, times
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--chains", type=int, default=25)
+    parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=ROBOTS)
+    parser.add_argument("--off", action="store_true")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--controller", default="himpc")
+    parser.add_argument("--set", nargs="*", default=[], dest="changes")
+    given = parser.parse_args(arguments)
+    changes = [f"avoidance.on={'false' if given.off else 'true'}", *given.changes]
+    print(
+        "| robot | drags | deepest, mm | chains deeper than 1 mm | speed | lost | unsolved | at rest | ms |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    worst = 0
+    for robot in given.robots:
+        total, times = run(robot, given.chains, given.seed, changes, given.controller)
+        print(
+            f"| {robot} | {total.drags} | {1e3 * total.deepest:.2f} {total.where} | {total.deep} | "
+            f"{total.speed:.2f} | {total.lost} | {total.unsolved} | {total.resting} of {total.chains} | "
+            f"{np.median(times):.2f}, {max(times):.1f} |",
+            flush=True,
+        )
+        bad = total.deep or total.lost or total.resting < 0.95 * total.chains
+        worst = max(worst, int(bool(bad)))
+    return worst
+
+
+if __name__ == "__main__":
+    sys.exit(main())
