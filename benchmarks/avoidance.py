@@ -3,13 +3,13 @@
     python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--seed 1]
                                    [--controller himpc] [--set PATH=VALUE …]
 
-Every chain drags the hand of a robot to four targets, one a second, of positions alone or of poses; targets
-are those of random postures, so many lie in the floor, in the robot or behind it. Then the robot has three
-seconds to come to rest. Prints a line of a Markdown table for each robot: drags, the deepest penetration
-between links whose distance is kept, by MuJoCo's geometry, the chains in which it exceeds 1 mm, the largest
-share of the velocity limits, lost runs, unsolved QPs, the chains whose joints are slower than 0.05 rad/s at
-the end, and the median and the longest processor time of a step. Exit code 1 if a penetration exceeds 1 mm,
-a run is lost, or more than 5 % of the chains do not come to rest.
+Every chain drags the hands of a robot four times, once a second, in position alone or in pose, from where the
+targets are 0.1 to 0.6 m in a random direction, so many targets end in the floor, in the robot or out of
+reach. Then the robot has three seconds to come to rest. Prints a line of a Markdown table for each robot:
+drags, the deepest penetration between links whose distance is kept, by MuJoCo's geometry, the chains in which
+it exceeds 1 mm, the largest share of the velocity limits, lost runs, unsolved QPs, the chains whose joints
+are slower than 0.05 rad/s at the end, and the median and the longest processor time of a step. Exit code 1 if
+a penetration exceeds 1 mm, a run is lost, or more than 5 % of the chains do not come to rest.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ from robots import Robot
 from robots.cover import cover_of
 
 DRAGS, APART_S, REST_S = 4, 1.0, 3.0
+FAR_M, TURN_RAD = (0.1, 0.6), 1.0
+"""How far a drag goes, at least and at most, and how far it turns at most."""
 DEEP_M, AT_REST = 1e-3, 0.05
 SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}
 ROBOTS = (*SCENES, "generated")
@@ -80,27 +82,24 @@ def scene_of(robot: str, seed: int) -> TorqueScene:
     return torque_scene(SCENES[robot]) if robot in SCENES else hold(None, None, generated(seed))
 
 
-def targets(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
-    """A drag of one or two targets of a hand: where a random posture has it."""
-    robot = session.robot
-    low = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
-    high = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)
-    data, q = robot.model.createData(), rng.uniform(low, high)
-    pin.framesForwardKinematics(robot.model, data, q)
-    tasks = {task.name: task for level in session.settings.levels for task in level.tasks}
-    found = []
-    turns = rng.random() < 0.5
-    for name, task in tasks.items():
-        target = session.target(name)
-        frame = getattr(task, "frame", None)
-        if target is None or frame is None:
-            continue
-        place = data.oMf[robot.frame_id(frame or robot.tip)]
-        if target.raw.ndim == 2 and turns and len(getattr(task, "axes", "xyz")) == 3:
-            found.append(MoveTarget(name, tuple(pin.Quaternion(place.rotation).coeffs().tolist())))
-        elif target.raw.ndim == 1:
-            axes = ["xyz".index(axis) for axis in getattr(task, "axes", "xyz")]
-            found.append(MoveTarget(name, tuple(place.translation[axes].tolist())))
+def drags(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
+    """One drag: every target of a position moves, and in half of the drags every target of an orientation on
+    three axes turns with it."""
+    found, turns = [], rng.random() < 0.5
+    for level in session.settings.levels:
+        for task in level.tasks:
+            target, frame = session.target(task.name), getattr(task, "frame", None)
+            if target is None or frame is None:
+                continue
+            if target.raw.ndim == 1:
+                away = rng.normal(size=target.raw.size)
+                away *= rng.uniform(*FAR_M) / np.linalg.norm(away)
+                found.append(MoveTarget(task.name, tuple((target.raw + away).tolist())))
+            elif turns and len(getattr(task, "axes", "xyz")) == 3:
+                axis = rng.normal(size=3)
+                turn = pin.exp3(rng.uniform(0.0, TURN_RAD) * axis / np.linalg.norm(axis))
+                goal = pin.Quaternion(turn @ target.raw).coeffs()
+                found.append(MoveTarget(task.name, tuple(goal.tolist())))
     return found
 
 
@@ -134,7 +133,7 @@ def run(
         total.chains += 1
         for drag in range(DRAGS):
             total.drags += 1
-            for event in targets(session, rng):
+            for event in drags(session, rng):
                 session.post(event)
             for _ in range(round((APART_S if drag < DRAGS - 1 else REST_S) / session.step_s)):
                 session.tick()

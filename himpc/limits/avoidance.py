@@ -30,7 +30,7 @@ class Avoidance:
     on: bool = False
     d_safe: Annotated[float, Range(0.0, 0.2)] = 0.01
     margin: Annotated[float, Range(0.0, 0.2)] = 0.01
-    reaction: Annotated[float, Range(0.0, 2.0)] = 0.1
+    reaction: Annotated[float, Range(0.0, 2.0)] = 0.2
     deceleration: Annotated[float, Range(0.01, 100.0)] = 2.0
     pull: Annotated[float, Range(0.0, 10.0)] = 0.1
 

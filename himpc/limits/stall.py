@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 BLOCKED = 0.03
 """m: only a robot with a pair that has less room than this can be stalled."""
+INSIDE = -0.008
+"""m: a robot that is farther inside must come out, and is not slowed down."""
 PROGRESS = 0.02
 """m/s, rad/s: the least decrease of an error that counts as progress; a reference that is faster moves."""
 CLOSE_ENOUGH = 0.01
@@ -58,7 +60,7 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
         T_s: s.
     """
     far = errors > CLOSE_ENOUGH
-    if moves or not 0.0 <= room <= BLOCKED or not far.any():
+    if moves or not INSIDE <= room <= BLOCKED or not far.any():
         due, slows = errors, False
     else:
         due = np.minimum(errors, before.due - PROGRESS * T_s)
