@@ -47,6 +47,7 @@ def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape])
         pair = min(joint[i], joint[k]), max(joint[i], joint[k])
         meets[B + k, i] = pair[0] != pair[1] and pair not in left_out
     tables = [_table(shape) for shape in shapes]
+    turn, middle = placements(shapes)
     return Surroundings(
         links=tuple(each.link for each in capsules),
         joint=joint,
@@ -56,17 +57,20 @@ def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape])
         names=(*(shape.name for shape in shapes), *(each.link for each in capsules)),
         kind=np.array([*(kind for kind, *_ in tables), *[CAPSULE] * S], np.intp),
         carrier=np.array([*[0] * B, *joint], np.intp),
-        turn=np.array([*(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for _, yaw, *_ in tables), *[np.eye(3)] * S]),
-        middle=np.array([*(middle for _, _, middle, *_ in tables), *start]).reshape(-1, 3),
+        turn=np.concatenate([turn, np.tile(np.eye(3), (S, 1, 1))]),
+        middle=np.concatenate([middle, start]),
         half=np.array([*(half for *_, half, _ in tables), *span]).reshape(-1, 3),
         thickness=np.array([*(thickness for *_, thickness in tables), *radius]),
         meets=meets,
     )
 
 
-def middles(shapes: Sequence[WorldShape]) -> Array:
-    """The rows of `Surroundings.middle` of objects of the world, (B, 3) m."""
-    return np.array([_table(shape)[2] for shape in shapes], float).reshape(-1, 3)
+def placements(shapes: Sequence[WorldShape]) -> tuple[Array, Array]:
+    """The rows of `Surroundings.turn` and `middle` of objects of the world, (B, 3, 3) and (B, 3) m."""
+    tables = [_table(shape) for shape in shapes]
+    turns = [pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for _, yaw, *_ in tables]
+    middles = [middle for _, _, middle, *_ in tables]
+    return np.array(turns).reshape(-1, 3, 3), np.array(middles).reshape(-1, 3)
 
 
 def _table(shape: WorldShape) -> tuple[int, float, Array, Array, float]:

@@ -227,8 +227,7 @@ class Plant:
 
     def acceleration(self, tau: np.ndarray) -> np.ndarray:
         """(n,) rad/s² if the torque tau (N·m) acted on the joints now: friction, damping and push included,
-        saturation, delay and lag not.
-        """
+        saturation, delay and lag not."""
         found = self._accelerate(self._data.qpos, self._data.qvel, as_vector("tau", tau, self.n))
         self._fresh = True
         return found[: self.n].copy()
@@ -241,11 +240,7 @@ class Plant:
 
     def object_velocities(self) -> np.ndarray:
         """(k, 3) m/s: the velocities of the middles of the free objects, world axes, in their order."""
-        if self.settings.contacts:
-            return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
-        return np.zeros((sum(thing.free for thing in self.world), 3))
-
-    # ---------------------------------------------------------------- inside
+        return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
 
     def _advance(self, h: float) -> None:
         data, before = self._data, self._data.qpos.copy()

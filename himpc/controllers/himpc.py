@@ -14,19 +14,17 @@ from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
 from himpc.controllers.period import PeriodResult, PeriodState
+from himpc.controllers.stall_guard import StallGuard
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
-from himpc.limits.distance import Near
-from himpc.limits.stall import PROGRESS, going, slowed, stalled
 from himpc.plan import Evidence, Plan
 from himpc.prediction.joint import JointState, predict_positions
 from himpc.references import Preview
 from himpc.references.outlook import observed_by
 from himpc.stack import DAMPING_LEVEL, about
-from himpc.tasks import Damping
 from himpc.tick.distances import Distances
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
@@ -59,7 +57,7 @@ class HIMPC(TorqueController):
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
-        self._errors: Array | None = None
+        self._guard = StallGuard(self._form.tasks, self._settings.T_s)
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
@@ -94,7 +92,7 @@ class HIMPC(TorqueController):
         # A joint's torque cannot exceed its limit. A larger reading is wrong and must not be the start of a
         # bound.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
-        self._settings, self._errors = settings, None
+        self._settings, self._guard = settings, StallGuard(self._form.tasks, settings.T_s)
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         avoidance = settings.limits.avoidance
         explicit = settings.route == "explicit"
@@ -140,14 +138,14 @@ class HIMPC(TorqueController):
             if self._off:
                 here = Configuration(self.robot, self._data, q, v, previews=previews)
                 measure(self._off, here, previews, values, errors)
-            near = self._near(q, previews)
+            near = self._distances and self._distances.at(q, observed_by(previews))
             rows = build_rows(state, self._tau_0, self._M_bar, settings.limits, limits, N, T_s, near)
             found = self._search(PeriodState(state, memory, previews, rows, values, errors))
         if found is None:
             return self._hold(q, started)
         solutions, predicted_q = found.solutions, found.predicted_q
         first = solutions[-1].U[0] if solutions else 0.0
-        self._errors = np.array([float(np.linalg.norm(errors[task.name])) for task in self._form.tasks])
+        self._guard.errors = self._form.lengths(errors)
         tau = np.minimum(np.maximum(self._tau_0 + first, limits.tau_lower), limits.tau_upper)
         if not usable(tau):
             return self._hold(q, started)
@@ -180,32 +178,14 @@ class HIMPC(TorqueController):
         if plan is None:
             return self._hold(q, started)
         if self._settings.limits.avoidance.on:
-            self._errors = tick.error_lengths(self._form.tasks)
+            self._guard.errors = tick.error_lengths(self._form.tasks)
         self._tau_0 = plan.tau
         return plan
 
     def _slowed(self, previews: Mapping[str, Preview]) -> LimitsInForce:
-        """The limits in force, with lower velocities while the robot is stalled, see `stalled`."""
+        """The limits in force, with lower velocities while a robot that keeps distances is stalled."""
         distances = self._distances if self.kernel is None else self.kernel.distances
-        if distances is None:
-            return self._limits
-        if self._errors is None:
-            self._stall = going(len(self._form.tasks))
-            return self._limits
-        moves = distances.moves or any(
-            float(np.abs(previews[task.name].velocity[0]).max()) > PROGRESS
-            for task in self._form.tasks
-            if not isinstance(task, Damping)
-        )
-        self._stall = stalled(self._stall, self._errors, moves, distances.room, self._settings.T_s)
-        return slowed(self._limits, self._stall)
-
-    def _near(self, q: Array, previews: Mapping[str, Preview]) -> Near | None:
-        """The nearest pairs, if the explicit route keeps distances."""
-        if self._distances is None:
-            return None
-        self._distances.observe(observed_by(previews))
-        return self._distances.at(q)
+        return self._limits if distances is None else self._guard.limits(self._limits, previews, distances)
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""

@@ -129,6 +129,10 @@ class StackForm:
                     asked[task.name] = found
         return {**previews, **asked} if asked else previews
 
+    def lengths(self, errors: Mapping[str, Array]) -> Array:
+        """The length of each task's error, m or rad."""
+        return np.array([float(np.linalg.norm(errors[task.name])) for task in self.tasks])
+
     def pulling(self, error: Array, pull: float) -> Array:
         """x̃ on which the tasks act, (m,): errors that are longer than they pull are shortened, see
         `Avoidance.pull`."""

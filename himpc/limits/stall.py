@@ -17,11 +17,11 @@ BLOCKED = 0.03
 """m: only a robot with a pair that has less room than this can be stalled."""
 INSIDE = -0.008
 """m: a robot that is farther inside must come out, and is not slowed down."""
-PROGRESS = 0.02
+PROGRESS = 0.05
 """m/s, rad/s: the least decrease of an error that counts as progress; a reference that is faster moves."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
-SLOWING, RECOVERY = 0.2, 0.05
+SLOWING, RECOVERY = 0.1, 0.05
 """s: time constants with which the joints become slow, and fast again."""
 SLOWEST = 0.02
 """rad/s: no joint becomes slower."""

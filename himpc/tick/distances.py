@@ -23,7 +23,7 @@ from himpc.tick.kernel.near import near
 from robots import Robot
 from robots.collision import Surroundings
 from robots.cover import cover_of
-from robots.cover_shapes import cover_surroundings, middles
+from robots.cover_shapes import WorldShape, cover_surroundings, placements
 from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]
@@ -139,10 +139,11 @@ class Distances:
     def observe(self, observed: Observed) -> None:
         """Takes over where the objects are."""
         before, self._observed = self._observed, observed
-        if observed.shapes is before.shapes:
+        if observed.shapes == before.shapes:
             return
         if list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
-            self._pairs.around.middle[: len(observed.shapes)] = middles(observed.shapes)
+            around, B = self._pairs.around, len(observed.shapes)
+            around.turn[:B], around.middle[:B] = placements(observed.shapes)
         else:
             self._know(observed)
 
@@ -183,8 +184,9 @@ class Distances:
         at = zip(pairs.shape[chosen].tolist(), pairs.sphere[chosen].tolist(), strict=True)
         return tuple(self._names[shape][sphere] for shape, sphere in at)
 
-    def at(self, q: Array) -> Near:
+    def at(self, q: Array, observed: Observed) -> Near:
         """The nearest pairs at the positions q, (n,)."""
+        self.observe(observed)
         count = self._find(*_placements(self._robot, self._data, q))
         pairs, chosen = self._pairs, self._chosen[:count]
         moving, share = self._moving[:count].copy(), self._share[:count].copy()
@@ -207,7 +209,7 @@ class Distances:
         return Directions(arena.f["direction"][block].copy(), names)
 
 
-def _kind(shape: object) -> tuple[object, ...]:
+def _kind(shape: WorldShape) -> tuple[object, ...]:
     """What stays when an object moves."""
-    sizes = (getattr(shape, name, None) for name in ("name", "size", "radius", "height"))
-    return type(shape), *sizes
+    fixed = (value for name, value in vars(shape).items() if name not in ("centre", "foot", "yaw"))
+    return type(shape), *fixed

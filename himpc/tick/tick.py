@@ -15,21 +15,21 @@ from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.constraints import imposed
 from himpc.plan import AtOnce, Evidence, Plan
-from himpc.references import Outlook, Preview, Reference, Target
+from himpc.references import Preview
 from himpc.references.outlook import observed_by
-from himpc.tasks import Damping, Task
+from himpc.tasks import Task
 from himpc.telemetry import Layout
-from himpc.tick.configure import arena_for, write_curve, write_limits, write_preview
+from himpc.tick.configure import arena_for, write_limits
 from himpc.tick.distances import Distances
 from himpc.tick.fallbacks import FallbackBudget, solve_levels
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
 from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
-from himpc.tick.kernel.arrays import NOW, Array
+from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linearize import linearize
-from himpc.tick.kernel.references import SAMPLED
+from himpc.tick.preview_writer import PreviewWriter
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, budget_of, write_effects
 from robots import Robot
@@ -69,10 +69,9 @@ class CompiledTick:
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
         self._started = self._looked = False
-        self._led = [each for each in self._given.spans if not isinstance(each[1], Damping)]
-        self._read: dict[int, Reference | Preview | None] = {}
+        self._writer = PreviewWriter(self.arena, self._given, settings)
         self._gathered: tuple[Layout, Array | None] | None = None
-        self._ticks, self.budget, self._reach = 0, budget_of(self.arena), settings.horizon + 1
+        self._ticks, self.budget = 0, budget_of(self.arena)
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Takes over a controller's memory; without one, constant velocity is assumed for the past."""
@@ -212,36 +211,7 @@ class CompiledTick:
         if limits is not self._limits:
             self._limits = limits
             write_limits(self.arena, limits, self._settings.limits.position == "paper")
-        references: Mapping[str, Reference] = {}
-        t = 0.0
-        if isinstance(previews, Outlook):
-            references, t = previews.references, previews.t
-            f["scalars"][NOW] = t
-        for place, task, span in self._led:
-            reference, read = references.get(task.name), self._read.get(place)
-            target = reference if isinstance(reference, Target) else None
-            if (reference is not None and reference is read) or (target and target.stays(t, read)):
-                continue
-            if target and self._shows(place, span, target, t):
-                self._read[place] = None
-            elif reference is not None and not target and write_curve(self.arena, place, span, reference):
-                self._read[place] = reference
-            else:
-                preview = previews[task.name]
-                if preview is not read:
-                    write_preview(self.arena, place, span, self._given.at_first(task, preview), self._reach)
-                # A target at rest gives the same preview again; other previews may have changed.
-                self._read[place] = preview if target else None
-
-    def _shows(self, place: int, span: slice, target: Target, t: float) -> bool:
-        """Whether a moving target has written its motion to the arrays that the kernel reads."""
-        f = self.arena.f
-        x_d = target.show(t, self._settings.T_s, f["motion"][:, :, span])
-        if x_d is None:
-            return False
-        self.arena.i["law"][place] = SAMPLED
-        (f["x_d"][span] if target.raw.ndim == 1 else f["R_d"][place].reshape(9))[:] = x_d
-        return True
+        self._writer.write(previews)
 
     def _solutions(self, found: Snapshot, fallbacks: Sequence[tuple[Fallback, float]]) -> list[LevelSolution]:
         return (

@@ -6,29 +6,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from himpc.references.observed import Observed
+from himpc.limits.avoidance import Avoidance
+from himpc.references.observed import NOTHING, Observed
 from robots import Plant
 from robots.collision import Ball, Box, Floor
-from robots.world import Post, Thing, World
+from robots.world import Post, Thing
 
 
-def observed(plant: Plant) -> Observed:
-    """The objects of a plant's world where they are now. A free box or post counts as upright."""
-    still = fixed(plant.world)
-    if not any(thing.free for thing in plant.world):
-        return still
-    poses, velocities = iter(plant.objects()), iter(plant.object_velocities())
+def observed(plant: Plant, avoidance: Avoidance) -> Observed:
+    """The objects of a plant's world where they are now, if distances are kept. A free box or post counts as
+    upright."""
+    if not avoidance.on:
+        return NOTHING
+    shapes, moving = [thing.shape for thing in plant.world], plant.object_velocities()
+    if not len(moving):
+        return Observed(tuple(shapes))
+    poses, velocities = iter(plant.objects()), iter(moving)
     velocity = np.zeros((len(plant.world), 3))
-    shapes = list(still.shapes)
     for place, thing in enumerate(plant.world):
         if thing.free:
             shapes[place], velocity[place] = _moved(thing, next(poses)), next(velocities)
     return Observed(tuple(shapes), velocity)
-
-
-def fixed(world: World) -> Observed:
-    """The objects of a world where they stand at the start."""
-    return Observed(tuple(thing.shape for thing in world))
 
 
 def _moved(thing: Thing, pose: np.ndarray) -> Ball | Box | Post | Floor:

@@ -13,7 +13,6 @@ from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Binding, Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
-from himpc.references.observed import NOTHING
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of
@@ -105,8 +104,6 @@ class TorqueSession(Session):
         self._push_until = math.inf
         self._ticks = 0
         self._outbox = DelayedTorque()
-        moves = any(thing.free for thing in self.plant.world)
-        self._around = None if moves else observed(self.plant)
         self._hands = self._first_hands()
         self._truth = (math.nan, math.nan, math.nan)
 
@@ -201,20 +198,15 @@ class TorqueSession(Session):
         self.failure = None
 
     def advance(self) -> Array:
-        """One control tick and its row (a buffer: copy it to keep it).
-
-        A row contains the true joint state, the references, the controller's results, and the torque that is
-        applied from this tick on.
-        """
+        """One control tick and its row (a buffer: copy it to keep it): the true joint state, the references,
+        the controller's results, and the torque that is applied from this tick on."""
         if self._mailbox or self._script or self._push_until < math.inf:
             self.drain()
         settings, plant = self.settings, self.plant
         T_s, t = settings.T_s, plant.t
         q, v = plant.q, plant.v
         state = plant.measure(T_s)
-        around = NOTHING
-        if settings.limits.avoidance.on:
-            around = self._around if self._around is not None else observed(plant)
+        around = observed(plant, settings.limits.avoidance)
         ahead = Outlook(self.references, t, T_s, settings.horizon, around)
         self.controller = settled(self.controller)
         plan = self.controller.step(state.q, state.v, ahead, plant.tau)

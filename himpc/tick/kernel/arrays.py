@@ -28,20 +28,30 @@ class TickArrays(NamedTuple):
 
     # What a tick is given.
     q: Annotated[
-        Array, "n", "rad", "kinematics tick → fallbacks given given_bounds finish_tick linearize solve_level"
+        Array,
+        "n",
+        "rad",
+        "kinematics tick → distance_rows fallbacks finish_tick given given_bounds linearize solve_level",
     ]
-    v: Annotated[Array, "n", "rad/s", "kinematics tick → fallbacks given given_bounds finish_tick linearize"]
+    v: Annotated[
+        Array,
+        "n",
+        "rad/s",
+        "kinematics tick → distance_rows fallbacks finish_tick given given_bounds linearize",
+    ]
     tau_0: Annotated[Array, "n", "N·m", "tick → gather given_bounds finish_tick linearize"]
-    x_d: Annotated[Array, "M", "m, rad", "configure linearize kinematics tick → gather"]
-    R_d: Annotated[Array, "T 3 3", "1", "configure kinematics tick → finish_tick linearize"]
+    x_d: Annotated[Array, "M", "m, rad", "configure kinematics linearize preview_writer → gather"]
+    R_d: Annotated[Array, "T 3 3", "1", "configure kinematics preview_writer → finish_tick linearize"]
     # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
-    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize → gather tick"]
+    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather"]
     given: Annotated[Array, "N1 G n", "m, 1", "given → linearize"]
     curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
     # What is remembered from the tick before.
     q_was: Annotated[Array, "n", "rad", "finish_tick tick → given linearize"]
-    v_was: Annotated[Array, "n", "rad/s", "finish_tick tick → fallbacks given given_bounds linearize"]
+    v_was: Annotated[
+        Array, "n", "rad/s", "finish_tick tick → distance_rows fallbacks given given_bounds linearize"
+    ]
     x_dot_was: Annotated[Array, "M", "m/s", "finish_tick linearize tick → itself"]
     path: Annotated[Array, "N1 n", "rad", "finish_tick kinematics tick → given linearize"]
     warm_multiplier: Annotated[Array, "r k", "1/N·m", "finish_tick solve_level problems → itself"]
@@ -51,7 +61,7 @@ class TickArrays(NamedTuple):
         Array,
         "n",
         "kg·m²",
-        "configure kinematics problems tick → fallbacks given_bounds finish_tick linearize",
+        "configure kinematics problems tick → distance_rows fallbacks finish_tick given_bounds linearize",
     ]
     K_p: Annotated[Array, "M", "1/s²", "configure → linearize"]
     K_v: Annotated[Array, "M", "1/s", "configure → linearize"]
@@ -67,19 +77,22 @@ class TickArrays(NamedTuple):
     limits: Annotated[
         Array, "8 n", "N·m, rad/s, rad, rad/s²", "configure problems → gather finish_tick linearize"
     ]
-    L: Annotated[Array, "b N", "1", "configure problems → fallbacks solve_level tick"]
-    direction: Annotated[Array, "g n n", "1", "given_bounds problems → finish_tick solve_level"]
-    approach: Annotated[Array, "N", "1", "configure → linearize"]
+    L: Annotated[Array, "b N", "1", "configure problems → distance_rows fallbacks solve_level tick"]
+    direction: Annotated[
+        Array, "g n n", "1", "distance_rows given_bounds problems → distances finish_tick solve_level"
+    ]
+    approach: Annotated[Array, "N", "1", "configure → distance_rows linearize"]
     scalars: Annotated[
         Array,
         "5",
         "s, m",
-        "configure finish_tick kinematics problems tick → fallbacks given_bounds linearize",
+        "configure finish_tick kinematics preview_writer problems tick → "
+        "distance_rows fallbacks given_bounds linearize",
     ]
     # The robot.
-    rotation: Annotated[Array, "J 3 3", "1", "configure → linearize"]
-    translation: Annotated[Array, "J 3", "m", "configure → linearize"]
-    axis: Annotated[Array, "J 3", "1", "configure → linearize"]
+    rotation: Annotated[Array, "J 3 3", "1", "configure → distance_rows linearize"]
+    translation: Annotated[Array, "J 3", "m", "configure → distance_rows linearize"]
+    axis: Annotated[Array, "J 3", "1", "configure → distance_rows linearize"]
     frame_rotation: Annotated[Array, "F 3 3", "1", "configure → linearize"]
     frame_translation: Annotated[Array, "F 3", "m", "configure → linearize"]
     # What a tick finds; one piece, so that a plan takes its copy at once.
@@ -90,9 +103,14 @@ class TickArrays(NamedTuple):
     error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
     R_now: Annotated[Array, "T 3 3", "1", "given linearize → finish_tick kinematics tick"]
     lower: Annotated[
-        Array, "b n", "N·m", "fallbacks given_bounds linearize problems → solve_level tables tick"
+        Array,
+        "b n",
+        "N·m",
+        "distance_rows fallbacks given_bounds linearize problems → solve_level tables tick",
     ]
-    upper: Annotated[Array, "b n", "N·m", "fallbacks given_bounds linearize problems → solve_level tick"]
+    upper: Annotated[
+        Array, "b n", "N·m", "distance_rows fallbacks given_bounds linearize problems → solve_level tick"
+    ]
     stopping: Annotated[Array, "2 n", "1", "linearize → finish_tick tick"]
     cost: Annotated[Array, "r", "1", "finish_tick → gather problems"]
     kkt: Annotated[Array, "r", "1", "fallbacks solve_level → gather problems"]
@@ -110,8 +128,8 @@ class TickArrays(NamedTuple):
     time_us: Annotated[Array, "r", "µs", "fallbacks → gather"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.
-    placed: Annotated[Array, "J 12", "1, m", "linearize → itself"]
-    axis_now: Annotated[Array, "J 3", "1", "linearize → itself"]
+    placed: Annotated[Array, "J 12", "1, m", "distance_rows linearize → distances"]
+    axis_now: Annotated[Array, "J 3", "1", "distance_rows linearize → distances"]
     point: Annotated[Array, "F 3", "m", "linearize → itself"]
     x_dot: Annotated[Array, "M", "m/s", "linearize → finish_tick"]
     B: Annotated[
@@ -124,7 +142,7 @@ class TickArrays(NamedTuple):
     Q: Annotated[Array, "N n n", "1", "solve_level → itself"]
     reflector: Annotated[Array, "N n n", "1", "solve_level → itself"]
     projected_jacobian: Annotated[Array, "N M n", "m/s²/N·m", "solve_level → itself"]
-    fixed: Annotated[Array, "N n", "N·m", "solve_level → finish_tick linearize"]
+    fixed: Annotated[Array, "N n", "N·m", "solve_level → distance_rows finish_tick linearize"]
     e_0: Annotated[Array, "N M", "1", "solve_level → itself"]
     e_1: Annotated[Array, "N M", "1", "finish_tick solve_level → itself"]
     pushed: Annotated[Array, "N M", "m/s²", "solve_level → itself"]
@@ -148,7 +166,9 @@ class TickArrays(NamedTuple):
     ideal: Annotated[Array, "w", "1", "solve_level → itself"]
     size: Annotated[Array, "2", "1/N·m, 1", "solve_level → itself"]
     budget: Annotated[Array, "1", "1", "solve_level problems tick → itself"]
-    sizes: Annotated[Whole, "12", "1", "configure tables → fallbacks finish_tick linearize solve_level"]
+    sizes: Annotated[
+        Whole, "12", "1", "configure tables → distance_rows fallbacks finish_tick linearize solve_level"
+    ]
     # What is remembered, and whether `x_dot_was` and `U_was` are known.
     known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
     warm_row: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
@@ -157,14 +177,14 @@ class TickArrays(NamedTuple):
     # The settings.
     task: Annotated[Whole, "T 4", "1", "configure → finish_tick linearize"]
     part: Annotated[Whole, "M", "1", "configure → linearize"]
-    law: Annotated[Whole, "T", "1", "configure tick → linearize"]
+    law: Annotated[Whole, "T", "1", "configure preview_writer → linearize"]
     row_knots: Annotated[Whole, "M", "1", "tables → finish_tick solve_level printed"]
     # The bit of `at_bound` of each row.
     bit: Annotated[Whole, "b", "1", "configure problems → finish_tick"]
     level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level printed"]
     # The robot.
-    parent: Annotated[Whole, "J", "1", "configure → linearize"]
-    is_revolute: Annotated[Whole, "J", "1", "configure → linearize"]
+    parent: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
+    is_revolute: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
     frame_joint: Annotated[Whole, "F", "1", "configure → linearize"]
     # What a tick finds.
     active_row: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]

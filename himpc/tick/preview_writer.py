@@ -1,0 +1,60 @@
+"""Writes the references of the tasks that the kernel computes to an arena."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import final
+
+from himpc.formulation.settings import Settings
+from himpc.references import Outlook, Preview, Reference, Target
+from himpc.tasks import Damping
+from himpc.tick.configure import write_curve, write_preview
+from himpc.tick.given import GivenRows
+from himpc.tick.kernel.arena import Arena
+from himpc.tick.kernel.arrays import NOW
+from himpc.tick.kernel.references import SAMPLED
+
+
+@final
+class PreviewWriter:
+    """Remembers which references the arena of a tick holds already."""
+
+    def __init__(self, arena: Arena, given: GivenRows, settings: Settings) -> None:
+        self._arena, self._given, self._T_s = arena, given, settings.T_s
+        self._reach = settings.horizon + 1
+        self._led = [each for each in given.spans if not isinstance(each[1], Damping)]
+        self._read: dict[int, Reference | Preview | None] = {}
+
+    def write(self, previews: Mapping[str, Preview]) -> None:
+        """Writes what is new in the previews of all tasks, or the coefficients of the references."""
+        f = self._arena.f
+        references: Mapping[str, Reference] = {}
+        t = 0.0
+        if isinstance(previews, Outlook):
+            references, t = previews.references, previews.t
+            f["scalars"][NOW] = t
+        for place, task, span in self._led:
+            reference, read = references.get(task.name), self._read.get(place)
+            target = reference if isinstance(reference, Target) else None
+            if (reference is not None and reference is read) or (target and target.stays(t, read)):
+                continue
+            if target and self._shows(place, span, target, t):
+                self._read[place] = None
+            elif reference is not None and not target and write_curve(self._arena, place, span, reference):
+                self._read[place] = reference
+            else:
+                preview = previews[task.name]
+                if preview is not read:
+                    write_preview(self._arena, place, span, self._given.at_first(task, preview), self._reach)
+                # A target at rest gives the same preview again; other previews may have changed.
+                self._read[place] = preview if target else None
+
+    def _shows(self, place: int, span: slice, target: Target, t: float) -> bool:
+        """Whether a moving target has written its motion to the arrays that the kernel reads."""
+        f = self._arena.f
+        x_d = target.show(t, self._T_s, f["motion"][:, :, span])
+        if x_d is None:
+            return False
+        self._arena.i["law"][place] = SAMPLED
+        (f["x_d"][span] if target.raw.ndim == 1 else f["R_d"][place].reshape(9))[:] = x_d
+        return True

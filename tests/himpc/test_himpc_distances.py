@@ -1,0 +1,167 @@
+"""Distances at torque level: those of the collision library, and rows that keep them."""
+
+# pyright: reportAttributeAccessIssue=false
+# coal is a compiled module without type information.
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from himpc.limits import Limits, in_force
+from himpc.limits.avoidance import Avoidance
+from himpc.limits.distance import Near, least_rates
+from himpc.limits.stall import SLOWEST, going, slowed, stalled
+from himpc.references.observed import Observed
+from himpc.tick.distances import Distances
+from robots import Robot, load_robot
+from robots.collision import Ball, Box, Floor
+from robots.cover import Capsule, cover_of
+from robots.world import Post
+
+WORLD = (
+    Floor(),
+    Ball("ball", (0.5, 0.2, 0.5), 0.1),
+    Box("box", (-0.4, 0.3, 0.4), (0.3, 0.2, 0.5), 0.7),
+    Post("post", (0.3, -0.4, 0.0), 0.8, 0.05),
+)
+SHAPES = {
+    "ball": (coal.Sphere(0.1), (0.5, 0.2, 0.5), 0.0),
+    "box": (coal.Box(0.3, 0.2, 0.5), (-0.4, 0.3, 0.4), 0.7),
+    "post": (coal.Capsule(0.05, 0.8), (0.3, -0.4, 0.4), 0.0),
+}
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("iiwa14")
+
+
+def placed(robot: Robot, q: np.ndarray, capsule: Capsule) -> tuple[coal.Capsule, coal.Transform3s]:
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    start, end = (data.oMi[capsule.joint].act(np.array(each)) for each in (capsule.start, capsule.end))
+    along = end - start
+    length = float(np.linalg.norm(along))
+    turn = np.eye(3)
+    if length:
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along / length).toRotationMatrix()
+    return coal.Capsule(capsule.radius, length), coal.Transform3s(turn, 0.5 * (start + end))
+
+
+def between(one: tuple, other: tuple) -> float:
+    return coal.distance(*one, *other, coal.DistanceRequest(), coal.DistanceResult())
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10**6))
+def test_distances_are_those_of_the_collision_library(seed: int) -> None:
+    """The nearest pairs of links and objects, and of links, have the library's distances, and no other pair
+    that is checked is nearer."""
+    robot = load_robot("iiwa14")
+    q = np.random.default_rng(seed).uniform(robot.q_lower, robot.q_upper)
+    distances = Distances(robot, Avoidance(on=True))
+    near = distances.at(q, Observed(WORLD))
+    capsules = cover_of(robot).capsules
+    solids = [placed(robot, q, each) for each in capsules]
+    lowest = min(
+        float(pose.getTranslation()[2] - 0.5 * abs(pose.getRotation()[2, 2]) * 2.0 * solid.halfLength)
+        - solid.radius
+        for (solid, pose), capsule in zip(solids, capsules, strict=True)
+        if capsule.joint > 1
+    )
+    things = {
+        name: (shape, coal.Transform3s(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.array(place)))
+        for name, (shape, place, yaw) in SHAPES.items()
+    }
+    for name, distance in zip(near.names, near.distance.tolist(), strict=True):
+        link, other = name.split(" – ")
+        mine = [solid for solid, each in zip(solids, capsules, strict=True) if each.link == link]
+        if other == "floor":
+            if distance == min(d for d, n in zip(near.distance, near.names, strict=True) if "floor" in n):
+                assert distance == pytest.approx(lowest, abs=1e-6)
+            continue
+        theirs = (
+            [things[other]]
+            if other in things
+            else [solid for solid, each in zip(solids, capsules, strict=True) if each.link == other]
+        )
+        exact = [between(one, two) for one in mine for two in theirs]
+        if distance > 1e-3:  # inside, a library tells the way out of convex solids, and not of segments
+            assert min(abs(each - distance) for each in exact) < 1e-5
+    exact = [between(one, two) for one in solids[2:] for two in things.values()]
+    assert min(exact) > near.distance[-1] - 1e-6 or min(near.distance) <= min(exact) + 1e-6
+
+
+def test_gradients_are_the_derivatives_of_the_distances(robot: Robot) -> None:
+    """Between two neighbouring postures the distances change as the gradients say."""
+    rng, h, checked = np.random.default_rng(3), 1e-6, 0
+    distances = Distances(robot, Avoidance(on=True))
+    for _ in range(20):
+        q, step = rng.uniform(robot.q_lower, robot.q_upper), rng.normal(size=robot.n)
+        low, near, high = (distances.at(q + k * h * step, Observed(WORLD)) for k in (-1, 0, 1))
+        if low.names == near.names == high.names:
+            rate = (high.distance - low.distance) / (2.0 * h)
+            assert rate == pytest.approx(near.gradient @ step, abs=2e-3)
+            checked += len(rate)
+    assert checked > 50
+
+
+def test_an_object_that_comes_closer_must_be_evaded(robot: Robot) -> None:
+    """Its velocity towards the link is added to the least rate; one that goes away takes from it."""
+    ball = Ball("ball", (0.56, 0.0, 0.6), 0.05)
+    still, coming, going_away = (
+        Distances(robot, Avoidance(on=True)).at(robot.home, Observed((ball,), velocity))
+        for velocity in (None, np.array([[0.0, 0.0, -0.5]]), np.array([[0.0, 0.0, 0.5]]))
+    )
+    place = next(k for k, name in enumerate(still.names) if "ball" in name)
+    rates = [least_rates(near, Avoidance(on=True))[place] for near in (still, coming, going_away)]
+    assert rates[1] > rates[0] > rates[2]
+    assert rates[1] - rates[0] == pytest.approx(rates[0] - rates[2])
+
+
+def pairs(*distance: float) -> Near:
+    r = len(distance)
+    return Near(np.array(distance), np.zeros((r, 7)), np.zeros(r), np.ones(r), ("",) * r)
+
+
+def test_from_the_least_rate_a_stop_is_possible() -> None:
+    """Reaction and deceleration from it use up the room and no more; inside d_safe the rate is positive; a
+    pair that enters the set has no bound yet."""
+    kept = Avoidance(on=True, d_safe=0.02, margin=0.01, reaction=0.1, deceleration=1.5)
+    far, middle, inside, entering = least_rates(pairs(0.18, 0.05, 0.01, 0.2499999), kept)
+    for distance, rate in ((0.18, far), (0.05, middle)):
+        stop = -rate * 0.1 + rate**2 / (2.0 * 1.5)
+        assert stop == pytest.approx(distance - 0.03)
+    assert inside > 0.0
+    assert entering < -1e3
+    assert least_rates(pairs(0.025), kept) == [0.0]
+
+
+def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
+    """Only while something is near, nothing moves, a task is away from its target, and none comes closer."""
+    cases = {
+        "stalled": (0.3, False, 0.01),
+        "far from everything": (0.3, False, 0.1),
+        "a target moves": (0.3, True, 0.01),
+        "there": (0.005, False, 0.01),
+    }
+    shares = {}
+    for name, (error, moves, room) in cases.items():
+        stall = going(2)
+        for _ in range(2000):
+            stall = stalled(stall, np.array([error, 0.0]), moves, room, 1e-3)
+        shares[name] = stall.share
+    assert shares.pop("stalled") < 0.01
+    assert set(shares.values()) == {1.0}
+    stall, error = going(1), 0.5
+    for _ in range(2000):
+        error -= 1e-4
+        stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
+    assert stall.share == 1.0
+    slow = slowed(in_force(robot, Limits()), stall._replace(share=0.0))
+    assert slow.v_limit == pytest.approx(SLOWEST)

@@ -1,0 +1,79 @@
+"""Scenes that keep distances: what is dragged into something stops before it, and both routes agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from himpc.limits.distance import DISTANCE
+from lessons.events import MoveTarget
+from lessons.recording.run import run
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
+
+DOWN = ((0.0, MoveTarget("position", (0.55, 0.1, -0.15))),)
+
+
+def scene(name: str, *changes: str) -> TorqueScene:
+    found = torque_scene(name)
+    return replace(found, settings=with_assignments(found.settings, changes))
+
+
+def test_an_arm_that_is_dragged_into_the_floor_stops_before_it_and_comes_to_rest() -> None:
+    """With rows it touches nothing, is within its limits, and rests; without rows it hits the floor."""
+    found = run(replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN), 4.0)
+    session = found.session
+    assert isinstance(session, TorqueSession)
+    assert found["contact_depth"].max() == 0.0
+    assert float(np.abs(session.plant.v).max()) < 0.05
+    assert session.diverged_at is None
+    bound = {(each.kind, each.joint) for each in session.binding()}
+    assert any(kind == "distance" and joint.endswith(" – floor") for kind, joint in bound) or all(
+        kind == "velocity" for kind, _ in bound
+    )
+    blind = run(replace(scene("iiwa14-hold"), events=DOWN), 2.0)
+    assert blind["contact_depth"].max() > 0.0
+
+
+def test_both_routes_keep_the_same_distances() -> None:
+    """Near the floor, with rows of distances that hold a level, torques and bounds of the two routes are
+    those of one problem."""
+    quick = replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN)
+    leader = TorqueSession(quick)
+    while not any(each.kind == "distance" for each in leader.binding()):
+        leader.tick()
+        assert leader.t < 3.0
+    for _ in range(20):
+        leader.tick()
+    given = leader.given
+    assert given is not None
+    plans = []
+    for route in ("compiled", "explicit"):
+        controller = TorqueSession(scene("iiwa14-hold", "avoidance.on=true", f"route={route}")).controller
+        controller.reset(leader.plant.tau)
+        plans.append(controller.step(*given, leader.plant.tau).freeze())
+    one, other = plans
+    block = one.rows.constraints.index(DISTANCE)
+    N = one.rows.L.shape[1]
+    rows = slice(block * N, (block + 1) * N)
+    assert np.isfinite(one.rows.lower[rows]).any()
+    for plan_rows in ("lower", "upper"):
+        assert getattr(one.rows, plan_rows)[rows] == pytest.approx(getattr(other.rows, plan_rows)[rows])
+    first, second = one.rows.directions_of(rows.start), other.rows.directions_of(rows.start)
+    assert first is not None
+    assert second is not None
+    assert first.names == second.names
+    assert pytest.approx(second.D) == first.D
+    assert one.unsolved == other.unsolved == 0
+    assert one.tau == pytest.approx(other.tau, abs=1e-6)
+
+
+def test_a_scene_without_rows_of_distances_is_as_before() -> None:
+    """Switched off, neither d_safe nor any other of the settings changes a bit of the run."""
+    plain = run(scene("iiwa14-hold"), 0.1)
+    changed = run(scene("iiwa14-hold", "avoidance.d_safe=0.1", "avoidance.pull=0.01"), 0.1)
+    assert np.array_equal(plain["tau"], changed["tau"])
