@@ -13,7 +13,7 @@ from himpc.limits.limits import LimitsInForce
 
 Array = NDArray[np.float64]
 
-BLOCKED = 0.03
+BLOCKED = 0.1
 """m: only a robot with a pair that has less room than this can be stalled."""
 INSIDE = -0.008
 """m: a robot that is farther inside must come out, and is not slowed down."""
@@ -23,6 +23,8 @@ CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
 """s: time constants with which the joints become slow, and fast again."""
+DISTURBED = 0.03
+"""m, rad: a first task whose error grows by more was pushed away, and may come back."""
 SLOWEST = 0.02
 """rad/s: no joint becomes slower."""
 
@@ -33,15 +35,17 @@ class Stall(NamedTuple):
     Attributes:
         share: 1: it is not; 0: wholly.
         due: (T,) the errors, m or rad, that its tasks should have reached by now.
+        least: the smallest error of the first task since then.
     """
 
     share: float
     due: Array
+    least: float
 
 
 def going(tasks: int) -> Stall:
     """A robot that is not stalled."""
-    return Stall(1.0, np.full(tasks, np.inf))
+    return Stall(1.0, np.full(tasks, np.inf), np.inf)
 
 
 def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) -> Stall:
@@ -59,14 +63,15 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
         room: by how much the nearest distance exceeds d_safe, m; infinite without any.
         T_s: s.
     """
-    far = errors > CLOSE_ENOUGH
-    if moves or not INSIDE <= room <= BLOCKED or not far.any():
-        due, slows = errors, False
+    far, first = errors > CLOSE_ENOUGH, float(errors[0])
+    free = moves or not INSIDE <= room <= BLOCKED or not far.any()
+    if free or first > before.least + DISTURBED:
+        due, least, slows = errors, first, False
     else:
-        due = np.minimum(errors, before.due - PROGRESS * T_s)
+        due, least = np.minimum(errors, before.due - PROGRESS * T_s), min(first, before.least)
         slows = not bool((far & (errors <= due + CLOSE_ENOUGH)).any())
     goal, seconds = (0.0, SLOWING) if slows else (1.0, RECOVERY)
-    return Stall(before.share + min(1.0, T_s / seconds) * (goal - before.share), due)
+    return Stall(before.share + min(1.0, T_s / seconds) * (goal - before.share), due, least)
 
 
 def slowed(limits: LimitsInForce, stall: Stall) -> LimitsInForce:

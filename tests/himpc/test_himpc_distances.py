@@ -146,7 +146,7 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
     """Only while something is near, nothing moves, a task is away from its target, and none comes closer."""
     cases = {
         "stalled": (0.3, False, 0.01),
-        "far from everything": (0.3, False, 0.1),
+        "far from everything": (0.3, False, 0.2),
         "a target moves": (0.3, True, 0.01),
         "there": (0.005, False, 0.01),
     }
@@ -163,5 +163,9 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
         error -= 1e-4
         stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
     assert stall.share == 1.0
+    stall = going(1)
+    for error in [*[0.3] * 1000, 0.35]:
+        stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
+    assert stall.due == [0.35]  # it was pushed away, and may come back
     slow = slowed(in_force(robot, Limits()), stall._replace(share=0.0))
     assert slow.v_limit == pytest.approx(SLOWEST)
