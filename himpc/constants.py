@@ -9,7 +9,7 @@ RETURN_RATE = 5.0
 WITHIN = 0.25
 """m: pairs of links or objects that are farther apart have no row."""
 FADE = 0.05
-"""m: over this distance before WITHIN a bound loosens to none, so that a pair that enters does not jump."""
+"""m: over this distance before WITHIN a bound loosens to none; a pair that enters has no bound yet."""
 RETREAT = 0.2
 """m/s: the fastest retreat that a row of a distance asks for."""
 TURN_PULL = 5.0

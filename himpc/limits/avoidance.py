@@ -19,7 +19,7 @@ class Avoidance:
     Attributes:
         on: whether distances have rows.
         d_safe: m, the distance that is kept.
-        margin: m, added to d_safe, since time-delay estimation brakes late.
+        margin: m, added to d_safe, for what time-delay estimation lags.
         reaction: s before the robot brakes, which the bound allows for.
         deceleration: m/s², of a distance's decrease, that the bound counts on.
         pull: m, largest error on which tasks of positions act while `on`; other tasks act on up to TURN_PULL

@@ -51,10 +51,9 @@ def going(tasks: int) -> Stall:
 def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) -> Stall:
     """The stall one period later.
 
-    At a target that cannot be reached, a strict hierarchy uses every freedom for ever smaller gains: near
-    such a configuration rows of tasks and of distances depend on each other, small errors ask for large
-    velocities, and the joints move at their limits without end. So while something is in the way, no
-    reference moves, and no task that is away from its target comes closer, the joints become slower.
+    Without this, an arm that is dragged into the floor stops above it and goes on moving its joints near
+    their limits without end. The joints become slower while something is near, no reference moves, and no
+    task that is away from its target comes closer.
 
     Args:
         before: one period ago.

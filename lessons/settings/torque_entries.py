@@ -53,7 +53,7 @@ TORQUE_ENTRIES = (
     Entry("avoidance.d_safe", "d_safe", "The distance that is kept", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="safe distance"),
     Entry("avoidance.margin", "Margin",
-          "Added to d_safe, since time-delay estimation brakes late", "m", 0.0, 100.0, 1.0, shown="mm",
+          "Added to d_safe, for what time-delay estimation lags", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="margin of distances"),
     Entry("avoidance.reaction", "Reaction", "Time before the robot brakes, which the bound allows for", "s",
           0.0, 1.0, 0.01, name="reaction of distances"),
@@ -61,9 +61,8 @@ TORQUE_ENTRIES = (
           "How fast the approach to an object can be slowed down, as the bound assumes", "m/s²", 0.1, 20.0,
           0.1, name="deceleration of distances"),
     Entry("avoidance.pull", "Pull",
-          "Largest error of a position on which its task acts while distances are kept, so that a target "
-              "out of reach does not pull harder; other tasks act on up to five times as many rad. 0: no "
-              "limit",
+          "Largest error of a position on which its task acts while distances are kept; other tasks act on "
+              "up to five times as many rad. 0: no limit",
           "m", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",

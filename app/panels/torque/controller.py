@@ -15,6 +15,7 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
+_DISTANCES = ("on", "d_safe", "margin", "reaction", "deceleration", "pull")
 _LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate")
 
 
@@ -48,6 +49,8 @@ class ControllerPanel:
             controls.add_elements("M_bar", robot.joint_names, "Per joint, kg·m²")
         with gui.add_folder("Limits"):
             controls.add(*(f"limits.{name}" for name in _LIMITS))
+        with gui.add_folder("Distances", expand_by_default=False):
+            controls.add(*(f"avoidance.{name}" for name in _DISTANCES))
         with gui.add_folder("Solver", expand_by_default=False):
             controls.add("route", "solver", "R_on")
         with gui.add_folder("Why M̄ matters", expand_by_default=False):
