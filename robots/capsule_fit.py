@@ -1,4 +1,4 @@
-"""A small capsule around points."""
+"""Small capsules around points, many at once."""
 
 from __future__ import annotations
 
@@ -11,69 +11,85 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
-_ROUNDS = 16  # steps of the search for the middle of a circle
+Mask = NDArray[np.bool_]
+_ROUNDS = 12  # steps of the search for the middle of a circle
 _DIGITS = 4  # of a coordinate in m
-_FEW, _MANY = 60, 250  # directions in which the farthest points are fitted, quickly or tightly
-_FACTORS = (1.0, 1.05, 1.1, 1.2, 1.3, 1.5)  # tried for the radius, times the smallest
+_FEW, _MANY = 48, 100  # directions in which the farthest points are fitted, quickly or tightly
+_FACTORS = np.array([1.0, 1.05, 1.1, 1.2, 1.3, 1.5])  # tried for the radius, times the smallest
+_AT_ONCE = 2_000_000  # numbers in an array
 
 
 class Fit(NamedTuple):
-    """Ends of the segment, (3,) m, and radius, m."""
+    """Capsules: ends of the segments, (…, 3) m, and radii, (…,) m."""
 
     start: Array
     end: Array
-    radius: float
+    radius: Array
+
+    def chosen(self, index: object) -> Fit:
+        return Fit(*(each[index] for each in self))  # pyright: ignore[reportCallIssue, reportArgumentType]
 
     @property
-    def volume(self) -> float:
-        """m³."""
-        return float(_volume(math.dist(self.start, self.end), self.radius))
+    def length(self) -> Array:
+        """Lengths of the segments, (…,) m."""
+        return np.sqrt(((self.end - self.start) ** 2).sum(axis=-1))
+
+    @property
+    def volume(self) -> Array:
+        """(…,) m³."""
+        return _volume(self.length, self.radius)
+
+    @property
+    def area(self) -> Array:
+        """(…,) m²."""
+        return 2.0 * np.pi * self.radius * (self.length + 2.0 * self.radius)
 
 
 def reach(points: Array, swell: Array, fit: Fit) -> Array:
-    """How far balls stand out of a capsule, (V,) m, below 0 inside. points: their middles (V, 3), m; swell:
+    """How far balls stand out of capsules, (…, V) m, below 0 inside. points: their middles (V, 3), m; swell:
     their radii (V,), m."""
-    axis = fit.end - fit.start
-    length = max(float(axis @ axis), 1e-300)
-    along = np.clip((points - fit.start) @ axis / length, 0.0, 1.0)
-    return np.linalg.norm(points - fit.start - along[:, None] * axis, axis=1) + swell - fit.radius
+    axis = (fit.end - fit.start)[..., None, :]
+    offset = points - fit.start[..., None, :]
+    length = np.maximum((axis**2).sum(axis=-1), 1e-300)
+    along = np.clip((offset * axis).sum(axis=-1) / length, 0.0, 1.0)
+    gap = offset - along[..., None] * axis
+    return np.sqrt((gap**2).sum(axis=-1)) + swell - fit.radius[..., None]
 
 
-def quick_fit(points: Array, swell: Array) -> Fit:
-    """Returns about the smallest capsule around balls whose axis is one of their principal axes."""
-    few, thick = _farthest(points, swell, _FEW)
-    return min((_along(few, thick, axis) for axis in _principal(points).T), key=lambda fit: fit.volume)
+def quick_fits(points: Array, swell: Array, groups: Mask) -> Fit:
+    """Returns for each group of balls, a row of (B, V), about the smallest capsule around them whose axis is
+    one of their principal axes. No group is empty."""
+    rows = max(1, _AT_ONCE // (_FEW * len(points)))
+    parts = [_quick(points, swell, groups[k : k + rows]) for k in range(0, len(groups), rows)]
+    return Fit(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
 def tight_fit(points: Array, swell: Array) -> Fit:
     """Returns a capsule that contains balls, with about the smallest volume and coordinates of 0.1 mm."""
-    few, thick = _farthest(points, swell, _MANY)
-    rough = [(_along(few, thick, axis), axis) for axis in _principal(points).T]
-    rough.sort(key=lambda each: each[0].volume)
-    best = min((_refined(few, thick, *each) for each in rough[:2]), key=lambda fit: fit.volume)
-    start, end = np.round(best.start, _DIGITS), np.round(best.end, _DIGITS)
-    needed = float(reach(points, swell, Fit(start, end, 0.0)).max())
-    return Fit(start, end, float(np.ceil((needed + 1e-9) * 10**_DIGITS) / 10**_DIGITS))
+    rows = max(1, _AT_ONCE // _MANY)
+    parts = range(0, len(points), rows)
+    far = [_farthest(points[k : k + rows], swell[k : k + rows]) + k for k in parts]
+    chosen = np.unique(np.concatenate(far))
+    few, thick = points[chosen], swell[chosen]
+    ends = np.unique(few, axis=0)
+    if len(ends) <= 2 and np.ptp(swell) == 0.0:
+        return _rounded(points, swell, ends[0], ends[-1])
+    middle, axes = _principal(points, np.ones((1, len(points)), np.bool_))
+    rough = _on_axes(few[None], thick[None], middle, axes).chosen(0)
+    k = int(rough.volume.argmin())
+    best = _refined(few, thick, rough.chosen(k), axes[0, :, k])
+    return _rounded(points, swell, best.start, best.end)
 
 
-def _norm(rows: Array) -> Array:
-    return np.sqrt(np.einsum("ij,ij->i", rows, rows))
+def _rounded(points: Array, swell: Array, start: Array, end: Array) -> Fit:
+    """The capsule with rounded ends that contains balls, its radius rounded up."""
+    start, end = np.round(start, _DIGITS) + 0.0, np.round(end, _DIGITS) + 0.0
+    needed = float(reach(points, swell, Fit(start, end, np.zeros(()))).max())
+    return Fit(start, end, np.ceil((needed + 1e-9) * 10**_DIGITS) / 10**_DIGITS)
 
 
-def _volume(length: Array | float, radius: Array | float) -> Array | float:
-    return np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
-
-
-def _principal(points: Array) -> Array:
-    """Orthonormal axes as columns, those of the largest variance first."""
-    middle = points - points.mean(axis=0)
-    return np.linalg.svd(middle.T @ middle)[0]
-
-
-def _farthest(points: Array, swell: Array, directions: int) -> tuple[Array, Array]:
-    """The balls that reach farthest in directions."""
-    chosen = np.unique((points @ sphere(directions).T + swell[:, None]).argmax(axis=0))
-    return points[chosen], swell[chosen]
+def _farthest(points: Array, swell: Array) -> NDArray[np.intp]:
+    return np.unique((sphere(_MANY) @ points.T + swell).argmax(axis=1))
 
 
 @lru_cache(maxsize=4)
@@ -85,51 +101,101 @@ def sphere(count: int) -> Array:
     return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
 
 
-def _along(points: Array, swell: Array, axis: Array) -> Fit:
-    """The smallest capsule whose axis has a direction and goes through the middle of the smallest circle."""
-    across = np.linalg.svd(axis[None])[2][1:]
-    flat = points @ across.T
-    middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
-    best, least = middle, np.inf
+def _volume(length: Array, radius: Array) -> Array:
+    return np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+
+
+def _quick(points: Array, swell: Array, groups: Mask) -> Fit:
+    heights = sphere(_FEW) @ points.T + swell
+    far = np.where(groups[:, None, :], heights, -np.inf).argmax(axis=2)
+    fits = _on_axes(points[far], swell[far], *_principal(points, groups))
+    return fits.chosen((np.arange(len(groups)), fits.volume.argmin(axis=1)))
+
+
+def _principal(points: Array, groups: Mask) -> tuple[Array, Array]:
+    """The middles (B, 3), m, of groups, and their principal axes as columns (B, 3, 3)."""
+    share = groups / groups.sum(axis=1, keepdims=True)
+    origin = points.mean(axis=0)
+    offset = points - origin
+    middle = share @ offset
+    squares = (share @ (offset[:, :, None] * offset[:, None, :]).reshape(-1, 9)).reshape(-1, 3, 3)
+    return middle + origin, np.linalg.eigh(squares - middle[:, :, None] * middle[:, None, :])[1]
+
+
+def _on_axes(points: Array, swell: Array, middle: Array, axes: Array) -> Fit:
+    """The smallest capsules (B, 3) whose axes have the directions (B, 3, 3) and go through the middle of the
+    smallest circle around points (B, D, 3)."""
+    local = (points - middle[:, None, :]) @ axes
+    z = local.swapaxes(1, 2)
+    flat = np.stack([local[:, :, [1, 2]], local[:, :, [2, 0]], local[:, :, [0, 1]]], axis=1)
+    thick = swell[:, None, :]
+    at = 0.5 * (flat.min(axis=2) + flat.max(axis=2))
+    best, least = at, np.full(at.shape[:2], np.inf)
     for k in range(_ROUNDS):
-        gap = _norm(flat - middle) + swell
-        far = int(gap.argmax())
-        if gap[far] < least:
-            best, least = middle, gap[far]
-        middle = middle + (flat[far] - middle) / (k + 2.0)
-    return _closed(points, swell, axis, best @ across, _FACTORS)
+        gap = np.sqrt(((flat - at[:, :, None, :]) ** 2).sum(axis=3)) + thick
+        far = gap.argmax(axis=2)[:, :, None]
+        width = np.take_along_axis(gap, far, axis=2)[:, :, 0]
+        best = np.where((width < least)[:, :, None], at, best)
+        least = np.minimum(width, least)
+        at = at + (np.take_along_axis(flat, far[..., None], axis=2)[:, :, 0] - at) / (k + 2.0)
+    rho = np.sqrt(((flat - best[:, :, None, :]) ** 2).sum(axis=3))
+    bottom, top, radius = _closed(z, rho, thick, _FACTORS)
+    through = np.zeros((*best.shape[:2], 3))
+    for k in range(3):
+        through[:, k, [(k + 1) % 3, (k + 2) % 3]] = best[:, k]
+    ends = [
+        (through + height[..., None] * np.eye(3)) @ axes.swapaxes(1, 2) + middle[:, None, :]
+        for height in (bottom, top)
+    ]
+    return Fit(ends[0], ends[1], radius)
 
 
-def _closed(points: Array, swell: Array, axis: Array, through: Array, factors: tuple[float, ...]) -> Fit:
-    """The smallest capsule on a line, its radius one of the factors times the smallest one."""
-    offset = points - through
-    z = offset @ axis
-    rho = _norm(offset - z[:, None] * axis)
-    radius = float((rho + swell).max()) * np.asarray(factors)[:, None] + 1e-12
-    slack = np.sqrt(np.maximum((radius - swell) ** 2 - rho**2, 0.0))
-    top, bottom = (z - slack).max(axis=1), (z + slack).min(axis=1)
+def _closed(z: Array, rho: Array, swell: Array, factors: Array) -> tuple[Array, Array, Array]:
+    """(bottom, top, radius) of the smallest capsules on lines, radii one of the factors times the smallest.
+
+    z, rho: (…, D) positions of points along lines and their distances from them, m.
+    """
+    radius = (rho + swell).max(axis=-1)[..., None] * factors + 1e-12
+    slack = (radius[..., None] - swell[..., None, :]) ** 2 - rho[..., None, :] ** 2
+    slack = np.sqrt(np.maximum(slack, 0.0))
+    top, bottom = (z[..., None, :] - slack).max(axis=-1), (z[..., None, :] + slack).min(axis=-1)
+    ball = top < bottom
     middle = 0.5 * (top + bottom)
-    top, bottom = np.where(top < bottom, middle, top), np.where(top < bottom, middle, bottom)
-    k = int(np.argmin(_volume(top - bottom, radius[:, 0])))
-    return Fit(through + bottom[k] * axis, through + top[k] * axis, float(radius[k, 0]))
+    top, bottom = np.where(ball, middle, top), np.where(ball, middle, bottom)
+    k = _volume(top - bottom, radius).argmin(axis=-1)[..., None]
+    return tuple(np.take_along_axis(each, k, axis=-1)[..., 0] for each in (bottom, top, radius))  # pyright: ignore[reportReturnType]
 
 
 def _refined(points: Array, swell: Array, fit: Fit, axis: Array) -> Fit:
     """Improves direction, place and radius by Nelder and Mead."""
     across = np.linalg.svd(axis[None])[2][1:]
-    size = float(np.ptp(points, axis=0).max()) + fit.radius
+    size = float(np.ptp(points, axis=0).max()) + float(fit.radius)
     through = 0.5 * (fit.start + fit.end)
 
-    def made(x: Array) -> Fit:
-        turned = axis + x[0] * across[0] + x[1] * across[1]
-        at = through + size * (x[2] * across[0] + x[3] * across[1])
-        return _closed(points, swell, turned / math.hypot(*turned), at, (1.0 + abs(x[4]),))
+    thick = swell.any()
 
+    def made(x: Array) -> tuple[float, Array, Array, float, float, float]:
+        turned = axis + x[0] * across[0] + x[1] * across[1]
+        turned = turned / math.hypot(*turned)
+        at = through + size * (x[2] * across[0] + x[3] * across[1])
+        offset = points - at
+        z = offset @ turned
+        apart = np.maximum(np.einsum("ij,ij->i", offset, offset) - z * z, 0.0)
+        widest = (np.sqrt(apart) + swell).max() if thick else math.sqrt(apart.max())
+        radius = float(widest) * (1.0 + abs(float(x[4]))) + 1e-12
+        slack = np.sqrt(np.maximum((radius - swell) ** 2 - apart, 0.0))
+        top, bottom = float((z - slack).max()), float((z + slack).min())
+        if top < bottom:
+            top = bottom = 0.5 * (top + bottom)
+        return math.pi * radius**2 * (top - bottom + 4.0 / 3.0 * radius), at, turned, bottom, top, radius
+
+    least = max(float(fit.volume), 1e-30)
     simplex = np.vstack([np.zeros(5), np.diag([0.15, 0.15, 0.05, 0.05, 0.1])])
     found = minimize(
-        lambda x: made(x).volume / max(fit.volume, 1e-30),
+        lambda x: made(x)[0] / least,
         np.zeros(5),
         method="Nelder-Mead",
-        options={"initial_simplex": simplex, "maxfev": 200, "xatol": 1e-3, "fatol": 1e-4},
+        options={"initial_simplex": simplex, "maxfev": 150, "xatol": 1e-3, "fatol": 1e-4},
     )
-    return made(found.x)
+    _, at, turned, bottom, top, radius = made(found.x)
+    return Fit(at + bottom * turned, at + top * turned, np.array(radius))

@@ -1,17 +1,21 @@
-"""Generates visual shapes for bodies without meshes: capsules from joint to joint, and a drum at each
-revolute joint."""
+"""Generates visual shapes: for bodies without meshes capsules from joint to joint, and a drum at each
+revolute joint; for a cover its capsules."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import pinocchio as pin
 import trimesh
 
+from robots.cover import Cover
 from robots.limbs import BODY, DRUM, TIP, Colour, Limb, joint_radius, limbs
 from robots.truth import joint_axis
+
+COVER: Colour = (86, 140, 200)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,20 +45,37 @@ def body_capsules(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[MeshP
 
 def _limb(limb: Limb) -> Iterator[MeshPart]:
     joint, k, end, radius, colour = limb
-    length = float(np.linalg.norm(end))
-    solid = trimesh.creation.capsule(height=length, radius=radius, count=[24, 24])
-    vertices = np.asarray(solid.vertices)
-    vertices = (
-        vertices - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)) + np.array([0.0, 0.0, 0.5 * length])
-    )
+    vertices, faces = _capsule(float(np.linalg.norm(end)), radius, 24)
     if colour == TIP:
-        yield MeshPart(joint, _along(vertices, end), np.asarray(solid.faces), BODY, f"body{joint}/limb{k}")
+        yield MeshPart(joint, _along(vertices, end), faces, BODY, f"body{joint}/limb{k}")
         ball = trimesh.creation.icosphere(subdivisions=3, radius=1.08 * radius)
         yield MeshPart(
             joint, np.asarray(ball.vertices) + end, np.asarray(ball.faces), TIP, f"body{joint}/tip"
         )
     else:
-        yield MeshPart(joint, _along(vertices, end), np.asarray(solid.faces), colour, f"body{joint}/limb{k}")
+        yield MeshPart(joint, _along(vertices, end), faces, colour, f"body{joint}/limb{k}")
+
+
+def _capsule(length: float, radius: float, sections: int) -> tuple[np.ndarray, np.ndarray]:
+    """(vertices, faces) of a capsule along z, from 0 to a length."""
+    solid = trimesh.creation.capsule(height=length, radius=radius, count=[sections, sections])
+    vertices = np.asarray(solid.vertices)
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    return vertices - middle + np.array([0.0, 0.0, 0.5 * length]), np.asarray(solid.faces)
+
+
+def cover_parts(cover: Cover) -> Iterator[MeshPart]:
+    """Generates the shapes of a cover, one for each body that has capsules."""
+    for joint, capsules in groupby(cover.capsules, lambda capsule: capsule.joint):
+        vertices: list[np.ndarray] = []
+        faces: list[np.ndarray] = []
+        for capsule in capsules:
+            axis = np.subtract(capsule.end, capsule.start)
+            length = float(np.linalg.norm(axis))
+            points, triangles = _capsule(length, capsule.radius, 16)
+            faces.append(triangles + sum(map(len, vertices)))
+            vertices.append((_along(points, axis) if length > 0.0 else points) + capsule.start)
+        yield MeshPart(joint, np.concatenate(vertices), np.concatenate(faces), COVER, f"cover/{joint}")
 
 
 def _pedestal(limb: Limb) -> Iterator[MeshPart]:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 Point = tuple[float, float, float]
 SolidKind = Literal["box", "sphere", "cylinder", "capsule", "hull"]
-Why = Literal["neighbours", "home", "always", "hollow"]
+Why = Literal["neighbours", "home", "always", "hollow", "cover"]
 Source = Literal["collision", "hull", "capsule"]
 
 
@@ -45,9 +45,10 @@ class Excluded:
     """Two bodies whose contact is left out: first < second, Pinocchio indices of their joints, 0 for the
     base.
 
-    names: a link of each. why: "neighbours" (a joint connects them), "home" (they touch at home) or "always"
-    (they touch in nearly every posture) or "hollow" (their hulls, which fill the hollows of the real links,
-    touch in postures in which the links do not).
+    names: a link of each. why: "neighbours" (a joint connects them), "home" (they touch at home), "always"
+    (they touch in nearly every posture), "hollow" (their hulls, which fill the hollows of the real links,
+    touch in postures in which the links do not) or, in a cover, "cover" (only their capsules touch, in many
+    postures).
     """
 
     first: int
@@ -77,11 +78,7 @@ class CollisionModel:
         parts = [text.format(counts[source]) for source, text in words.items() if counts[source]]
         near = sum(pair.why == "neighbours" for pair in self.excluded)
         text = f"contacts use {', '.join(parts)}; left out are {near} pair(s) of neighbours"
-        for why, said in _TOLD:
-            pairs = [" – ".join(pair.names) for pair in self.excluded if pair.why == why]
-            shown = ", ".join(pairs[:_SHOWN]) + (f" and {len(pairs) - _SHOWN} more" if pairs[_SHOWN:] else "")
-            text += f", and {shown}, which {said}" if pairs else ""
-        return text
+        return text + told(self.excluded)
 
 
 _SHOWN = 8
@@ -89,7 +86,18 @@ _TOLD = (
     ("home", "touch at home"),
     ("always", "touch in nearly every posture"),
     ("hollow", "touch only as convex hulls"),
+    ("cover", "touch only as capsules"),
 )
+
+
+def told(excluded: tuple[Excluded, ...]) -> str:
+    """The end of a sentence of the import report: pairs that are left out, without neighbours."""
+    text = ""
+    for why, said in _TOLD:
+        pairs = [" – ".join(pair.names) for pair in excluded if pair.why == why]
+        shown = ", ".join(pairs[:_SHOWN]) + (f" and {len(pairs) - _SHOWN} more" if pairs[_SHOWN:] else "")
+        text += f", and {shown}, which {said}" if pairs else ""
+    return text
 
 
 def stored(path: Path) -> CollisionModel:

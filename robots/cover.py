@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robots.collision_model import Excluded, Point, frozen
+from robots.collision_model import Excluded, Point, frozen, told
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -39,6 +39,14 @@ class Cover:
 
     capsules: tuple[Capsule, ...] = ()
     excluded: tuple[Excluded, ...] = ()
+
+    def __str__(self) -> str:
+        """One line for the import report."""
+        if not self.capsules:
+            return "the robot has no capsules: no distance is kept"
+        near = sum(pair.why == "neighbours" for pair in self.excluded)
+        text = f"distances use {len(self.capsules)} capsules that contain the links"
+        return f"{text}; left out are {near} pair(s) of neighbours{told(self.excluded)}"
 
 
 def cover_of(robot: Robot) -> Cover:

@@ -19,7 +19,7 @@ from robots.urdf.read import Refusal, placement
 
 Array = NDArray[np.float64]
 _SECTIONS = 24  # of a round solid
-_MOST = 400_000  # triangles of a robot
+_MOST = 250_000  # triangles of a robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Patch:
 
 
 def patches(robot: Robot, meshes: bool = True) -> Iterator[Patch]:
-    """Yields the surfaces of the solids and of the visual shapes of a robot, at most 400,000 triangles.
+    """Yields the surfaces of the solids and of the visual shapes of a robot, at most 250,000 triangles.
 
     meshes: whether mesh files are read. No content of the description or of a mesh file raises an error.
     """

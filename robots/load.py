@@ -13,7 +13,7 @@ from robots.collision_model import stored
 from robots.cover import stored_cover
 from robots.errors import InputError, shortened, unknown_name
 from robots.importing import Import, bounds, import_robot
-from robots.mechanics.imported import with_collision
+from robots.mechanics.imported import with_cover, with_geometry
 from robots.meshes import has_meshes
 from robots.processes.isolation import Fault, isolated
 from robots.report import Finding, ImportReport
@@ -67,15 +67,23 @@ def _import(
     data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
 ) -> Import:
     try:
-        found = isolated(import_robot, data, source, folder, tip, within)
+        found = isolated(_imported, data, source, folder, tip, within)
     except Fault as fault:
         return Import(ImportReport(source, (Finding("refused", source, str(fault)),)))
     if found.robot is None or not has_meshes(found.robot.urdf_text):
         return found
     try:
-        robot = isolated(with_collision, found.robot)
+        robot = isolated(with_geometry, found.robot)
     except Fault:
-        robot = with_collision(found.robot, meshes=False)
+        robot = with_geometry(found.robot, meshes=False)
+    return Import(robot.report, robot)
+
+
+def _imported(data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None) -> Import:
+    found = import_robot(data, source, folder, tip, within)
+    if found.robot is None or has_meshes(found.robot.urdf_text):
+        return found
+    robot = with_cover(found.robot)
     return Import(robot.report, robot)
 
 

@@ -1,4 +1,4 @@
-"""The spheres that approximate a robot for collision avoidance."""
+"""The spheres that approximate a robot for collision avoidance in HTMPC."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:
     along the links for other robots.
 
     The generated ones follow the straight lines from each joint to the next and to the tip, in steps of their
-    radius, a twentieth of the chain's length.
+    radius, a twentieth of the chain's length. They approximate the links, as in the HTMPC paper, and parts of
+    the links stand out of them; the capsules of `robots.cover.cover_of`, which distances at torque level use,
+    contain the links.
     """
     return _BY_ROBOT.get(robot.name) or _along_links(robot)
 

@@ -22,6 +22,7 @@ from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import draggable
+from app.view.cover import CoverView
 from app.view.drag import Hand
 from app.view.ellipsoids import EllipsoidView
 from app.view.link_picker import LinkPicker
@@ -123,6 +124,7 @@ class TorqueFace:
         self._add_targets(scene)
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
+        self._cover = CoverView(scene, ready.robot)
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]
@@ -205,6 +207,7 @@ class TorqueFace:
         self._inside.draw(moment)
         q = moment.latest[context.ready.layout.fields["q"]]
         self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
+        self._cover.draw(bool(self._start.cover.value))
 
     def write(self, now: SessionSnapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:

@@ -2,43 +2,107 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 
-from robots.collision_model import Solid
+from robots.collision_model import CollisionModel, Excluded, Solid
 from robots.cover import Capsule, Cover
 from robots.covered import patches
 from robots.covering import covering
-from robots.mechanics.exclusions import collision_model
+from robots.mechanics.exclusions import collision_model, touching_often
 from robots.per_robot import per_robot
 from robots.robot import Robot
 
+NEAR = 0.01
+"""m: bodies whose capsules are nearer than this at home are left out: a safe distance could not hold."""
+USELESS = 0.5
+"""Share of the postures without contact in which two bodies are left out if their capsules touch."""
+
+
+_TAPER = 0.4
+"""How much less it matters that the capsules of the base stand out than those of a last link."""
+_CLOSE = 2.5
+"""How much more it matters for bodies whose capsules alone are too near to each other."""
+
+
+_TAPER = 0.4
+"""How much less it matters that the capsules of the base stand out than those of a last link."""
+
+
+_CLOSE = 2.5
+"""How much more it matters for bodies that only their capsules bring too near to each other."""
+
 
 @per_robot
-def made_cover(robot: Robot, meshes: bool = True) -> Cover:
-    """Makes the cover of a robot from its URDF and its solids. meshes: whether mesh files are read."""
-    model = robot.model
-    longest = max(len(support) for support in model.supports) - 1
-    depth = {joint: (len(model.supports[joint]) - 1) / max(longest, 1) for joint in range(model.njoints)}
-    capsules = covering(patches(robot, meshes), depth)
-    return Cover(capsules, collision_model(robot, tuple(map(as_solid, capsules))).excluded)
+def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
+    """Makes the cover of a robot from its URDF and its solids.
+
+    Left out are the pairs that the plant leaves out, pairs whose capsules are nearer than 10 mm at home,
+    and pairs whose capsules touch in many postures in which the solids do not.
+
+    Args:
+        robot: it has its collision geometry.
+        meshes: whether mesh files are read.
+        tries: with 2, the bodies of pairs that are left out only because of their capsules get more of the
+            capsules, if fewer pairs are left out then.
+    """
+    surfaces = list(patches(robot, meshes))
+    supports = robot.model.supports
+    longest = max(max(map(len, supports)) - 1, 1)
+    weights = {k: 1.0 - _TAPER * (1.0 - (len(own) - 1) / longest) for k, own in enumerate(supports)}
+    best = _checked(robot, covering(surfaces, weights))
+    for _ in range(tries - 1):
+        close = {each for pair in _own_pairs(robot, best) for each in (pair.first, pair.second)}
+        if not close:
+            break
+        weights = {joint: weight * (_CLOSE if joint in close else 1.0) for joint, weight in weights.items()}
+        now = _checked(robot, covering(surfaces, weights))
+        best = min(best, now, key=lambda each: len(each.excluded))
+    return best
+
+
+def _own_pairs(robot: Robot, cover: Cover) -> tuple[Excluded, ...]:
+    """The pairs that a cover leaves out and the plant does not."""
+    known = {(pair.first, pair.second) for pair in robot.collision.excluded}
+    return tuple(pair for pair in cover.excluded if (pair.first, pair.second) not in known)
+
+
+def _checked(robot: Robot, capsules: tuple[Capsule, ...]) -> Cover:
+    """The cover with the pairs to leave out."""
+    solids = tuple(map(as_solid, capsules))
+    found = Cover(capsules, collision_model(robot, solids, near_home=NEAR).excluded)
+    excluded = (*robot.collision.excluded, *_own_pairs(robot, found))
+    covered = replace(robot, collision=CollisionModel(solids, excluded))
+    return Cover(capsules, (*excluded, *_useless(robot, covered)))
+
+
+def _useless(robot: Robot, covered: Robot) -> list[Excluded]:
+    counts: Counter[tuple[int, int]] = Counter()
+    both: Counter[tuple[int, int]] = Counter()
+    postures = list(zip(touching_often(robot), touching_often(covered), strict=True))
+    for real, found in postures:
+        counts.update(found - real)
+        both.update(found & real)
+    names = {solid.joint: solid.link for solid in reversed(covered.collision.solids)}
+    return [
+        Excluded(a, b, (names[a], names[b]), "cover")
+        for (a, b), count in sorted(counts.items())
+        if count > USELESS * (len(postures) - both[a, b])
+    ]
 
 
 def as_solid(capsule: Capsule) -> Solid:
     """A capsule of a cover as a solid of the plant."""
     start, end = np.array(capsule.start), np.array(capsule.end)
     length = float(np.linalg.norm(end - start))
-    middle = tuple(float(x) for x in 0.5 * (start + end))
+    x, y, z = (float(value) for value in 0.5 * (start + end))
     if length < 1e-6:
-        return Solid(capsule.joint, capsule.link, "sphere", "capsule", (capsule.radius,), middle)
+        size: tuple[float, ...] = (capsule.radius,)
+        return Solid(capsule.joint, capsule.link, "sphere", "capsule", size, (x, y, z))
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (end - start) / length)
-    x, y, z, w = turn.coeffs()
-    return Solid(
-        capsule.joint,
-        capsule.link,
-        "capsule",
-        "capsule",
-        (capsule.radius, 0.5 * length),
-        middle,
-        (w, x, y, z),
-    )
+    i, j, k, w = (float(value) for value in turn.coeffs())
+    size = capsule.radius, 0.5 * length
+    return Solid(capsule.joint, capsule.link, "capsule", "capsule", size, (x, y, z), (w, i, j, k))

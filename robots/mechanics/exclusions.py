@@ -4,6 +4,7 @@ postures."""
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 
 import mujoco
@@ -19,16 +20,20 @@ from robots.settings import PlantSettings
 NEAR = 2e-3
 """m: bodies that are nearer than this at home count as touching there."""
 SAMPLES = 300
+Bodies = tuple[int, int]
 OFTEN = 0.9
 """Share of random postures in which a pair touches that is always excluded."""
 
 
 def collision_model(
-    robot: Robot, solids: tuple[Solid, ...], hollow: tuple[tuple[str, str], ...] = ()
+    robot: Robot,
+    solids: tuple[Solid, ...],
+    hollow: tuple[tuple[str, str], ...] = (),
+    near_home: float = NEAR,
 ) -> CollisionModel:
     """Returns the solids with the pairs of bodies to leave out: neighbours, pairs of links that are
-    `hollow`, pairs that are nearer than 2 mm at home, and pairs that touch in nearly every posture within
-    the joints' limits."""
+    `hollow`, pairs that are nearer than a distance (m) at home, and pairs that touch in nearly every posture
+    within the joints' limits."""
     names: dict[int, str] = {}
     for solid in solids:
         names.setdefault(solid.joint, solid.link)
@@ -46,34 +51,36 @@ def collision_model(
         first, second = sorted(robot.model.frames[robot.frame_id(link)].parentJoint for link in links)
         near.append(pair(first, second, "hollow"))
     model = CollisionModel(solids, tuple(near))
-    home = sorted(touching(replace(robot, collision=model), robot.home, NEAR))
+    home = sorted(touching(replace(robot, collision=model), robot.home, near_home))
     model = replace(model, excluded=(*model.excluded, *(pair(a, b, "home") for a, b in home)))
-    postures = sample_configurations(
-        np.maximum(robot.q_lower, -np.pi), np.minimum(robot.q_upper, np.pi), SAMPLES, 0
-    )
-    counts = _touches(replace(robot, collision=model), postures)
+    counts = Counter(each for found in touching_often(replace(robot, collision=model)) for each in found)
     always = sorted(each for each, count in counts.items() if count > OFTEN * SAMPLES)
     return replace(model, excluded=(*model.excluded, *(pair(a, b, "always") for a, b in always)))
 
 
-def touching(robot: Robot, q: np.ndarray, margin: float = 0.0) -> set[tuple[int, int]]:
+def touching(robot: Robot, q: np.ndarray, margin: float = 0.0) -> set[Bodies]:
     """Returns the pairs of bodies, excluded ones left out, that are nearer than a margin (m) at q (n,),
     rad; 0 is the base."""
-    return set(_touches(robot, np.array([q]), margin))
+    return next(_touches(robot, np.array([q]), margin))
 
 
-def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Counter[tuple[int, int]]:
+def touching_often(robot: Robot) -> list[set[Bodies]]:
+    """Returns the pairs of bodies, excluded ones left out, that touch in each of 300 random postures within
+    the joints' limits."""
+    lower, upper = np.maximum(robot.q_lower, -np.pi), np.minimum(robot.q_upper, np.pi)
+    return list(_touches(robot, sample_configurations(lower, upper, SAMPLES, 0)))
+
+
+def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterator[set[Bodies]]:
     # Both solids have the margin, and MuJoCo adds them.
     model = compiled(robot, PlantSettings(contacts=True), margin=0.5 * margin)
     data = mujoco.MjData(model)
     joints = [solid.joint for solid in robot.collision.solids]
-    counts: Counter[tuple[int, int]] = Counter()
     for q in postures:
         data.qpos[:] = q
         mujoco.mj_fwdPosition(model, data)
-        found = {tuple(sorted(joints[geom] for geom in contact.geom)) for contact in data.contact}
-        counts.update((a, b) for a, b in found)
-    return counts
+        pairs = (sorted(joints[geom] for geom in contact.geom) for contact in data.contact)
+        yield {(a, b) for a, b in pairs}
 
 
 def lowest(robot: Robot) -> tuple[float | None, float | None]:

@@ -1,4 +1,4 @@
-"""Gives an imported robot its collision geometry, and a line about it in the import report."""
+"""Gives an imported robot its collision geometry and its cover, and lines about them in the report."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from robots.collision_model import CollisionModel
 from robots.collision_shapes import collision_solids
+from robots.cover import Cover
+from robots.mechanics.covers import made_cover
 from robots.mechanics.exclusions import collision_model
 from robots.report import Finding
 from robots.robot import Robot
@@ -24,6 +26,28 @@ def with_collision(robot: Robot, meshes: bool = True) -> Robot:
         found, text = CollisionModel(), "MuJoCo cannot use the robot's shapes: the robot touches nothing"
     if not meshes:
         text += "; reading its meshes takes too long or fails"
-    finding = Finding("note", "contacts", text)
-    report = replace(robot.report, findings=(*robot.report.findings, finding))
-    return replace(robot, collision=found, report=report)
+    return replace(_noted(robot, "contacts", text), collision=found)
+
+
+def with_cover(robot: Robot, meshes: bool = True) -> Robot:
+    """Returns a robot that has its collision geometry with the capsules that distances use.
+
+    meshes: whether mesh files are read. A robot whose numbers no capsule can contain has none, and the report
+    says so.
+    """
+    try:
+        found = made_cover(robot, meshes)
+        text = str(found)
+    except (ValueError, RuntimeError, ArithmeticError):
+        found, text = Cover(), "no capsules contain the robot's shapes: no distance is kept"
+    return replace(_noted(robot, "distances", text), cover=found)
+
+
+def with_geometry(robot: Robot, meshes: bool = True) -> Robot:
+    """Both."""
+    return with_cover(with_collision(robot, meshes), meshes)
+
+
+def _noted(robot: Robot, where: str, text: str) -> Robot:
+    findings = (*robot.report.findings, Finding("note", where, text))
+    return replace(robot, report=replace(robot.report, findings=findings))

@@ -24,4 +24,4 @@ def made(entry: CatalogEntry) -> CollisionModel:
 if __name__ == "__main__":
     for each in CATALOG.values():
         each.collision_path.write_text(as_json(made(each)))
-        each.cover_path.write_text(cover_as_json(made_cover(load_robot(each.name))))
+        each.cover_path.write_text(cover_as_json(made_cover(load_robot(each.name), tries=2)))

@@ -11,11 +11,14 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.messages import ContactPoint, Post
 from app.panels.torque.plots import touching
+from app.view.cover import CoverView
 from app.view.world import ContactView, WorldView
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
-from robots import Ball, Box, Floor
+from robots import Ball, Box, Floor, load_robot
+from robots.capsules import cover_parts
+from robots.cover import cover_of
 from robots.world import Post as Pole
 from robots.world import Thing
 
@@ -95,3 +98,24 @@ def test_the_plot_of_errors_marks_the_time_in_contact() -> None:
         columns=lambda _: np.array([[np.nan], [0.0], [12.0], [0.0]]),
     )
     np.testing.assert_array_equal(touching(window) > 0.0, [False, False, True, False])
+
+
+def test_the_cover_is_drawn_on_request() -> None:
+    """Nothing is created before; each mesh is below the frame of its body, and contains the body's drawn
+    shapes."""
+    scene: Any = Scene()
+    robot = load_robot("panda")
+    view = CoverView(scene, robot)
+    view.draw(False)
+    assert not scene.added
+    view.draw(True)
+    bodies = {capsule.joint for capsule in cover_of(robot).capsules}
+    assert set(scene.added) == {f"/robot/{joint or 'base'}/cover" for joint in bodies}
+    assert all(node.visible for node in scene.added.values())
+    for part in cover_parts(cover_of(robot)):
+        for capsule in (each for each in cover_of(robot).capsules if each.joint == part.joint):
+            ends = np.array([capsule.start, capsule.end])
+            assert (part.vertices.min(axis=0) <= ends.min(axis=0) - 0.97 * capsule.radius).all()
+            assert (part.vertices.max(axis=0) >= ends.max(axis=0) + 0.97 * capsule.radius).all()
+    view.draw(False)
+    assert not any(node.visible for node in scene.added.values())

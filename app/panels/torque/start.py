@@ -82,6 +82,12 @@ class StartPanel:
                 hint="The speed at which each level can move its frame with joints of unit speed, within the "
                 "freedom that the levels above leave. The ellipsoid is flat in directions without motion",
             )
+            self.cover = gui.add_checkbox(
+                "Cover that distances use",
+                False,
+                hint="The capsules that contain the links. A controller that keeps distances measures them "
+                "between these capsules",
+            )
         self.dark = gui.add_checkbox("Dark theme", dark)
 
         @buttons.on_click

@@ -1,0 +1,143 @@
+"""A body of a robot as triangles, and how far capsules stand out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from robots.capsule_fit import Fit, quick_fits, reach
+from robots.covered import Patch
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+_FINE = 15  # parts into which the edges of large triangles are cut, per largest extent of a body
+_LARGEST = 40_000  # triangles of a link, beyond which no more are cut
+_SAMPLE = 500  # triangles of a body by which groups are found
+_NEAR = 8_000  # points from which distances are measured
+_SURFACE = 80  # points of a capsule whose distances are measured
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The triangles of a body.
+
+    Attributes:
+        joint: Pinocchio index of its joint. names: its links.
+        corners: (F, 3, 3), m. swells: (F,), m, radii of the balls whose middles fill the triangles.
+        links: (F,), the index of the link of each.
+    """
+
+    joint: int
+    names: tuple[str, ...]
+    corners: Array
+    swells: Array
+    links: Indices
+
+    @cached_property
+    def areas(self) -> Array:
+        """(F,), m², above 0."""
+        a, b, c = self.corners.swapaxes(0, 1)
+        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1) + 1e-12
+
+    @cached_property
+    def sample(self) -> Indices:
+        """Triangles by which groups are found, evenly over the area."""
+        return self._drawn(_SAMPLE)
+
+    @cached_property
+    def middles(self) -> Array:
+        """Middles of the sample, (S, 3), m."""
+        return self.corners[self.sample].mean(axis=1)
+
+    @cached_property
+    def swell(self) -> Array:
+        """Radii of balls at these middles that stand for the triangles, (S,), m."""
+        corners = self.corners[self.sample] - self.middles[:, None, :]
+        return self.swells[self.sample] + 0.5 * np.sqrt((corners**2).sum(axis=2)).max(axis=1)
+
+    @cached_property
+    def _nearby(self) -> KDTree:
+        return KDTree(self.corners[self._drawn(_NEAR)].mean(axis=1))
+
+    def fits(self, group: Indices) -> Fit:
+        """Capsules around the groups of the sample, (K,)."""
+        return quick_fits(self.middles, self.swell, group == np.arange(group.max() + 1)[:, None])
+
+    def excess(self, fits: Fit) -> float:
+        """How far capsules stand out, m: the mean of the squares over their outer surface, rooted."""
+        gaps, areas = self.gaps(fits, _SURFACE)
+        return float(np.sqrt(np.average(gaps**2, weights=areas)))
+
+    def gaps(self, fits: Fit, count: int) -> tuple[Array, Array]:
+        """Distances, m, from points of the capsules' surfaces that lie in no other one to the triangles, and
+        the areas that the points stand for, m²."""
+        every = [surface(fits.chosen(k), count) for k in range(len(fits.radius))]
+        outer = np.concatenate(
+            [
+                np.delete(reach(points, np.zeros(count), fits), k, axis=0).min(axis=0, initial=1.0) > 0.0
+                for k, points in enumerate(every)
+            ]
+        )
+        areas = np.repeat(fits.area / count, count)[outer]
+        points = np.concatenate(every)[outer]
+        return np.maximum(self._nearby.query(points)[0] - self.swells.max(), 0.0), areas
+
+    def name(self, mask: NDArray[np.bool_]) -> str:
+        """The link with the largest area of some triangles."""
+        return self.names[int(np.bincount(self.links[mask], weights=self.areas[mask]).argmax())]
+
+    def _drawn(self, most: int) -> Indices:
+        share = self.areas / self.areas.sum() + 0.1 / len(self.areas)
+        count = min(len(share), most)
+        drawn = np.random.default_rng(0).choice(len(share), count, replace=False, p=share / share.sum())
+        return np.sort(drawn)
+
+
+def body_of(surfaces: list[Patch]) -> Body:
+    """Returns the body that patches of one joint make, its large triangles cut into small ones."""
+    names = tuple(dict.fromkeys(patch.link for patch in surfaces))
+    corners = np.concatenate([patch.corners for patch in surfaces])
+    swells = np.concatenate([np.full(len(patch.corners), patch.swell) for patch in surfaces])
+    links = np.concatenate([np.full(len(patch.corners), names.index(patch.link)) for patch in surfaces])
+    edge = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) / _FINE
+    return Body(surfaces[0].joint, names, *_cut(corners, swells, links, edge))
+
+
+def _cut(corners: Array, swells: Array, links: Indices, edge: float) -> tuple[Array, Array, Indices]:
+    """Halves the longest edges of triangles until they are short, or there are enough triangles."""
+    done: list[tuple[Array, Array, Indices]] = []
+    count = 0
+    while len(swells):
+        lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        long = lengths.max(axis=1) > edge
+        done.append((corners[~long], swells[~long], links[~long]))
+        count += len(done[-1][1])
+        corners, swells, links = corners[long], swells[long], links[long]
+        if count + 2 * len(swells) > _LARGEST:
+            done.append((corners, swells, links))
+            break
+        first, rows = lengths[long].argmax(axis=1), np.arange(len(swells))
+        a, b, c = (corners[rows, (first + k) % 3] for k in range(3))
+        middle = 0.5 * (a + b)
+        corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+        swells, links = np.tile(swells, 2), np.tile(links, 2)
+    first, second, third = zip(*done, strict=True)
+    return np.concatenate(first), np.concatenate(second), np.concatenate(third)
+
+
+def surface(fit: Fit, count: int) -> Array:
+    """Points (count, 3), m, evenly on the surface of a capsule, in a spiral."""
+    axis, radius = fit.end - fit.start, float(fit.radius)
+    length = float(np.linalg.norm(axis))
+    across = np.linalg.svd(axis[None])[2][1:]
+    along = axis / length if length > 0.0 else np.cross(across[0], across[1])
+    # The area of a ball or a cylinder between two heights is proportional to their difference.
+    height = (length + 2.0 * radius) * (np.arange(count) + 0.5) / count - radius
+    ring = np.sqrt(np.maximum(radius**2 - (height - np.clip(height, 0.0, length)) ** 2, 0.0))
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
+    local = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), height])
+    return fit.start + local @ np.vstack([across, along])
