@@ -105,9 +105,12 @@ def test_gradients_are_the_derivatives_of_the_distances(robot: Robot) -> None:
         q, step = rng.uniform(robot.q_lower, robot.q_upper), rng.normal(size=robot.n)
         low, near, high = (distances.at(q + k * h * step, Observed(WORLD)) for k in (-1, 0, 1))
         if low.names == near.names == high.names:
+            apart = (
+                near.distance > 0.0
+            )  # inside a box, the nearest point may lie where two faces are equally far
             rate = (high.distance - low.distance) / (2.0 * h)
-            assert rate == pytest.approx(near.gradient @ step, abs=2e-3)
-            checked += len(rate)
+            assert rate[apart] == pytest.approx((near.gradient @ step)[apart], abs=2e-3)
+            checked += int(apart.sum())
     assert checked > 50
 
 
