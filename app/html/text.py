@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from latex2mathml.converter import convert
 
-from app.html.palette import BAD, GOOD, RGB, css
+from app.html.palette import BAD, GOOD, RGB, css, on
 
 esc = html.escape
 
@@ -47,7 +47,7 @@ def swatch(colour: RGB) -> str:
 
 def badge(text: str, colour: RGB) -> str:
     return (
-        f'<span style="background:{css(colour)};color:#fff;border-radius:4px;padding:0 0.4em;'
+        f'<span style="background:{css(colour)};color:{css(on(colour))};border-radius:4px;padding:0 0.4em;'
         f'font-weight:600;white-space:nowrap">{esc(text)}</span>'
     )
 
