@@ -48,7 +48,10 @@ CHART, CHART_TITLE = ".uplot", ".u-title"
 NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
 SHEET = 'div[style*="width: 20em"]'
 """The sheet at the bottom of a phone."""
+STORED = "viser-user:"
+"""What viser puts before the keys of values that a browser stores."""
 OF_THE_PAGE = (
+    ("MessageHandler.tsx", f'LOCAL_STORAGE_PREFIX = "{STORED}"'),
     ("App.tsx", "w.__viserMutable = mutable.current"),
     ("WebsocketInterface.tsx", "viewerMutable.sendMessage = (message)"),
     ("components/UplotComponent.css", f"{CHART} {CHART_TITLE} {{"),
