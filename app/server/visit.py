@@ -87,7 +87,7 @@ class Visit:
             return  # the tab was closed
         tokens, dark, progress, motion = (text if text and len(text) <= _LONGEST else None for text in found)
         self._dark = dark == "1"
-        self._comfort = Comfort(self._client, motion == REDUCED)
+        self._comfort = Comfort(self._client, motion == REDUCED and isinstance(self._sessions, Sessions))
         self._notebook = Notebook(
             found_progress(progress, self._key), lambda text: self._keep(_PROGRESS, text), self._key
         )

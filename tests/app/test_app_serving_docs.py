@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import re
 import shutil
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urljoin
 
 import pytest
 from viser import __version__
@@ -212,6 +214,60 @@ def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
             with Wire(f"{proxy}/?{brought}") as page:
                 assert eventually(lambda: page.folders("Import report") > 0, LONG)
                 assert page.find("Python file") is None and page.find("File") is None
+    finally:
+        server.close()
+
+
+_PREFIXED = """
+server {
+    listen 127.0.0.1:PORT;
+    location /user/zoe/lab/ {
+        proxy_pass URL/;
+        proxy_http_version 1.1;
+        proxy_set_header Host $http_host;
+        proxy_set_header Upgrade $http_upgrade;
+        proxy_set_header Connection "upgrade";
+    }
+}
+"""
+
+
+def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
+    """Behind a proxy that removes a prefix: the token leaves the address without leaving the prefix, the
+    cookie belongs to it, the question for the token leads back to it, and a page gets a robot."""
+    port, prefix = free_port(), "/user/zoe/lab/"
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")),
+        port=0,
+        max_sessions=1,
+        trusted_origins=[f"http://127.0.0.1:{port}"],
+    )
+    site = _PREFIXED.replace("PORT", str(port)).replace("URL", server.url)
+    try:
+        with nginx_with(nginx, tmp_path, site, port):
+
+            def ask(path: str, cookie: str = "") -> tuple[int, http.client.HTTPMessage, str]:
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LONG)
+                connection.request("GET", path, headers={"Cookie": cookie})
+                found = connection.getresponse()
+                text = found.read().decode()
+                connection.close()
+                return found.status, found.headers, text
+
+            status, _, text = ask(prefix)
+            assert status == 403
+            links = re.findall(r'(?:href|action|src)="([^"]*)"', text)
+            assert links and {urljoin(prefix, each) for each in links} == {prefix}
+            token = (server.guest_link).partition("?")[2]
+            status, headers, _ = ask(f"{prefix}?{token}")
+            assert status == 303 and urljoin(prefix, headers["Location"]) == prefix
+            cookie, *attributes = headers["Set-Cookie"].split("; ")
+            assert not any(each.startswith("Path") for each in attributes)  # a browser takes the prefix
+            status, _, page = ask(prefix, cookie)
+            assert status == 200 and not re.findall(r'(?:href|action|src)="/', page)
+            assert ask(f"{prefix}health")[0] == 200
+            with Wire(f"http://127.0.0.1:{port}{prefix}?{token}"):
+                assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
     finally:
         server.close()
 
