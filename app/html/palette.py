@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 RGB = tuple[int, int, int]
 
@@ -80,6 +80,11 @@ def on(colour: RGB) -> RGB:
     return max((WHITE, BLACK), key=lambda text: contrast(text, colour))
 
 
+def button(colour: RGB) -> RGB:
+    """The colour, as dark as a button must be on which the page writes in white."""
+    return next(found for found in _mixed(colour, BLACK) if contrast(found, WHITE) >= 4.6)
+
+
 def ink(colour: RGB) -> str:
     """The CSS colour of text in this colour, darker on a light page and lighter on a dark one."""
     light, dark = readable_on(colour, LIGHT_PAGE), readable_on(colour, DARK_PAGE)
@@ -89,12 +94,14 @@ def ink(colour: RGB) -> str:
 def readable_on(colour: RGB, page: RGB) -> RGB:
     """The colour, mixed with black or white until its contrast with the page is at least 7.5: enough for
     4.5 on pale areas and in paler paragraphs."""
-    goal = on(page)
-    mixed = (
-        tuple(round(own + share / 20 * (end - own)) for own, end in zip(colour, goal, strict=True))
-        for share in range(21)
-    )
-    return next((r, g, b) for r, g, b in mixed if contrast((r, g, b), page) >= _TEXT)
+    return next(found for found in _mixed(colour, on(page)) if contrast(found, page) >= _TEXT)
+
+
+def _mixed(colour: RGB, end: RGB) -> Iterator[RGB]:
+    """From the colour to `end` in steps of a twentieth."""
+    for share in range(21):
+        r, g, b = (round(own + share / 20 * (to - own)) for own, to in zip(colour, end, strict=True))
+        yield r, g, b
 
 
 _TEXT = 7.5

@@ -85,7 +85,8 @@ def bar(share: float, colour: RGB, mark: float | None = None) -> str:
 @lru_cache(maxsize=64)
 def formula(latex: str) -> str:
     """A LaTeX formula as MathML that scrolls instead of being cut off."""
-    return f'<div style="overflow-x:auto;padding:0.3em 0.75em">{convert(latex, display="block")}</div>'
+    style = "overflow-x:auto;padding:0.3em 0.75em"
+    return f'<div tabindex="0" style="{style}">{convert(latex, display="block")}</div>'
 
 
 def figure(value: float, unit: str = "") -> str:

@@ -11,6 +11,7 @@ from app.adapter import private
 from app.adapter.names import STORED
 from app.client.simulation_client import SimulationClient
 from app.link.messages import Play
+from app.page import accessible
 from app.panels.run.narration import Narration, facts_of
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.settings import SceneSettings
@@ -37,7 +38,6 @@ _BEGIN = """(() => {
     "background:#222;color:#fff";
   line.hidden = true;
   document.body.append(line);
-  document.documentElement.lang = "en";
 })()"""
 _SAY = """(() => {
   const line = document.getElementById(%s);
@@ -59,6 +59,7 @@ class Comfort:
         """Called when a scene was built."""
         self._narration = Narration(time.monotonic)
         private.run_script(self._client, _BEGIN % {"line": json.dumps(LINE)})
+        private.run_script(self._client, accessible.script())
         if self._reduced:
             learner.send(Play(False))
 

@@ -26,6 +26,7 @@ from app.html.palette import (
     LEVELS,
     LIGHT_PAGE,
     RGB,
+    button,
     contrast,
     ink,
     joint_colour,
@@ -91,6 +92,7 @@ def test_text_in_a_colour_can_be_read_on_both_pages(colour: RGB) -> None:
         paler = tuple(round(0.8 * own + 0.2 * behind) for own, behind in zip((r, g, b), page, strict=True))
         assert contrast((paler[0], paler[1], paler[2]), page) >= 4.5, "in a paragraph with opacity 0.8"
     assert contrast(on(colour), colour) >= 4.5
+    assert contrast(button(colour), LIGHT_PAGE) >= 4.5, "white words on a button"
     assert f"color:rgba({on(colour)[0]}," in badge("word", colour)
 
 

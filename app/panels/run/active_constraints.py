@@ -57,6 +57,5 @@ class BindingPanel:
 
 def _table(titles: tuple[str, ...], rows: str) -> str:
     head = _HEAD.format("".join(f'<th style="padding-right:0.8em">{title}</th>' for title in titles))
-    return (
-        f'<div style="overflow-x:auto"><table style="border-spacing:0.3em 0.1em">{head}{rows}</table></div>'
-    )
+    table = f'<table style="border-spacing:0.3em 0.1em">{head}{rows}</table>'
+    return f'<div tabindex="0" style="overflow-x:auto">{table}</div>'

@@ -9,7 +9,7 @@ import viser
 
 from app.client.run_statistics import RunFigures
 from app.client.simulation_client import SimulationClient
-from app.html.palette import BAD, BOUND, GHOST, RGB, ink
+from app.html.palette import BAD, BOUND, GHOST, RGB, button, ink
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -43,7 +43,7 @@ class ComparePanel:
         )
         self._folders: list[viser.GuiFolderHandle] = []
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
-        self._start = gui.add_button("Start the ghost", color="violet")
+        self._start = gui.add_button("Start the ghost", color=button(GHOST))
         self._swap = gui.add_button(
             "Swap robot and ghost", hint="Each gets the other's settings; both start again", visible=False
         )
