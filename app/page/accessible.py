@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 
-from app.adapter.names import CLOSES_NOTICE, ICON_BUTTON, ROW, SCROLLS
+from app.adapter.names import CHART, CLOSES_NOTICE, ICON_BUTTON, ROW, SCROLLS
 
 # Mantine's default colours of labels and buttons have a contrast of 3.3 and 3.6 on a white page.
 STYLE = """
@@ -24,7 +24,7 @@ STYLE = """
 # A slider has a number beside it, and both belong to one label; viser names at most one of them. Controls
 # come and go with tabs, so that the script looks regularly.
 _NAMES = """
-const row = %s, icon = %s, closes = %s, scrolls = %s, key = "__himpcLabNames";
+const row = %s, icon = %s, closes = %s, scrolls = %s, chart = %s, key = "__himpcLabNames";
 window[key]?.();
 const empty = (each) => !each.getAttribute("aria-label") && !each.getAttribute("aria-labelledby");
 const name = (each, words) => { if (words && empty(each)) each.setAttribute("aria-label", words); };
@@ -39,7 +39,7 @@ const look = () => {
     if (!each.textContent.trim()) name(each, "Commands and settings");
   for (const each of document.querySelectorAll(scrolls)) each.tabIndex = 0;
   for (const each of document.querySelectorAll("canvas")) {
-    if (each.closest(".uplot")) { each.setAttribute("aria-hidden", "true"); continue; }
+    if (each.closest(chart)) { each.setAttribute("aria-hidden", "true"); continue; }
     each.setAttribute("role", "img");
     name(each, "The robot in its scene");
   }
@@ -52,7 +52,7 @@ look();
 
 def script() -> str:
     """JavaScript that adds names, language and style; it may run again for each scene."""
-    names = _NAMES % tuple(map(json.dumps, (ROW, ICON_BUTTON, CLOSES_NOTICE, SCROLLS)))
+    names = _NAMES % tuple(map(json.dumps, (ROW, ICON_BUTTON, CLOSES_NOTICE, SCROLLS, CHART)))
     return f"""(() => {{
 document.documentElement.lang = "en";
 const id = "himpc-lab-style";
