@@ -25,7 +25,7 @@ from websockets.sync.client import connect
 from app.__main__ import main
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.passes import QUERY
+from app.server.passes import HEADER, QUERY
 from app.server.server import PageServer
 from browsing.wire import Wire, camera, eventually, pack
 from lessons.own.folder import Folder
@@ -270,6 +270,57 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
                 assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
     finally:
         server.close()
+
+
+def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
+    """Two servers of one session each, with one token: the second learner gets the second robot, the third is
+    asked to wait, and gets the place that becomes free."""
+    port, token = free_port(), "one-token-for-all-servers"
+    origin = f"http://127.0.0.1:{port}"
+    servers = [
+        PageServer(
+            SceneChoice(RunSpec("planar3-hold")),
+            port=0,
+            max_sessions=1,
+            grace=0.5,
+            trusted_origins=[origin],
+            token=token,
+            refers=True,
+        )
+        for _ in range(2)
+    ]
+    (site,) = re.findall(r"```text\n(upstream .*?)```", PAGE.read_text(), re.DOTALL)
+    for text, here in (
+        ("lab-1.example.org:8080", servers[0].url.removeprefix("http://")),
+        ("lab-2.example.org:8080", servers[1].url.removeprefix("http://")),
+        ("listen 80;", f"listen 127.0.0.1:{port};"),
+    ):
+        assert site.count(text) == 1
+        site = site.replace(text, here)
+    link = f"{origin}/?{QUERY}={token}"
+    try:
+        with nginx_with(nginx, tmp_path, site, port):
+
+            def taken() -> int:
+                return sum(learner.attached for each in servers for learner in each.sessions.learners)
+
+            with Wire(link):
+                assert eventually(lambda: taken() == 1, LONG)
+                with Wire(link):
+                    assert eventually(lambda: taken() == 2, LONG)
+                    assert [len(each.sessions.learners) for each in servers] == [1, 1]
+                    with pytest.raises(InvalidStatus) as refused:
+                        connect(link.replace("http", "ws"), subprotocols=PROTOCOL)
+                    assert refused.value.response.status_code == 503
+                    with pytest.raises(urllib.error.HTTPError) as waiting:
+                        urllib.request.urlopen(urllib.request.Request(origin, headers={HEADER: token}))
+                    assert waiting.value.code == 503 and waiting.value.headers["Refresh"] == "5"
+                assert eventually(lambda: sum(len(each.sessions.learners) for each in servers) == 1, LONG)
+                with Wire(link):
+                    assert eventually(lambda: taken() == 2, LONG)
+    finally:
+        for each in servers:
+            each.close()
 
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
